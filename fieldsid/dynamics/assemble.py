@@ -14,21 +14,16 @@ from operator import attrgetter
 import numpy as np
 
 from fieldsid.dynamics import integrate
-from fieldsid.dynamics.places import CONSTANTS, CROSS_DAMPING, CROSS_RATE, DRIVES
-from fieldsid.models.effect import Core, Effect, Motion, Terms, Values, over_intervals
+from fieldsid.models.effect import Effect, Motion, Terms, Values, over_intervals
 from fieldsid.models.fin_path import FinPath
+from fieldsid.models.hull import CROSS_FACTOR, DAMPING, DRIVES, FIN, MOMENT_END, MOMENT_START, STIFFNESS, Core
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
 MAX_RATE_STEP_PRODUCT, MAX_PIECES = 0.3, 200
 """Largest product of step and fastest linear rate of one RK4 piece (relative error below 3e-5 of a step), and most pieces."""
-DAMPING, STIFFNESS, CROSS_FACTOR, CROSS_INPUT = (
-    DRIVES.index(name) for name in ("damping", "stiffness", "cross_factor", "cross_push")
-)
-MOMENT = (DRIVES.index("moment_start"), DRIVES.index("moment_end"))
-"""The places of the core's drives."""
+MOMENT = (MOMENT_START, MOMENT_END)
 NO_CORE, NO_TERMS = Core(), Terms()
-_CONSTANTS = attrgetter(*CONSTANTS)
 MAX_MOMENT_ITERATIONS = 30
 MOMENT_TOLERANCE = 1e-9
 
@@ -49,7 +44,7 @@ class Base:
 
 @dataclass(frozen=True, slots=True)
 class KernelInputs:
-    """Arrays of the core: drive (n-1, 6), constants (16,), pieces per interval; what they came from: fin path, terms, core."""
+    """Arrays of the core: drive (n-1, 6), constants (17,), pieces per interval; what they came from: fin path, terms, core."""
 
     drive: FloatArray
     constants: FloatArray
@@ -95,9 +90,8 @@ def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Valu
     drive[:, STIFFNESS] = base.stiffness
     drive[:, MOMENT[0]], drive[:, MOMENT[1]] = moments_of(base, fin, terms)
     drive[:, CROSS_FACTOR] = cross_factor_of(terms)
-    drive[:, CROSS_INPUT] = cross_input_of(fin, core)
-    constants = constants_of(core)
-    return KernelInputs(drive, constants, _pieces(record, damping, base.stiffness, constants), fin, terms, core)
+    drive[:, FIN] = fin.mean
+    return KernelInputs(drive, np.array(core), _pieces(record, damping, base.stiffness, core), fin, terms, core)
 
 
 def damping_of(base: Base, terms: Terms) -> FloatArray | float:
@@ -120,16 +114,6 @@ def moments_of(base: Base, fin: FinPath, terms: Terms) -> tuple[FloatArray, Floa
 def cross_factor_of(terms: Terms) -> FloatArray | float:
     """Return the speed over the run's own in the cross state's equation over each interval, (n-1,), or 1."""
     return 1.0 if terms.cross_factor is None else over_intervals(terms.cross_factor)
-
-
-def cross_input_of(fin: FinPath, core: Core) -> FloatArray | float:
-    """Return the fin's input to the cross state's equation over each interval, (n-1,), or zero."""
-    return core.cross_fin * fin.mean if core.cross_fin != 0.0 else 0.0
-
-
-def constants_of(core: Core) -> FloatArray:
-    """Return a core's coefficients as the vector (16,) that the kernel takes; the fin's input to the cross state is a drive."""
-    return np.array(_CONSTANTS(core))
 
 
 def scaled_fin(fin: FinPath, terms: Terms) -> tuple[FloatArray, FloatArray]:
@@ -165,7 +149,7 @@ def with_moments(
         drive = assembled.drive.copy()
         for effect in own:
             _add_moment(drive, effect, Motion(path[:, 0], path[:, 1]), values, record)
-        current = replace(assembled, drive=drive, pieces=_pieces(record, drive[:, 0], drive[:, 1], assembled.constants))
+        current = replace(assembled, drive=drive, pieces=_pieces(record, drive[:, DAMPING], drive[:, STIFFNESS], assembled.core))
         new = integrate_record(record, current, start)
         change = float(np.max(np.abs(new[:, :2] - path[:, :2])))
         path = new
@@ -196,10 +180,10 @@ def _add_moment(drive: FloatArray, effect: Effect, motion: Motion, values: Value
         - effect.moment(Motion(motion.angle, motion.rate - step), values, record)
     ) / (2 * step)
     slope_y, slope_p = over_intervals(by_angle), over_intervals(by_rate)
-    drive[:, 0] -= slope_p
-    drive[:, 1] -= slope_y
-    drive[:, 2] += value[:-1] - slope_p * motion.rate[:-1] - slope_y * motion.angle[:-1]
-    drive[:, 3] += value[1:] - slope_p * motion.rate[1:] - slope_y * motion.angle[1:]
+    drive[:, DAMPING] -= slope_p
+    drive[:, STIFFNESS] -= slope_y
+    drive[:, MOMENT_START] += value[:-1] - slope_p * motion.rate[:-1] - slope_y * motion.angle[:-1]
+    drive[:, MOMENT_END] += value[1:] - slope_p * motion.rate[1:] - slope_y * motion.angle[1:]
 
 
 def pieces_for(step: float, *rates: float) -> int:
@@ -207,8 +191,8 @@ def pieces_for(step: float, *rates: float) -> int:
     return ceil(min(max(1.0, step * max(rates) / MAX_RATE_STEP_PRODUCT), MAX_PIECES))
 
 
-def _pieces(record: Record, damping: FloatArray | float, stiffness: FloatArray | float, constants: FloatArray) -> int:
-    cross = abs(float(constants[CROSS_DAMPING])), sqrt(abs(float(constants[CROSS_RATE])))
+def _pieces(record: Record, damping: FloatArray | float, stiffness: FloatArray | float, core: Core) -> int:
+    cross = abs(core.cross_damping), sqrt(abs(core.cross_rate))
     return pieces_for(record.longest, _largest(damping), sqrt(_largest(stiffness)), *cross)
 
 

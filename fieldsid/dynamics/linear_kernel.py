@@ -9,20 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.dynamics.places import (
-    CROSS_DAMPING,
-    CROSS_QUADRATIC,
-    CROSS_RATE,
-    HEADING_COS,
-    HEADING_COS2,
-    HEADING_SIN,
-    HEADING_SIN2,
-    QUADRATIC,
-    RIGHTING_COS,
-    RIGHTING_SIN,
-    STRIP_FORCE,
-    STRIP_MOMENT,
-)  # fmt: skip
+from fieldsid.models.hull import DAMPING, STIFFNESS, kinds_of
 from fieldsid.numerics.arrays import FloatArray, IntArray
 from fieldsid.numerics.jit import inner, jit
 
@@ -84,39 +71,9 @@ def set_all_diverged(sens: FloatArray, first: int) -> None:
 
 
 @inner
-def reverses(c: FloatArray) -> bool:
-    """Whether any of the constants (16,) goes with the sine or the cosine of the angle."""
-    once = abs(c[HEADING_SIN]) + abs(c[HEADING_COS]) + abs(c[RIGHTING_SIN]) + abs(c[RIGHTING_COS])
-    return bool(once + abs(c[HEADING_SIN2]) + abs(c[HEADING_COS2]) != 0.0)
-
-
-@inner
-def crosses_limit_by(c: FloatArray) -> bool:
-    """Whether any of the constants (16,) drives the cross state or damps it."""
-    return bool(abs(c[CROSS_DAMPING]) + abs(c[CROSS_RATE]) + abs(c[CROSS_QUADRATIC]) + abs(c[STRIP_FORCE]) != 0.0)
-
-
-@inner
-def of_strips(c: FloatArray) -> bool:
-    """Whether any of the constants (16,) is of the flow that the cross state makes along the hull."""
-    return bool(abs(c[STRIP_MOMENT]) + abs(c[STRIP_FORCE]) != 0.0)
-
-
-@inner
-def crosses_limit(drive: FloatArray, c: FloatArray, start: FloatArray) -> bool:
-    """Whether the cross state is anything but zero."""
-    push = abs(start[2])
-    for i in range(drive.shape[0]):
-        push += abs(drive[i, 5])
-    return push != 0.0 or crosses_limit_by(c)
-
-
-@inner
 def is_linear(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray) -> bool:
     """Whether a motion is linear in (y, p) alone, and goes by even intervals."""
-    if c[QUADRATIC] != 0.0 or c[STRIP_MOMENT] != 0.0:
-        return False
-    return is_even(steps, drive) and not (reverses(c) or crosses_limit(drive, c, start))
+    return not kinds_of(c).bent and start[2] == 0.0 and is_even(steps, drive)
 
 
 @inner
@@ -125,7 +82,8 @@ def is_even(steps: FloatArray, drive: FloatArray) -> bool:
     if steps.shape[0] < FEWEST_INTERVALS:
         return False
     for i in range(steps.shape[0]):
-        if drive[i, 0] != drive[0, 0] or drive[i, 1] != drive[0, 1] or abs(steps[i] - steps[0]) > STEP_TOLERANCE * steps[0]:
+        alike = drive[i, DAMPING] == drive[0, DAMPING] and drive[i, STIFFNESS] == drive[0, STIFFNESS]
+        if not alike or abs(steps[i] - steps[0]) > STEP_TOLERANCE * steps[0]:
             return False
     return True
 
@@ -174,7 +132,7 @@ def linear_sensitivities(
     """
     bent = 0.0
     for j in range(d_c.shape[0]):
-        bent += abs(d_start[j, 2]) + abs(factor[j, 5])
+        bent += abs(d_start[j, 2])
         for l in range(d_c.shape[1]):
             bent += abs(d_c[j, l])
     if bent != 0.0 or not is_linear(steps, drive, c, start):

@@ -1,61 +1,38 @@
-"""The compiled core of any motion: angle, rate and one cross state by RK4 over each interval, with exact tangents of that map.
+"""The compiled core of any motion: the equations of models/hull.py by RK4 over each interval, with exact tangents of that map.
 
-    y' = p
-    p' = -a p - k y + m(t) - Q p|p| (|p|/0.2)^o - N F(s x/g, p) + c x
-         + hs sin z + hc cos z + hs2 sin 2z + hc2 cos 2z + rs (z - sin z) + rc (cos z - 1)
-    z = y - ht (t - the middle of the run)
-    x' = -e g x - (D/g) x|x| - f g^2 p - Y g G(s x/g, p) + q
-    F(alpha, p) = 32 int_{-1/2}^{1/2} (alpha + xi p) |alpha + xi p| xi dxi        (F(0, p) = p |p|)
-    G(alpha, p) = int_{-1/2}^{1/2} (alpha + xi p) |alpha + xi p| dxi              (G(alpha, 0) = alpha |alpha|)
-a, k, q and the cross factor g (speed over the run's speed) are held over an interval; m runs straight from its start to its
-end. The tangents are the derivatives of the discrete map itself, so a least-squares step has no truncation error of its own.
+Damping, stiffness, the fin and the cross factor are held over an interval; the moment runs straight from its start to its end.
+The tangents are the derivatives of the discrete map itself, so a least-squares step has no truncation error of its own.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.dynamics.drag_laws import crossflow, crossforce, power_drag
-from fieldsid.dynamics.linear_kernel import (
-    DIVERGED_RATE_RAD_S,
-    crosses_limit,
-    crosses_limit_by,
-    of_strips,
-    reverses,
-    set_all_diverged,
-    set_diverged,
+from fieldsid.dynamics.linear_kernel import DIVERGED_RATE_RAD_S, set_all_diverged, set_diverged
+from fieldsid.models.hull import (
+    CROSS_FACTOR,
+    DAMPING,
+    FIN,
+    MOMENT_END,
+    MOMENT_START,
+    STIFFNESS,
+    Core,
+    Kinds,
+    Slope,
+    by_constants,
+    either,
+    kinds_of,
+    named,
+    slope,
 )
-from fieldsid.dynamics.places import (
-    BEYOND_SQUARE,
-    CROSS_DAMPING,
-    CROSS_QUADRATIC,
-    CROSS_RATE,
-    CROSS_SHARE,
-    HEADING_COS,
-    HEADING_COS2,
-    HEADING_SIN,
-    HEADING_SIN2,
-    HEADING_TURN,
-    QUADRATIC,
-    RIGHTING_COS,
-    RIGHTING_SIN,
-    STRIP_FLOW,
-    STRIP_FORCE,
-    STRIP_MOMENT,
-)  # fmt: skip
-from fieldsid.models.effect import ZERO_RATE_RAD_S
 from fieldsid.numerics.arrays import FloatArray, IntArray
 from fieldsid.numerics.jit import inner, jit
 
-SMALLEST_SPEED_RATIO = 0.01
-"""Speed over the run's speed below which the cross state's quadratic drag grows no more: at rest the state means nothing."""
 SMALLEST_WEIGHT = 1e-150
-AT_Y, AT_P, AT_X, PART, BY_Y, BY_P, BY_X, BY_FACTOR, DRAG, BY_POWER, SIN, COS, ARC, BY_TURN = range(14)
-OF_X, OF_FACTOR, X_BY_P, AT_MOMENT, AT_FORCE, MOMENT_BY_FLOW, FORCE_BY_FLOW = range(14, 21)
-"""What is kept of each stage of a step: the state and the share of the interval; the derivatives of p' by y and by p, of -x'
-by x and by the cross factor; what the derivatives of the constants multiply; the derivatives of p' by x and by the cross
-factor, of -x' by p; and, of the flow that the cross state makes, F, G/g and their derivatives by s."""
-STAGE_COLUMNS = 21
+BY_ANGLE, BY_RATE, BY_CROSS, BY_FACTOR, CROSS_BY_RATE, CROSS_BY_CROSS, CROSS_BY_FACTOR, AT_ANGLE, AT_RATE, PART = range(10)
+"""What is kept of each stage of a step: the slopes, see `Slope`; angle, rate and the share of the interval that has passed."""
+OF_ANGLE, OF_RATE, OF_CROSS, OF_LEVEL, OF_RISE, OF_DAMPING, OF_STIFFNESS, OF_FIN, OF_FACTOR = range(9)
+"""The columns of a step's linear map: of the state, of a moment's level and rise, and of the other drives."""
 
 
 @inner
@@ -79,58 +56,56 @@ def _total(steps: FloatArray) -> float:
     return total
 
 
+@inner
+def over_interval(
+    k: Core, kinds: Kinds, drive: FloatArray, i: int, step: float, pieces: int, late: float, state: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Return angle, rate and cross state after the interval of a drive's row i (n-1, 6), `late` s after the run's middle."""
+    y, p, x = state
+    h, a, b, fast, fin = step / pieces, drive[i, DAMPING], drive[i, STIFFNESS], drive[i, CROSS_FACTOR], drive[i, FIN]
+    first, last = drive[i, MOMENT_START], drive[i, MOMENT_END]
+    for piece in range(pieces):
+        ky, kp, kx, ty, tp, tx = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for stage in range(4):
+            g, part = _reach(stage) * h, (piece + _reach(stage)) / pieces
+            rate, moment = p + g * kp, first + (last - first) * part
+            now = slope(k, kinds, a, b, moment, fin, fast, y + g * ky, rate, x + g * kx, late + part * step)
+            ky, kp, kx = rate, now.rate, now.cross
+            ty, tp, tx = ty + _weight(stage) * ky, tp + _weight(stage) * kp, tx + _weight(stage) * kx
+        y, p, x = y + h / 6.0 * ty, p + h / 6.0 * tp, x + h / 6.0 * tx
+    return y, p, x
+
+
 @jit
 def nonlinear_motion(
     steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, out: FloatArray
 ) -> None:
     """Fill out (n, 3) as `integrate.integrate_motion` does, whatever the motion and the clock."""
-    n = steps.shape[0] + 1
-    y, p, x = start[0], start[1], start[2]
-    out[0, 0], out[0, 1], out[0, 2] = y, p, x
-    turning, stripped, late = reverses(c), of_strips(c), -0.5 * _total(steps)
-    for i in range(n - 1):
-        h = steps[i] / pieces
-        a, k = drive[i, 0], drive[i, 1]
-        fast = drive[i, 4]
-        floored = max(fast, SMALLEST_SPEED_RATIO)
-        e, f_cross, hold, q = c[CROSS_DAMPING] * fast, c[CROSS_RATE] * fast**2, c[CROSS_QUADRATIC] / floored, drive[i, 5]
-        for piece in range(pieces):
-            ky, kp, kx = 0.0, 0.0, 0.0
-            ty, tp, tx = 0.0, 0.0, 0.0
-            for stage in range(4):
-                g = _reach(stage) * h
-                part = (piece + _reach(stage)) / pieces
-                ys, ps, xs = y + g * ky, p + g * kp, x + g * kx
-                m = drive[i, 2] + (drive[i, 3] - drive[i, 2]) * part
-                drag = ps * abs(ps) if c[BEYOND_SQUARE] == 0.0 else power_drag(ps, c[BEYOND_SQUARE])[0]
-                f = -a * ps - k * ys + m - c[QUADRATIC] * drag + c[CROSS_SHARE] * xs
-                slower = (e + hold * abs(xs)) * xs + f_cross * ps - q
-                if stripped:
-                    alpha = c[STRIP_FLOW] * xs / floored
-                    f -= c[STRIP_MOMENT] * crossflow(alpha, ps)[0]
-                    slower += c[STRIP_FORCE] * fast * crossforce(alpha, ps)[0]
-                if turning:
-                    seen = ys - c[HEADING_TURN] * (late + part * steps[i])
-                    sin, cos = np.sin(seen), np.cos(seen)
-                    f += c[HEADING_SIN] * sin + c[HEADING_COS] * cos
-                    f += c[RIGHTING_SIN] * (seen - sin) + c[RIGHTING_COS] * (cos - 1.0)
-                    f += 2.0 * c[HEADING_SIN2] * sin * cos + c[HEADING_COS2] * (1.0 - 2.0 * sin * sin)
-                ky, kp, kx = ps, f, -slower
-                ty += _weight(stage) * ky
-                tp += _weight(stage) * kp
-                tx += _weight(stage) * kx
-            y += h / 6.0 * ty
-            p += h / 6.0 * tp
-            x += h / 6.0 * tx
-        if not abs(p) < DIVERGED_RATE_RAD_S:
+    state = (start[0], start[1], start[2])
+    out[0, 0], out[0, 1], out[0, 2] = state
+    k, kinds, late = named(c), kinds_of(c), -0.5 * _total(steps)
+    for i in range(steps.shape[0]):
+        state = over_interval(k, kinds, drive, i, steps[i], pieces, late, state)
+        if not abs(state[1]) < DIVERGED_RATE_RAD_S:
             set_diverged(out, i + 1)
             return
-        out[i + 1, 0], out[i + 1, 1], out[i + 1, 2] = y, p, x
+        out[i + 1, 0], out[i + 1, 1], out[i + 1, 2] = state
         late += steps[i]
 
 
 @inner
-def _map_row(row: int, h: float, stages: FloatArray, rows: FloatArray, push: FloatArray, pull: FloatArray) -> None:
+def _keep(stage: int, now: Slope, y: float, p: float, part: float, stages: FloatArray) -> None:
+    """Fill column `stage` of stages (10, 4) with what the linear map of a step is made of."""
+    stages[BY_ANGLE, stage], stages[BY_RATE, stage], stages[BY_CROSS, stage] = now.by_angle, now.by_rate, now.by_cross
+    stages[BY_FACTOR, stage], stages[CROSS_BY_FACTOR, stage] = now.by_factor, now.cross_by_factor
+    stages[CROSS_BY_RATE, stage], stages[CROSS_BY_CROSS, stage] = now.cross_by_rate, now.cross_by_cross
+    stages[AT_ANGLE, stage], stages[AT_RATE, stage], stages[PART, stage] = y, p, part
+
+
+@inner
+def _map_row(
+    row: int, h: float, cross_fin: float, stages: FloatArray, rows: FloatArray, push: FloatArray, pull: FloatArray
+) -> None:
     """Fill one row of a step's linear map: rows (3, 9) of the state and of what enters, push and pull (3, 4) of each stage.
 
     A tangent obeys s' = A_l s + b u_l at stage l of the step, so that s -> s + sum_l W_l (A_l s + b u_l) with
@@ -139,94 +114,51 @@ def _map_row(row: int, h: float, stages: FloatArray, rows: FloatArray, push: Flo
     in_y, in_p, in_x = 1.0 * (row == 0), 1.0 * (row == 1), 1.0 * (row == 2)
     of_y, of_p, of_x = in_y, in_p, in_x
     v_y, v_p, v_x, part = 0.0, 0.0, 0.0, 0.0
-    one, of_cross, by_factor = 0.0, 0.0, 0.0
+    level, of_cross, by_factor = 0.0, 0.0, 0.0
     for back in range(4):
         l = 3 - back
         whole = _weight(l) * h / 6.0
         w_y, w_p, w_x = part * v_y + whole * in_y, part * v_p + whole * in_p, part * v_x + whole * in_x
-        v_y, v_p = w_p * stages[BY_Y, l], w_y + w_p * stages[BY_P, l] - w_x * stages[X_BY_P, l]
-        v_x = w_p * stages[OF_X, l] - w_x * stages[BY_X, l]
+        v_y, v_p = w_p * stages[BY_ANGLE, l], w_y + w_p * stages[BY_RATE, l] + w_x * stages[CROSS_BY_RATE, l]
+        v_x = w_p * stages[BY_CROSS, l] + w_x * stages[CROSS_BY_CROSS, l]
         of_y, of_p, of_x = of_y + v_y, of_p + v_p, of_x + v_x
-        one, of_cross = one + w_p, of_cross + w_x
-        by_factor += w_p * stages[OF_FACTOR, l] - w_x * stages[BY_FACTOR, l]
+        level, of_cross = level + w_p, of_cross + w_x
+        by_factor += w_p * stages[BY_FACTOR, l] + w_x * stages[CROSS_BY_FACTOR, l]
         push[row, l], pull[row, l] = w_p, w_x
         part = _reach(l) * h
-    rows[row, 0], rows[row, 1], rows[row, 2], rows[row, 3] = of_y, of_p, of_x, one
-    rows[row, 7], rows[row, 8] = of_cross, by_factor
+    rows[row, OF_ANGLE], rows[row, OF_RATE], rows[row, OF_CROSS], rows[row, OF_LEVEL] = of_y, of_p, of_x, level
+    rows[row, OF_FIN], rows[row, OF_FACTOR] = cross_fin * of_cross, by_factor
 
 
 @inner
 def _map_rates(row: int, stages: FloatArray, push: FloatArray, rows: FloatArray) -> None:
     """Fill what changes from step to step, and from piece to piece of one, in a row of the linear map of a linear motion."""
-    rising, by_a, by_k = 0.0, 0.0, 0.0
+    rise, turned, stiffened = 0.0, 0.0, 0.0
     for l in range(4):
-        rising += push[row, l] * stages[PART, l]
-        by_a, by_k = by_a - push[row, l] * stages[AT_P, l], by_k - push[row, l] * stages[AT_Y, l]
-    rows[row, 4], rows[row, 5], rows[row, 6] = rising, by_a, by_k
-
-
-@inner
-def _of_constant(l: int, stages: FloatArray, stage: int, fast: float, floored: float) -> tuple[float, float]:
-    """Return the derivatives of p' and of -x' at a stage of a step by the constant at place l, the state as it is."""
-    ps, xs = stages[AT_P, stage], stages[AT_X, stage]
-    sin, cos = stages[SIN, stage], stages[COS, stage]
-    of_p, of_x = 0.0, 0.0
-    if l == QUADRATIC:
-        of_p = -stages[DRAG, stage]
-    elif l == HEADING_SIN:
-        of_p = sin
-    elif l == HEADING_COS:
-        of_p = cos
-    elif l == RIGHTING_SIN:
-        of_p = stages[ARC, stage]
-    elif l == RIGHTING_COS:
-        of_p = cos - 1.0
-    elif l == CROSS_DAMPING:
-        of_x = fast * xs
-    elif l == CROSS_RATE:
-        of_x = fast * fast * ps
-    elif l == CROSS_QUADRATIC:
-        of_x = xs * abs(xs) / floored
-    elif l == BEYOND_SQUARE:
-        of_p = -stages[BY_POWER, stage]
-    elif l == HEADING_SIN2:
-        of_p = 2.0 * sin * cos
-    elif l == HEADING_COS2:
-        of_p = 1.0 - 2.0 * sin * sin
-    elif l == HEADING_TURN:
-        of_p = -stages[BY_TURN, stage]
-    elif l == CROSS_SHARE:
-        of_p = xs
-    elif l == STRIP_MOMENT:
-        of_p = -stages[AT_MOMENT, stage]
-    elif l == STRIP_FORCE:
-        of_x = stages[AT_FORCE, stage]
-    else:
-        of_p, of_x = -stages[MOMENT_BY_FLOW, stage], stages[FORCE_BY_FLOW, stage]
-    return of_p, of_x
+        rise += push[row, l] * stages[PART, l]
+        turned, stiffened = turned + push[row, l] * stages[AT_RATE, l], stiffened + push[row, l] * stages[AT_ANGLE, l]
+    rows[row, OF_RISE], rows[row, OF_DAMPING], rows[row, OF_STIFFNESS] = rise, -turned, -stiffened
 
 
 @inner
 def _map_constants(
-    moved: IntArray, stages: FloatArray, push: FloatArray, pull: FloatArray, fast: float, floored: float, by: FloatArray
+    moved: IntArray, of_rate: FloatArray, of_cross: FloatArray, push: FloatArray, pull: FloatArray, by: FloatArray
 ) -> None:
     """Fill by (3, K) with what a step makes of the state per unit of each of the K constants that any parameter moves.
 
     Where there is no cross state no constant moves it, and the third rows of push and pull are nil.
     """
-    for k in range(moved.shape[0]):
-        to_y, to_p, to_x = 0.0, 0.0, 0.0
-        for stage in range(4):
-            e, z = _of_constant(moved[k], stages, stage, fast, floored)
-            to_y += push[0, stage] * e - pull[0, stage] * z
-            to_p += push[1, stage] * e - pull[1, stage] * z
-            to_x += push[2, stage] * e - pull[2, stage] * z
-        by[0, k], by[1, k], by[2, k] = to_y, to_p, to_x
+    for l in range(moved.shape[0]):
+        for row in range(3):
+            total = 0.0
+            for stage in range(4):
+                total += push[row, stage] * of_rate[moved[l], stage] + pull[row, stage] * of_cross[moved[l], stage]
+            by[row, l] = total
 
 
 @inner
 def _moved_constants(d_c: FloatArray) -> IntArray:
-    """Return the places of the constants that any parameter moves; d_c (P, 16)."""
+    """Return the places of the constants that any parameter moves; d_c (P, 17)."""
     places, count = np.zeros(d_c.shape[1], dtype=np.intp), 0
     for l in range(d_c.shape[1]):
         size = 0.0
@@ -238,6 +170,60 @@ def _moved_constants(d_c: FloatArray) -> IntArray:
     return places[:count]
 
 
+@inner
+def _all_kinds(c: FloatArray, start: FloatArray, d_c: FloatArray, d_start: FloatArray) -> tuple[Kinds, bool]:
+    """Return the kinds of terms that the constants or a parameter bring in, and whether there is a cross state."""
+    kinds = kinds_of(c)
+    crossing = start[2] != 0.0
+    for j in range(d_c.shape[0]):
+        kinds = either(kinds, kinds_of(d_c[j]))
+        crossing = crossing or d_start[j, 2] != 0.0
+    return kinds, crossing or kinds.crossing
+
+
+@inner
+def _carry(
+    i: int, size: int, rows: FloatArray, columns: FloatArray, place: IntArray, factor: FloatArray, d_c: FloatArray,
+    has_c: FloatArray, moved: IntArray, by: FloatArray, s: FloatArray,
+) -> None:  # fmt: skip
+    """Carry the tangents s (P, 3) over a step of interval i: by the map of its `size` states, the drives and the constants."""
+    crossing = size > 2
+    for j in range(s.shape[0]):
+        # written out: each call that hands over arrays would cost as much as what it does
+        sy, sp, sx = s[j, 0], s[j, 1], s[j, 2]
+        to_y, to_p = rows[0, OF_ANGLE] * sy + rows[0, OF_RATE] * sp, rows[1, OF_ANGLE] * sy + rows[1, OF_RATE] * sp
+        to_x = 0.0
+        if crossing:
+            to_y, to_p = to_y + rows[0, OF_CROSS] * sx, to_p + rows[1, OF_CROSS] * sx
+            to_x = rows[2, OF_ANGLE] * sy + rows[2, OF_RATE] * sp + rows[2, OF_CROSS] * sx
+        if factor[j, MOMENT_START] != 0.0 or factor[j, MOMENT_END] != 0.0:
+            level = factor[j, MOMENT_START] * columns[place[j, MOMENT_START], i]
+            rise = factor[j, MOMENT_END] * columns[place[j, MOMENT_END], i] - level
+            to_y += rows[0, OF_LEVEL] * level + rows[0, OF_RISE] * rise
+            to_p += rows[1, OF_LEVEL] * level + rows[1, OF_RISE] * rise
+            if crossing:
+                to_x += rows[2, OF_LEVEL] * level + rows[2, OF_RISE] * rise
+        if factor[j, DAMPING] != 0.0 or factor[j, STIFFNESS] != 0.0:
+            d_a, d_k = factor[j, DAMPING] * columns[place[j, DAMPING], i], factor[j, STIFFNESS] * columns[place[j, STIFFNESS], i]
+            to_y += rows[0, OF_DAMPING] * d_a + rows[0, OF_STIFFNESS] * d_k
+            to_p += rows[1, OF_DAMPING] * d_a + rows[1, OF_STIFFNESS] * d_k
+            if crossing:
+                to_x += rows[2, OF_DAMPING] * d_a + rows[2, OF_STIFFNESS] * d_k
+        if crossing and (factor[j, CROSS_FACTOR] != 0.0 or factor[j, FIN] != 0.0):
+            d_fin, d_g = factor[j, FIN] * columns[place[j, FIN], i], factor[j, CROSS_FACTOR] * columns[place[j, CROSS_FACTOR], i]
+            to_y += rows[0, OF_FIN] * d_fin + rows[0, OF_FACTOR] * d_g
+            to_p += rows[1, OF_FIN] * d_fin + rows[1, OF_FACTOR] * d_g
+            to_x += rows[2, OF_FIN] * d_fin + rows[2, OF_FACTOR] * d_g
+        if has_c[j] > 0.0:
+            for l in range(moved.shape[0]):
+                by_own = d_c[j, moved[l]]
+                to_y, to_p, to_x = to_y + by_own * by[0, l], to_p + by_own * by[1, l], to_x + by_own * by[2, l]
+        # a start's influence dies out; below the normal numbers it would only cost time, eightfold
+        s[j, 0] = to_y if abs(to_y) > SMALLEST_WEIGHT else 0.0
+        s[j, 1] = to_p if abs(to_p) > SMALLEST_WEIGHT else 0.0
+        s[j, 2] = to_x if abs(to_x) > SMALLEST_WEIGHT else 0.0
+
+
 @jit
 def nonlinear_sensitivities(
     steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, columns: FloatArray, place: IntArray,
@@ -247,135 +233,43 @@ def nonlinear_sensitivities(
 
     All parameters go through one linear map a step, see `_map_row`.
     """
-    n, count = steps.shape[0] + 1, d_c.shape[0]
-    s, has_c = np.zeros((count, 3)), np.zeros(count)
-    stages, rows, push, pull = np.zeros((STAGE_COLUMNS, 4)), np.zeros((3, 9)), np.zeros((3, 4)), np.zeros((3, 4))
-    turning, raised, late = reverses(c), c[BEYOND_SQUARE] != 0.0, -0.5 * _total(steps)
-    stripped = of_strips(c)
-    crossing = crosses_limit(drive, c, start)
+    count, size = d_c.shape
+    s, has_c = d_start.copy(), np.zeros(count)
+    stages, rows, push, pull = np.zeros((10, 4)), np.zeros((3, 9)), np.zeros((3, 4)), np.zeros((3, 4))
+    of_rate, of_cross = np.zeros((size, 4)), np.zeros((size, 4))
+    k, (kinds, crossing), late = named(c), _all_kinds(c, start, d_c, d_start), -0.5 * _total(steps)
     for j in range(count):
-        for l in range(3):
-            s[j, l] = d_start[j, l]
-        for l in range(d_c.shape[1]):
+        for l in range(size):
             has_c[j] += d_c[j, l] != 0.0
         sens[j, 0, 0], sens[j, 1, 0] = s[j, 0], s[j, 1]
-        turning, stripped = turning or reverses(d_c[j]), stripped or of_strips(d_c[j])
-        raised, crossing = (
-            raised or d_c[j, BEYOND_SQUARE] != 0.0,
-            crossing or crosses_limit_by(d_c[j]) or s[j, 2] != 0.0 or factor[j, 5] != 0.0,
-        )
-    bent = crossing or turning or raised or stripped or c[QUADRATIC] != 0.0
-    moved = _moved_constants(d_c)
-    by_constant = np.zeros((3, moved.shape[0]))
-    last_h, last_a, last_k = -1.0, 0.0, 0.0
+    bent, moved = crossing or kinds.bent or kinds.raised, _moved_constants(d_c)
+    by = np.zeros((3, moved.shape[0]))
+    last_h, last_a, last_b = -1.0, 0.0, 0.0
     y, p, x = start[0], start[1], start[2]
     out[0, 0], out[0, 1], out[0, 2] = y, p, x
-    for i in range(n - 1):
-        h = steps[i] / pieces
-        a, k = drive[i, 0], drive[i, 1]
-        fast = drive[i, 4]
-        floored = max(fast, SMALLEST_SPEED_RATIO)
-        damp, turn, hold, q = c[CROSS_DAMPING] * fast, c[CROSS_RATE] * fast * fast, c[CROSS_QUADRATIC] / floored, drive[i, 5]
+    for i in range(steps.shape[0]):
+        h, a, b, fast, fin = steps[i] / pieces, drive[i, DAMPING], drive[i, STIFFNESS], drive[i, CROSS_FACTOR], drive[i, FIN]
+        first, last = drive[i, MOMENT_START], drive[i, MOMENT_END]
         for piece in range(pieces):
-            ky, kp, kx = 0.0, 0.0, 0.0
-            ty, tp, tx = 0.0, 0.0, 0.0
+            ky, kp, kx, ty, tp, tx = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             for stage in range(4):
-                g, part, wt = _reach(stage) * h, (piece + _reach(stage)) / pieces, _weight(stage)
-                ys, ps, xs = y + g * ky, p + g * kp, x + g * kx
-                m = drive[i, 2] + (drive[i, 3] - drive[i, 2]) * part
-                drag, log = ps * abs(ps), 0.0
-                by_y, by_p = -k, -a - 2.0 * c[QUADRATIC] * abs(ps)
-                if raised:
-                    drag, log = power_drag(ps, c[BEYOND_SQUARE])
-                    by_p = -a - (2.0 + c[BEYOND_SQUARE]) * c[QUADRATIC] * drag / (ps if abs(ps) > ZERO_RATE_RAD_S else 1.0)
-                f = -a * ps - k * ys + m - c[QUADRATIC] * drag + c[CROSS_SHARE] * xs
-                if turning:
-                    clock = late + part * steps[i]
-                    seen = ys - c[HEADING_TURN] * clock
-                    sin, cos = np.sin(seen), np.cos(seen)
-                    sin2, cos2 = 2.0 * sin * cos, 1.0 - 2.0 * sin * sin
-                    f += c[HEADING_SIN] * sin + c[HEADING_COS] * cos + c[HEADING_SIN2] * sin2 + c[HEADING_COS2] * cos2
-                    f += c[RIGHTING_SIN] * (seen - sin) + c[RIGHTING_COS] * (cos - 1.0)
-                    slope = c[HEADING_SIN] * cos - c[HEADING_COS] * sin + 2.0 * (c[HEADING_SIN2] * cos2 - c[HEADING_COS2] * sin2)
-                    slope += c[RIGHTING_SIN] * (1.0 - cos) - c[RIGHTING_COS] * sin
-                    by_y += slope
-                    stages[SIN, stage], stages[COS, stage], stages[ARC, stage] = sin, cos, seen - sin
-                    stages[BY_TURN, stage] = slope * clock
-                square = xs * abs(xs)
-                slower = damp * xs + hold * square + turn * ps - q
-                by_x = damp + 2.0 * hold * abs(xs)
-                by_factor = c[CROSS_DAMPING] * xs + 2.0 * fast * c[CROSS_RATE] * ps - hold / floored * square
-                stages[OF_X, stage], stages[OF_FACTOR, stage], stages[X_BY_P, stage] = c[CROSS_SHARE], 0.0, turn
-                if stripped:
-                    alpha = c[STRIP_FLOW] * xs / floored
-                    moment, moment_by_flow, moment_by_p = crossflow(alpha, ps)
-                    force, force_by_flow, force_by_p = crossforce(alpha, ps)
-                    f -= c[STRIP_MOMENT] * moment
-                    slower += c[STRIP_FORCE] * fast * force
-                    by_p -= c[STRIP_MOMENT] * moment_by_p
-                    by_x += c[STRIP_FORCE] * fast * force_by_flow * c[STRIP_FLOW] / floored
-                    by_factor += c[STRIP_FORCE] * (force - fast * force_by_flow * alpha / floored)
-                    stages[OF_X, stage] -= c[STRIP_MOMENT] * moment_by_flow * c[STRIP_FLOW] / floored
-                    stages[OF_FACTOR, stage] = c[STRIP_MOMENT] * moment_by_flow * alpha / floored
-                    stages[X_BY_P, stage] += c[STRIP_FORCE] * fast * force_by_p
-                    stages[AT_MOMENT, stage], stages[AT_FORCE, stage] = moment, fast * force
-                    stages[MOMENT_BY_FLOW, stage] = c[STRIP_MOMENT] * moment_by_flow * xs / floored
-                    stages[FORCE_BY_FLOW, stage] = c[STRIP_FORCE] * fast * force_by_flow * xs / floored
-                stages[AT_Y, stage], stages[AT_P, stage], stages[AT_X, stage], stages[PART, stage] = ys, ps, xs, part
-                stages[BY_Y, stage], stages[BY_P, stage] = by_y, by_p
-                stages[BY_X, stage], stages[BY_FACTOR, stage] = by_x, by_factor
-                stages[DRAG, stage], stages[BY_POWER, stage] = drag, c[QUADRATIC] * log * drag
-                ky, kp, kx = ps, f, -slower
-                ty += wt * ky
-                tp += wt * kp
-                tx += wt * kx
-            y += h / 6.0 * ty
-            p += h / 6.0 * tp
-            x += h / 6.0 * tx
+                g, part, weight = _reach(stage) * h, (piece + _reach(stage)) / pieces, _weight(stage)
+                angle, rate, cross = y + g * ky, p + g * kp, x + g * kx
+                moment = first + (last - first) * part
+                now = slope(k, kinds, a, b, moment, fin, fast, angle, rate, cross, late + part * steps[i])
+                _keep(stage, now, angle, rate, part, stages)
+                by_constants(k, kinds, now, fin, fast, rate, cross, stage, of_rate, of_cross)
+                ky, kp, kx = rate, now.rate, now.cross
+                ty, tp, tx = ty + weight * ky, tp + weight * kp, tx + weight * kx
+            y, p, x = y + h / 6.0 * ty, p + h / 6.0 * tp, x + h / 6.0 * tx
+            alike = not bent and a == last_a and b == last_b and abs(h - last_h) < 1e-9 * h
             for row in range(2 + crossing):
-                if bent or not (a == last_a and k == last_k and abs(h - last_h) < 1e-9 * h):
-                    _map_row(row, h, stages, rows, push, pull)
+                if not alike:
+                    _map_row(row, h, k.cross_fin, stages, rows, push, pull)
                 _map_rates(row, stages, push, rows)
-            last_h, last_a, last_k = h, a, k
-            _map_constants(moved, stages, push, pull, fast, floored, by_constant)
-            for j in range(count):
-                # written out: each call that hands over arrays would cost as much as what it does
-                sy, sp, sx = s[j, 0], s[j, 1], s[j, 2]
-                to_y = rows[0, 0] * sy + rows[0, 1] * sp
-                to_p = rows[1, 0] * sy + rows[1, 1] * sp
-                to_x = 0.0
-                if crossing:
-                    to_y += rows[0, 2] * sx
-                    to_p += rows[1, 2] * sx
-                    to_x = rows[2, 0] * sy + rows[2, 1] * sp + rows[2, 2] * sx
-                if factor[j, 2] != 0.0 or factor[j, 3] != 0.0:
-                    m = factor[j, 2] * columns[place[j, 2], i]
-                    slope = factor[j, 3] * columns[place[j, 3], i] - m
-                    to_y += rows[0, 3] * m + rows[0, 4] * slope
-                    to_p += rows[1, 3] * m + rows[1, 4] * slope
-                    if crossing:
-                        to_x += rows[2, 3] * m + rows[2, 4] * slope
-                if factor[j, 0] != 0.0 or factor[j, 1] != 0.0:
-                    d_a, d_k = factor[j, 0] * columns[place[j, 0], i], factor[j, 1] * columns[place[j, 1], i]
-                    to_y += rows[0, 5] * d_a + rows[0, 6] * d_k
-                    to_p += rows[1, 5] * d_a + rows[1, 6] * d_k
-                    if crossing:
-                        to_x += rows[2, 5] * d_a + rows[2, 6] * d_k
-                if crossing and (factor[j, 4] != 0.0 or factor[j, 5] != 0.0):
-                    d_fast, d_q = factor[j, 4] * columns[place[j, 4], i], factor[j, 5] * columns[place[j, 5], i]
-                    to_y += rows[0, 7] * d_q + rows[0, 8] * d_fast
-                    to_p += rows[1, 7] * d_q + rows[1, 8] * d_fast
-                    to_x += rows[2, 7] * d_q + rows[2, 8] * d_fast
-                if has_c[j] > 0.0:
-                    for l in range(moved.shape[0]):
-                        size = d_c[j, moved[l]]
-                        to_y += size * by_constant[0, l]
-                        to_p += size * by_constant[1, l]
-                        to_x += size * by_constant[2, l]
-                # a start's influence dies out; below the normal numbers it would only cost time, eightfold
-                s[j, 0] = to_y if abs(to_y) > SMALLEST_WEIGHT else 0.0
-                s[j, 1] = to_p if abs(to_p) > SMALLEST_WEIGHT else 0.0
-                s[j, 2] = to_x if abs(to_x) > SMALLEST_WEIGHT else 0.0
+            last_h, last_a, last_b = h, a, b
+            _map_constants(moved, of_rate, of_cross, push, pull, by)
+            _carry(i, 2 + crossing, rows, columns, place, factor, d_c, has_c, moved, by, s)
         if not abs(p) < DIVERGED_RATE_RAD_S:
             set_diverged(out, i + 1)
             set_all_diverged(sens, i + 1)

@@ -6,7 +6,7 @@ In its other forms it has a power of the speed of its own, and drag that grows w
     x' = -cross_damping f x - (cross_quadratic / f) x|x| - cross_rate f^2 r + cross_fin f^3 delta
 With x = -a21 v, a21 ~ f: the drag D v|v| becomes D/|a21| x|x|. Then the fin's own lift no longer drops out of the
 transfer function. Or the drag is that of the cross flow v + l r at every place l along the hull of length L: x/f is v/L itself
-in rad/s (times 1 1/s), and with F and G of dynamics/nonlinear_kernel.py, uniform strips,
+in rad/s (times 1 1/s), and with F and G of models/hull.py, uniform strips,
     p' += strip_munk x - strip_drag F(v/L, p),   (v/L)' = ... - 32 strip_drag strip_inertia G(v/L, p)
     strip_drag = rho Cd T L^4 / (64 I),   strip_inertia = I/(m L^2),   I and m with their added parts.
 The drift to the other side, with cross_rate, cross_fin and strip_munk the other way, is the same motion.
@@ -19,10 +19,10 @@ and 7.1.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
-from fieldsid.models.effect import Coefficient, Core, Values, Variant
+from fieldsid.models.effect import Coefficient, Values, Variant
 from fieldsid.models.helpers.drift_law import drift_law, reference_speed
+from fieldsid.models.hull import Core
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
@@ -113,8 +113,7 @@ def core(values: Values, scale: float) -> Core:
     if "strip_drag" not in values:
         return state
     force = 32.0 * values["strip_drag"] * values["strip_inertia"] * lift
-    return replace(
-        state,
+    return state._replace(
         cross_share=values["strip_munk"],
         strip_moment=values["strip_drag"],
         strip_force=force,

@@ -14,8 +14,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Values, Variant
+from fieldsid.models.effect import Coefficient, Effect, Stage, Values, Variant
 from fieldsid.models.helpers.drift_law import drift_law, reference_speed
+from fieldsid.models.hull import Core
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 

@@ -16,7 +16,8 @@ import numpy as np
 
 from fieldsid.effects._speed_powers import MIN_SPEED_RATIO, speed_powers
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Terms, Values, Variant
+from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values, Variant
+from fieldsid.models.hull import Core
 from fieldsid.models.record import Record
 
 HEADING_SPAN_RAD = 0.5 * np.pi

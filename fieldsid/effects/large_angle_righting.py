@@ -8,7 +8,8 @@ rad/s^2 (weight fore or aft of the buoyancy). Source: Fossen 2011, section 4.1 (
 from __future__ import annotations
 
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Values
+from fieldsid.models.effect import Coefficient, Effect, Stage, Values
+from fieldsid.models.hull import Core
 
 
 def core(values: Values, scale: float) -> Core:

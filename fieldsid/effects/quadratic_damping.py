@@ -7,7 +7,8 @@ In its other form the power is free: -quadratic p |p| (|p| / 0.2 rad/s)^(rate_po
 from __future__ import annotations
 
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Values, Variant
+from fieldsid.models.effect import Coefficient, Effect, Stage, Values, Variant
+from fieldsid.models.hull import Core
 
 SQUARE = 2.0
 POWER = Coefficient(

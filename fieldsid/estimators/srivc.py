@@ -15,7 +15,6 @@ import numpy as np
 
 from fieldsid.dynamics import integrate
 from fieldsid.dynamics.assemble import pieces_for
-from fieldsid.dynamics.places import CONSTANTS, DRIVES
 from fieldsid.errors import DataError, DivergenceError
 from fieldsid.estimators.svf_ls import base_slots, finished, median_step, parameters_of, regress
 from fieldsid.fitting.problem.estimator import Estimator, Options, Solution
@@ -24,6 +23,7 @@ from fieldsid.fitting.regression.bias_compensation import Transfer, inverse_of_n
 from fieldsid.fitting.regression.residual_colour_covariance import Series, coloured_covariance
 from fieldsid.fitting.regression.svf_equation import RegressionParameters, measured_signals
 from fieldsid.logs.run import Note
+from fieldsid.models.hull import CONSTANTS, DAMPING, DRIVES, MOMENT_END, MOMENT_START, STIFFNESS
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
@@ -112,7 +112,7 @@ def through(
 ) -> FloatArray:
     """Return a signal, straight over each interval, through 1/(s^2 + a s + k), and its slope: (n, 2)."""
     drive = np.zeros((steps.size, len(DRIVES)))
-    drive[:, 0], drive[:, 1], drive[:, 2], drive[:, 3] = a, k, start, end
+    drive[:, DAMPING], drive[:, STIFFNESS], drive[:, MOMENT_START], drive[:, MOMENT_END] = a, k, start, end
     first = np.zeros(3) if state is None else np.array([state[0], state[1], 0.0])
     out = np.empty((steps.size + 1, 3))
     pieces = pieces_for(float(steps.max()), a, k**0.5)

@@ -1,14 +1,8 @@
 """The contract of a physical effect: everything any command may ask of it, in one frozen record.
 
-Signal path: command -> ACTUATOR -> fin angle -> HYDRODYNAMICS -> motion -> SENSOR -> measurement. The core integrates
-    angle' = p
-    p' = -a(t) p - k(t) angle + m(t) - quadratic p|p| (|p|/0.2)^beyond_square - strip_moment F(s x/g, p)
-         + heading_sin sin(seen) + heading_cos cos(seen) + heading_sin2 sin(2 seen) + heading_cos2 cos(2 seen)
-         + righting_sin (seen - sin seen) + righting_cos (cos seen - 1) + cross_share x
-    x' = -cross_damping g x - (cross_quadratic / g) x|x| - cross_rate g^2 p - strip_force g G(s x/g, p) + cross_fin delta
-with p the rate, seen = angle - heading_turn (t - the middle of the run), s = strip_flow, and x the cross state (sway or heave,
-scaled so that its moment is cross_share x, the share one by default). A run starts with x where some steady rate before it had
-left it; no motion within that rate leaves it further from zero.
+Signal path: command -> ACTUATOR -> fin angle -> HYDRODYNAMICS -> motion -> SENSOR -> measurement. The equations of motion are
+those of models/hull.py. A run starts with a cross state where some steady rate before it had left it; no motion within that rate
+leaves it further from zero.
 """
 
 from __future__ import annotations
@@ -16,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +19,7 @@ from fieldsid.errors import EffectError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.models.definition import NONE, Definition
 from fieldsid.models.fin_path import FinPath
+from fieldsid.models.hull import Core
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.records.named_inputs import sha256_of
 from fieldsid.registry import Outside, define, pick
@@ -39,8 +33,6 @@ MomentHook = Callable[["Motion", Values, "Record"], FloatArray]
 
 
 REGISTRY = "fieldsid.effects"
-REFERENCE_RATE_RAD_S, ZERO_RATE_RAD_S = 0.2, 1e-9
-"""rad/s: the rate at which drag of another power equals the quadratic one, and the one below which it is nil."""
 
 
 class Stage(StrEnum):
@@ -122,61 +114,6 @@ def _joined(a: FloatArray | None, b: FloatArray | None, how: np.ufunc) -> FloatA
     if a is None or b is None:
         return a if b is None else b
     return np.asarray(how(a, b))
-
-
-@dataclass(frozen=True, slots=True)
-class Core:
-    """Coefficients of the state-dependent terms the compiled core knows; zero where an effect is absent."""
-
-    quadratic: float = 0.0
-    heading_sin: float = 0.0
-    heading_cos: float = 0.0
-    righting_sin: float = 0.0
-    righting_cos: float = 0.0
-    cross_damping: float = 0.0
-    cross_rate: float = 0.0
-    cross_fin: float = 0.0
-    cross_quadratic: float = 0.0
-    beyond_square: float = 0.0
-    heading_sin2: float = 0.0
-    heading_cos2: float = 0.0
-    heading_turn: float = 0.0
-    cross_share: float = 1.0
-    strip_moment: float = 0.0
-    strip_force: float = 0.0
-    strip_flow: float = 0.0
-
-    def plus(self, other: Core) -> Core:
-        """Return the sum of two sets of coefficients; the factors of FACTORS are taken from whichever sets them."""
-        pairs = zip(CORE_FIELDS, _VALUES(self), _VALUES(other), strict=True)
-        return Core(*((b if b != 1.0 else a) if name in FACTORS else a + b for name, a, b in pairs))
-
-    def steady_cross_state(self, rate: float) -> float:
-        """Return the cross state that a steady rate leads to at the run's own speed, zero where there is none.
-
-        The force along the hull is taken as that of a hull that drifts as fast and does not turn.
-        """
-        if self.cross_damping <= 0.0:
-            return 0.0
-        square = self.cross_quadratic + self.strip_force * self.strip_flow**2
-        return float(steady_cross_state(np.asarray(-self.cross_rate * rate), self.cross_damping, square))
-
-
-def steady_cross_state(push: FloatArray, damping: FloatArray | float, quadratic: FloatArray | float) -> FloatArray:
-    """Return the root x of damping x + quadratic x|x| = push, arrays alike, damping > 0; a small quadratic loses no digits."""
-    return np.asarray(2.0 * push / (damping + np.sqrt(damping**2 + 4.0 * quadratic * np.abs(push))))
-
-
-def power_drag(rate: FloatArray, beyond: FloatArray | float) -> FloatArray:
-    """Return p|p| (|p|/0.2 rad/s)^beyond at rates p, arrays alike, beyond > -1: the plain version of the kernel's."""
-    size = np.abs(rate)
-    return np.asarray(rate * size * np.maximum(size, ZERO_RATE_RAD_S) ** beyond / REFERENCE_RATE_RAD_S**beyond)
-
-
-CORE_FIELDS = tuple(Core.__dataclass_fields__)
-_VALUES = attrgetter(*CORE_FIELDS)
-FACTORS = ("cross_share",)
-"""The coefficients of a core that are one where no effect sets them."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,10 +40,19 @@ def jit(function: Callable[P, R]) -> Callable[P, R]:
 
 def inner(function: Callable[P, R]) -> Callable[P, R]:
     """Return the function as it is, which functions of `jit` may call, compiled with them; called from Python it is plain."""
+    return _callable_when_compiled(function, forceinline=False)
+
+
+def inlined(function: Callable[P, R]) -> Callable[P, R]:
+    """Return the function as `inner` does, put into what calls it: what a caller does not take of its result is not computed."""
+    return _callable_when_compiled(function, forceinline=True)
+
+
+def _callable_when_compiled(function: Callable[P, R], *, forceinline: bool) -> Callable[P, R]:
     if not HAS_NUMBA:
         return function
-    decorator = _numba().extending.register_jitable(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-    return cast("Callable[P, R]", decorator(function))
+    options = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": forceinline}
+    return cast("Callable[P, R]", _numba().extending.register_jitable(**options)(function))
 
 
 def cache_folder() -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.dynamics.linear_kernel import linear_sensitivities
-from fieldsid.dynamics.places import CONSTANTS, DRIVES
 from fieldsid.maneuvers import Autopilot, Limits, Schedule, all_maneuvers, fly
+from fieldsid.models.hull import CONSTANTS, DRIVES
 from fieldsid.noise.kalman.disturbance import disturbance_filter
 from fieldsid.planning.flight.closed_loop import closed_loop
 from fieldsid.planning.flight.rule_flight import OperatingPointPlant
@@ -21,7 +21,7 @@ def compile_planning() -> None:
     """Call once, on vehicles that do not move, what planning calls thousands of times."""
     m, n, steps, zero = SCENES, SAMPLES, np.full(SAMPLES - 1, 0.05), np.zeros
     drive, c = zero((m, n - 1, len(DRIVES))), zero((m, len(CONSTANTS)))
-    push, off = zero((m, n - 1, 3)), zero((m, n - 1, 2))
+    push, off = zero((m, n - 1, 2)), zero((m, n - 1, 2))
     closed_loop(steps, drive[0].copy(), c[0], 1, zero(n), off[0], push[0], zero(3), zero(4), zero(n), zero((n, 3)))
     plant = OperatingPointPlant(drive, c, 1, push, zero(m), off, zero((m, 3)))
     still, short = Autopilot(0.0, 0.0), Schedule(20.0, 0.0, 0.0)

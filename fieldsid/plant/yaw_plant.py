@@ -1,8 +1,7 @@
 """The identified yaw model as arrays over draws of its parameters, ready for steady turns at any speed.
 
-    0 = -(a(u) + a') r - q r|r| (|r|/0.2)^o - N F(s x, r) + b(u) delta + m + M(r) + c_m x
-    c(u) x + c_q(u) x|x| + Y(u) G(s x, r) = -c_r(u) r + c_d(u) delta
-with every coefficient at the speed u kept in the turn, by the model's own speed law and its effects' own scaling.
+Its equations are those of motion (models/hull.py), with every coefficient at the speed kept in the turn, by the model's own
+speed law and its effects' own scaling.
 The actuator's effects are taken as they leave a fin that was told to stay at its limit.
 """
 
@@ -13,10 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldsid.dynamics.assemble import combined_terms, fin_path
+from fieldsid.dynamics.assemble import combined_core, combined_terms, fin_path
 from fieldsid.dynamics.free_run import command_record, effects_of
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Core, Effect, Motion
+from fieldsid.models.effect import Effect, Motion
+from fieldsid.models.hull import OF_ANGLE
 from fieldsid.models.model import Model
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
@@ -24,29 +24,16 @@ from fieldsid.numerics.arrays import FloatArray
 SETTLE_S = 60.0
 STEP_S = 0.05
 EXPONENT = "damping_exponent"
-CORE = (
-    "cross_damping", "cross_rate", "cross_fin", "cross_quadratic", "cross_share", "strip_moment", "strip_force", "strip_flow",
-    "quadratic", "beyond_square",
-)  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True)
-class Scaled:
-    """A coefficient that goes with the scale as a power: value (d, 1) at the reference speed and its exponent."""
-
-    value: FloatArray
-    exponent: float
-
-    def at(self, scale: FloatArray) -> FloatArray:
-        """Return the coefficient (d, s) at scales (d, s) or (1, s)."""
-        return np.asarray(self.value * scale**self.exponent)
+NEARBY = 0.9
+"""Share of the speed at which the powers of an effect's own scaling are read off."""
 
 
 @dataclass(frozen=True, slots=True)
 class YawPlant:
     """One model, d draws of its values; draw 0 is the estimate itself. Arrays (d, 1); `fin` by rate sign, (d, 1) rad.
 
-    `moment` (d, s) is at the speeds that turns are entered at.
+    `core` (d, 17) are the constants of the equations of motion at the reference speed, `powers` (17,) those of the speed they go
+    with; `moment` (d, s) is at the speeds that turns are entered at.
     """
 
     model: Model
@@ -55,7 +42,8 @@ class YawPlant:
     damping_exponent: FloatArray
     authority_ratio: FloatArray
     trim: FloatArray
-    core: Mapping[str, Scaled]
+    core: FloatArray
+    powers: FloatArray
     fin: Mapping[float, FloatArray]
     moment: FloatArray
     damping_more: FloatArray
@@ -95,13 +83,12 @@ class YawPlant:
         return replace(
             self,
             **{f: getattr(self, f)[keep] for f in ARRAYS},
-            core={n: Scaled(c.value[keep], c.exponent) for n, c in self.core.items()},
             fin={s: d[keep] for s, d in self.fin.items()},
             factors=(self.factors[0][keep], self.factors[1][keep]),
         )
 
 
-ARRAYS = ("damping", "damping_exponent", "authority_ratio", "trim", "moment", "damping_more", "sway_seen")
+ARRAYS = ("core", "damping", "damping_exponent", "authority_ratio", "trim", "moment", "damping_more", "sway_seen")
 
 
 def yaw_plant(
@@ -122,6 +109,8 @@ def yaw_plant(
     terms = [combined_terms(steady, parts, v) for v in values]
     free = [combined_terms(steady, own, v) for v in values]
 
+    core, powers = scaled_cores(parts, values, 1.0)
+
     def column(numbers: Sequence[float]) -> FloatArray:
         return np.array(numbers, dtype=np.float64)[:, None]
 
@@ -132,7 +121,8 @@ def yaw_plant(
         damping_exponent=exponents[:, None],
         authority_ratio=column([v[names.authority] / model.values[names.authority] for v in values]),
         trim=column([v[names.trim] for v in values]),
-        core=_scaled_core(parts, values),
+        core=core,
+        powers=powers[0],
         fin={s: column(steady_fins(parts, values, s * sign * fin_limit, steady.speed)) for s in (1.0, -1.0)},
         moment=straight_moment(model, parts, values, entry) + column([_mean(t.moment, 0.0) for t in free]),
         damping_more=column([_mean(t.damping, 0.0) for t in terms]),
@@ -234,24 +224,15 @@ def _step(command: float) -> tuple[FloatArray, FloatArray]:
     return time, np.where(time < 0.5 * STEP_S, 0.0, command)
 
 
-def _core(parts: Sequence[Effect], values: Mapping[str, float], scale: float) -> Core:
-    core = Core()
-    for effect in parts:
-        if effect.core is not None:
-            core = core.plus(effect.core(values, scale))
-    return core
+def scaled_cores(parts: Sequence[Effect], values: Sequence[Mapping[str, float]], scale: float) -> tuple[FloatArray, FloatArray]:
+    """Return the constants (d, 17) of draws at `scale` times the reference speed, and the powers (d, 17) of it they go with.
 
-
-def _scaled_core(parts: Sequence[Effect], values: Sequence[Mapping[str, float]]) -> dict[str, Scaled]:
-    """Return the core's coefficients of all draws, each with the power of the scale it goes with."""
-    double = _core(parts, values[0], 2.0)
-    cores = [_core(parts, v, 1.0) for v in values]
-    out = {}
-    for name in CORE:
-        at_one, at_two = getattr(cores[0], name), getattr(double, name)
-        exponent = float(np.log2(at_two / at_one)) if at_one != 0 and at_two / at_one > 0 else 0.0
-        out[name] = Scaled(np.array([getattr(c, name) for c in cores])[:, None], exponent)
-    return out
+    Those of the angle itself are nil.
+    """
+    there, slower = (np.array([combined_core(parts, v, at) for v in values]) for at in (scale, NEARBY * scale))
+    there[:, OF_ANGLE] = 0.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return there, np.nan_to_num(np.log(slower / there) / np.log(NEARBY), posinf=0.0, neginf=0.0)
 
 
 def _mean(values: FloatArray | None, absent: float) -> float:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.models.axis import Axis
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.models.hull import Core
 from fieldsid.schedule.linear_plant import FinLimits, LinearPlant
 from fieldsid.turning.maneuvering.belief import Belief
-from fieldsid.turning.maneuvering.equations import NAMES, REFERENCE_SPEED_M_S, coefficients, rudder_lift
+from fieldsid.turning.maneuvering.equations import NAMES, about_straight, coefficients
 
 LAG, RATE = NAMES.index("lag"), NAMES.index("rate_limit")
 
@@ -25,24 +25,18 @@ def believed_plant(belief: Belief, near: LinearPlant, limits: FinLimits, draws: 
     which = np.arange(draws) % near.count
     zero = np.zeros(draws)
     way = -float(np.sign(near.authority[0]))  # as the runs were read: what a model's sway makes of it in the end may differ
-    damping, authority, slow, by_rate, by_fin = _about_straight(hull, near.speed)
+    (sway, sway_by_rate, sway_by_fin), (by_sway, by_rate, by_fin) = about_straight(hull, near.speed).transpose(1, 2, 0)
+    # the cross state is the moment that sway makes
+    states = zip(-sway, -by_sway * sway_by_rate, way * by_sway * sway_by_fin, strict=True)
+    core = np.array([Core(cross_damping=c, cross_rate=r, cross_fin=f) for c, r, f in states])
     return LinearPlant(
         axis=Axis.YAW,
         speed=near.speed,
-        damping=damping,
+        damping=-by_rate,
         stiffness=zero,
-        authority=way * authority,
+        authority=way * by_fin,
         offset=near.offset[which],
-        quadratic=zero,
-        beyond_square=zero,
-        cross_damping=slow,
-        cross_rate=by_rate,
-        cross_fin=way * by_fin,
-        cross_quadratic=zero,
-        cross_share=zero + 1.0,
-        strip_moment=zero,
-        strip_force=zero,
-        strip_flow=zero,
+        core=core,
         lag=hull[:, LAG] if limits.lag is None else zero + limits.lag,
         delay=near.delay[which],
         fin_rate=hull[:, RATE] if limits.rate is None else zero + limits.rate,
@@ -50,19 +44,3 @@ def believed_plant(belief: Belief, near: LinearPlant, limits: FinLimits, draws: 
         speed_loss=np.zeros((draws, near.speed_loss.shape[1])),
         hull=hull,
     )
-
-
-def _about_straight(hull: FloatArray, speed: float) -> tuple[FloatArray, ...]:
-    """Return damping, authority and the cross state's damping, share of the rate and share of the fin, (d,) each.
-
-    The cross state is the moment that sway makes: x = n_v v, x' = y_v x + n_v y_r r + n_v y_fin fin.
-    """
-    p = dict(zip(NAMES, hull.T, strict=True))
-    length, gyration, arm, still = p["length"], p["gyration"], p["rudder_arm"], REFERENCE_SPEED_M_S
-    lift = np.array([rudder_lift(h, speed) for h in hull])
-    of_sway = np.maximum(p["sway_lift"] * speed + p["sway_viscous"] * still, 0.0) + lift * speed
-    sway_by_rate, sway_by_fin = -(p["sway_rate"] + lift * arm) * speed, lift * speed**2 / length
-    by_sway = -(p["yaw_lift"] + arm * lift) * speed / (gyration * length**2)
-    damping = (p["yaw_rate"] * speed + p["yaw_viscous"] * still + arm**2 * lift * speed) / (gyration * length)
-    authority = arm * lift * speed**2 / (gyration * length**2)
-    return damping, authority, of_sway / length, -by_sway * sway_by_rate, by_sway * sway_by_fin

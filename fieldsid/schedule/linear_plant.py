@@ -1,6 +1,7 @@
 """The linear plant a controller meets at one speed: fin command to angle, over draws of the identified parameters.
 
-y'' = -a y' - k y + b delta + m x,   x' = -c x - c_q x|x| - c_r y' + c_f delta
+It is the derivative of the equations of motion (models/hull.py) on a straight run, of which flights are,
+y'' = -a y' - k y + b delta + m x,   x' = -c x - c_r y' + c_f delta
 angle/fin = (b (s + c) + m c_f) / ((s^2 + a s + k)(s + c) + m c_r s),   fin/command = exp(-T s) / (lag s + 1)
 """
 
@@ -14,24 +15,19 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.dynamics.free_run import effects_of
+from fieldsid.dynamics.steady_kernel import straight_slopes
 from fieldsid.errors import UsageError
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import CORE_FIELDS, Core, Effect, Stage
+from fieldsid.models.effect import Effect, Stage
+from fieldsid.models.hull import CROSS_DAMPING, OF_ANGLE, Core
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import ComplexArray, FloatArray
 from fieldsid.plant.parameter_source import ParameterSource, draw_values
-from fieldsid.plant.yaw_plant import EXPONENT, follows_the_run, straight_moment
+from fieldsid.plant.yaw_plant import EXPONENT, follows_the_run, scaled_cores, straight_moment
 
-PARTS = (
-    "damping", "stiffness", "authority", "offset", "quadratic", "beyond_square", "cross_damping", "cross_rate",
-    "cross_fin", "cross_quadratic", "cross_share", "strip_moment", "strip_force", "strip_flow", "lag", "delay",
-    "fin_rate", "powers", "speed_loss",
-)  # fmt: skip
-POWERS = ("damping", "authority", "cross_damping", "cross_rate", "cross_fin", "cross_quadratic")
-"""What goes with a power of the speed, in the order of a plant's `powers`."""
-NEARBY = 0.9
-"""Share of the speed at which the powers of an effect's own scaling are read off."""
-
+PARTS = ("damping", "stiffness", "authority", "offset", "core", "lag", "delay", "fin_rate", "powers", "speed_loss")
+WITHOUT_EFFECTS = np.array(Core(cross_damping=1.0))
+"""The constants of a plant without effects: of a cross state that nothing moves, which comes back to rest."""
 ACTUATOR = ("lag", "delay", "max_rate")
 """Coefficients of the actuator's effects that the plant holds."""
 LONGEST_LAG_S = 10.0
@@ -42,9 +38,10 @@ LONGEST_LAG_S = 10.0
 class LinearPlant:
     """Coefficients (d,) over draws at one speed, the estimate first.
 
-    `quadratic`, `beyond_square`, `cross_quadratic`, the strips, `powers` and `speed_loss` act in time simulations only.
-    `offset` is the fin's trim offset (rad): the fin acts as fin + offset. `fin_rate` is inf where not limited. `powers` (d, 6)
-    are the exponents of the speed, by POWERS; `speed_loss` (d, 3) is drag a_u (1/m), the fin's and the turn's loss over it.
+    `core` (d, 17) are the constants of the equations of motion; what of them is of a second order, `powers` and `speed_loss` act
+    in time simulations only. `offset` is the fin's trim offset (rad): the fin acts as fin + offset. `fin_rate` is inf where not
+    limited. `powers` (d, 19) are the exponents of the speed of damping, authority and the constants; `speed_loss` (d, 3) is drag
+    a_u (1/m), the fin's and the turn's loss over it.
     Where the draws are those of a vehicle in surge, sway and yaw, `hull` (d, 22) are its coefficients
     (`turning/maneuvering/equations.py`): flights are of these, and the rest is what they are about a straight run.
     """
@@ -55,16 +52,7 @@ class LinearPlant:
     stiffness: FloatArray
     authority: FloatArray
     offset: FloatArray
-    quadratic: FloatArray
-    beyond_square: FloatArray
-    cross_damping: FloatArray
-    cross_rate: FloatArray
-    cross_fin: FloatArray
-    cross_quadratic: FloatArray
-    cross_share: FloatArray
-    strip_moment: FloatArray
-    strip_force: FloatArray
-    strip_flow: FloatArray
+    core: FloatArray
     lag: FloatArray
     delay: FloatArray
     fin_rate: FloatArray
@@ -98,16 +86,14 @@ class LinearPlant:
 
     def response(self, omega: FloatArray) -> ComplexArray:
         """Return angle over fin command at frequencies (w,) rad/s, (d, w)."""
-        s = 1j * omega[None, :]
-        a, k, b = self.damping[:, None], self.stiffness[:, None], self.authority[:, None]
-        c, c_r, c_f = self.cross_damping[:, None], self.moment_of_rate[:, None], self.moment_of_fin[:, None]
+        s, b = 1j * omega[None, :], self.authority[:, None]
+        a, k, c, c_r, c_f = self.straight[:, :, None]
         hull = (b * (s + c) + c_f) / ((s * s + a * s + k) * (s + c) + c_r * s)
         return np.asarray(hull * np.exp(-s * self.delay[:, None]) / (self.lag[:, None] * s + 1.0))
 
     def polynomials(self) -> tuple[FloatArray, FloatArray]:
         """Return numerator (d, m) and denominator (d, n) of angle over command without delay, highest power first."""
-        a, k, b = self.damping, self.stiffness, self.authority
-        c, c_r, c_f = self.cross_damping, self.moment_of_rate, self.moment_of_fin
+        (a, k, c, c_r, c_f), b = self.straight, self.authority
         one = np.ones_like(a)
         numerator, denominator = b[:, None], np.column_stack([one, a, k])
         if c_r.any() or c_f.any():
@@ -120,32 +106,32 @@ class LinearPlant:
     @property
     def growth(self) -> FloatArray:
         """Return how fast the hull's least stable motion grows without a pilot, (d,) 1/s; a free heading is not one."""
-        a, k, c, c_r = self.damping, self.stiffness, self.cross_damping, self.moment_of_rate
-        coupled = bool(c_r.any() or self.moment_of_fin.any())
+        a, k, c, c_r, c_f = self.straight
+        coupled = bool(c_r.any() or c_f.any())
         own = np.column_stack([np.ones_like(a), a + c, k + a * c + c_r] if coupled else [np.ones_like(a), a])
         if k.any():
             own = np.column_stack([np.ones_like(a), a + c, k + a * c + c_r, k * c] if coupled else [np.ones_like(a), a, k])
         return np.asarray(roots_of(own).real.max(axis=1))
 
     @property
-    def moment_of_rate(self) -> FloatArray:
-        """Return what the yaw or pitch rate takes from the moment of the cross state, (d,) 1/s^2 for each second."""
-        return np.asarray(self.cross_share * self.cross_rate)
-
-    @property
-    def moment_of_fin(self) -> FloatArray:
-        """Return what the fin adds to the moment of the cross state, (d,) 1/s^3."""
-        return np.asarray(self.cross_share * self.cross_fin)
+    def straight(self) -> FloatArray:
+        """Return a, k, c, m c_r and m c_f of the equations above, (5, d): the derivative of the equations of motion."""
+        out = straight_slopes(np.ascontiguousarray(self.core))
+        out[0] += self.damping
+        out[1] += self.stiffness
+        return out
 
     @property
     def slow_damping(self) -> FloatArray:
         """Return the damping of the yaw or pitch rate (d,) 1/s once sway or heave has followed."""
-        return np.asarray(self.damping + self.moment_of_rate / self.cross_damping)
+        a, _, c, c_r, _ = self.straight
+        return np.asarray(a + c_r / c)
 
     @property
     def slow_authority(self) -> FloatArray:
         """Return the authority (d,) 1/s^2 as the slow loop feels it: the fin's own and that through sway or heave."""
-        return np.asarray(self.authority + self.moment_of_fin / self.cross_damping)
+        _, _, c, _, c_f = self.straight
+        return np.asarray(self.authority + c_f / c)
 
 
 def products(left: FloatArray, right: FloatArray) -> FloatArray:
@@ -239,12 +225,11 @@ def _plant_of_points(source: ParameterSource, speed: float, limits: FinLimits, d
     base = source.base_draws(speed, draws, np.random.default_rng(seed))
     stiffness = np.zeros(draws) if names.stiffness is None else base[names.stiffness]
     authority = base[names.authority]
-    zero = np.zeros(draws)
+    core = np.tile(WITHOUT_EFFECTS, (draws, 1))
     lag, delay, fin_rate = _actuator({}, limits, draws)
     return LinearPlant(
-        source.axis, speed, base[names.damping], stiffness, authority, base[names.trim] / authority,
-        zero, zero, zero + 1.0, zero, zero, zero, zero + 1.0, zero, zero, zero, lag, delay, fin_rate,
-        _powers(zero + 1.0, {}), np.zeros((draws, 3)),
+        source.axis, speed, base[names.damping], stiffness, authority, base[names.trim] / authority, core, lag, delay, fin_rate,
+        _powers(np.ones(draws), np.zeros_like(core)), np.zeros((draws, 3)),
     )  # fmt: skip
 
 
@@ -266,24 +251,13 @@ def _plant_of_model(
         )
     moved = {n: value - at[n] for n, value in centre.items()}
     parts = effects_of(model)
-    cores, slower = (
-        [_core(parts, {EXPONENT: float(e)} | v, at) for v, e in zip(values, exponents, strict=True)]
-        for at in (scale, NEARBY * scale)
-    )
+    cores, own = scaled_cores(parts, [{EXPONENT: float(e)} | v for v, e in zip(values, exponents, strict=True)], scale)
 
     def column(name: str) -> FloatArray:
         return np.array([v[name] for v in values])
 
-    def cored(name: str) -> FloatArray:
-        return np.array([getattr(c, name) for c in cores])
-
-    def power(name: str) -> FloatArray:
-        there = np.array([getattr(c, name) for c in slower])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(np.nan_to_num(np.log(there / cored(name)) / np.log(NEARBY)))
-
     authority = column(names.authority) * ratio
-    coupled = cored("cross_damping")
+    cores[:, CROSS_DAMPING] = np.where(cores[:, CROSS_DAMPING] > 0.0, cores[:, CROSS_DAMPING], 1.0)
     shared = {n: np.array([v[n] for v in values]) for n in ACTUATOR if n in model.values}
     trim = column(names.trim) * model.law.trim_factor(speed) + moved.get(names.trim, 0.0)
     trim = trim + straight_moment(model, parts, values, np.array([speed]))[:, 0]
@@ -294,34 +268,16 @@ def _plant_of_model(
         stiffness=np.zeros(draws) if names.stiffness is None else column(names.stiffness) + moved.get(names.stiffness, 0.0),
         authority=authority,
         offset=trim / authority,
-        quadratic=cored("quadratic"),
-        beyond_square=cored("beyond_square"),
-        cross_damping=np.where(coupled > 0, coupled, 1.0),
-        cross_rate=cored("cross_rate"),
-        cross_fin=cored("cross_fin"),
-        cross_quadratic=cored("cross_quadratic"),
-        cross_share=cored("cross_share"),
-        strip_moment=cored("strip_moment"),
-        strip_force=cored("strip_force"),
-        strip_flow=cored("strip_flow"),
+        core=cores,
         **dict(zip(("lag", "delay", "fin_rate"), _actuator(shared, limits, draws), strict=True)),
-        powers=_powers(exponents, {name: power(name) for name in POWERS[2:]}),
+        powers=_powers(exponents, own),
         speed_loss=np.zeros((draws, 3)),
     )
 
 
-def _core(parts: Sequence[Effect], values: Mapping[str, float], scale: float) -> Core:
-    core = Core()
-    for effect in parts:
-        if effect.core is not None:
-            core = core.plus(effect.core(values, scale))
-    return core
-
-
-def _powers(damping: FloatArray, own: Mapping[str, FloatArray]) -> FloatArray:
-    """Return the exponents (d, 6) of the speed: damping's, two of the fin's lift, and the cross state's own."""
-    lift, none = np.full_like(damping, 2.0), np.zeros_like(damping)
-    return np.column_stack([damping, lift, *(own.get(name, none) for name in POWERS[2:])])
+def _powers(damping: FloatArray, own: FloatArray) -> FloatArray:
+    """Return the exponents (d, 19) of the speed: damping's, two of the fin's lift, and the constants' own (d, 17)."""
+    return np.column_stack([damping, np.full_like(damping, 2.0), own])
 
 
 def _actuator(shared: Mapping[str, FloatArray], limits: FinLimits, draws: int) -> Sequence[FloatArray]:
@@ -344,6 +300,6 @@ def _counted(effect: Effect, model: Model) -> bool:
         return True
     if effect.core is not None:
         core = effect.core({EXPONENT: model.law.damping_exponent} | dict(model.values), 1.0)
-        return all(getattr(core, n) == getattr(Core(), n) for n in CORE_FIELDS if n not in PARTS)
+        return not any(core[place] for place in OF_ANGLE)
     own = {c.name for c in effect.every if c.name in model.values}
     return own <= set(ACTUATOR) or follows_the_run(effect)

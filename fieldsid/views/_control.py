@@ -30,13 +30,8 @@ def model_system(model: Model, speed: float | None) -> Any:
 def plant_system(plant: LinearPlant) -> Any:
     """Return a plant's estimate: the hull with sway or heave where it has them, the fin's lag and its delay before it."""
     control, names = python_control(), NAMES[plant.axis]
-    a, k, b, c, c_r, c_f, lag, delay = (
-        float(part[0])
-        for part in (
-            plant.damping, plant.stiffness, plant.authority, plant.cross_damping, plant.moment_of_rate, plant.moment_of_fin,
-            plant.lag, plant.delay,
-        )
-    )  # fmt: skip
+    a, k, c, c_r, c_f = plant.straight[:, 0].tolist()
+    b, lag, delay = (float(part[0]) for part in (plant.authority, plant.lag, plant.delay))
     ways, fin = np.array([[0.0, 1.0, 0.0], [-k, -a, 1.0], [0.0, -c_r, -c]]), np.array([[0.0], [b], [c_f]])
     states = 3 if c_r or c_f else 2
     hull = control.ss(ways[:states, :states], fin[:states], np.eye(2, states), np.zeros((2, 1)))

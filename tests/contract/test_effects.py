@@ -12,8 +12,9 @@ import pytest
 from fieldsid.effects import all_effects
 from fieldsid.maneuvers import all_maneuvers
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import FACTORS, Core, Effect, Motion, Stage, Terms
+from fieldsid.models.effect import Effect, Motion, Stage, Terms
 from fieldsid.models.fin_path import FinPath
+from fieldsid.models.hull import CONSTANTS, FACTORS
 from fieldsid.models.record import Record
 
 EFFECTS = all_effects()
@@ -65,7 +66,7 @@ def outputs(effect: Effect, values: dict[str, float], log: Record) -> dict[str, 
         found |= {n: getattr(terms, n) for n in Terms.__dataclass_fields__ if getattr(terms, n) is not None}
     if effect.core is not None:
         core = effect.core(values, 1.3)
-        found |= {n: np.array([getattr(core, n)]) for n in Core.__dataclass_fields__}
+        found |= {n: np.array([getattr(core, n)]) for n in CONSTANTS}
     if effect.moment is not None:
         found["moment"] = effect.moment(motion_of(log), values, log)
     if effect.measure is not None:

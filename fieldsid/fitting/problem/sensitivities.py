@@ -9,35 +9,35 @@ import numpy as np
 
 from fieldsid.dynamics import integrate
 from fieldsid.dynamics.assemble import (
-    CROSS_FACTOR,
-    CROSS_INPUT,
-    DAMPING,
     MOMENT,
-    STIFFNESS,
     Base,
     KernelInputs,
     combined_core,
     combined_terms,
-    constants_of,
     fin_path,
     in_order,
     integrate_record,
     measured,
     scaled_fin,
 )
-from fieldsid.dynamics.places import (
-    CONSTANTS,
-    CROSS_DAMPING,
-    CROSS_QUADRATIC,
-    CROSS_RATE,
-    DRIVES,
-    STRIP_FLOW,
-    STRIP_FORCE,
-)
 from fieldsid.fitting.problem.parameters import START_NAMES, ParameterLayout
 from fieldsid.models.axis import NAMES
-from fieldsid.models.effect import TERM_PARTS, Core, Effect, Motion, Terms, Values, over_intervals
+from fieldsid.models.effect import TERM_PARTS, Effect, Motion, Terms, Values, over_intervals
 from fieldsid.models.fin_path import FinPath
+from fieldsid.models.hull import (
+    CONSTANTS,
+    CROSS_DAMPING,
+    CROSS_FACTOR,
+    CROSS_QUADRATIC,
+    CROSS_RATE,
+    DAMPING,
+    DRIVES,
+    FIN,
+    STIFFNESS,
+    STRIP_FLOW,
+    STRIP_FORCE,
+    Core,
+)
 from fieldsid.models.record import Record
 from fieldsid.models.speed_law import over_reference
 from fieldsid.numerics.arrays import FloatArray
@@ -99,7 +99,7 @@ class Sensitivities:
         drives = []
         for path in paths:
             start, end = (new - old for new, old in zip(scaled_fin(path, a.terms), own, strict=True))
-            drives.append({MOMENT[0]: (b, start), MOMENT[1]: (b, end), CROSS_INPUT: (a.core.cross_fin, path.mean - a.fin.mean)})
+            drives.append({MOMENT[0]: (b, start), MOMENT[1]: (b, end), FIN: (1.0, path.mean - a.fin.mean)})
         whole, d_c, sens = (
             slice(0, len(self.record) - 1),
             np.zeros((count, len(CONSTANTS))),
@@ -110,7 +110,7 @@ class Sensitivities:
         return sens
 
     def _input_jacobians(self, slots: tuple[int, ...]) -> tuple[list[DriveDerivatives], FloatArray, FloatArray]:
-        """Return the derivatives by the parameters: of the drives, of the constants (P, 16), of the initial states (P, 3)."""
+        """Return the derivatives by the parameters: of the drives, of the constants (P, 17), of the initial states (P, 3)."""
         count = len(slots)
         drives: list[DriveDerivatives] = []
         d_c, d_start = np.zeros((count, len(CONSTANTS))), np.zeros((count, 3))
@@ -134,7 +134,7 @@ class Sensitivities:
         return combined_core(self.layout.effects, values, self.scales[0])
 
     def _initial_state_derivative(self, d_c: FloatArray) -> float:
-        """Return the derivative of the initial cross state by the kernel's constants (16,), the rate before the run fixed."""
+        """Return the derivative of the initial cross state by the kernel's constants (17,), the rate before the run fixed."""
         x, before, c = self.start[CROSS], self.values.get("rate_before", 0.0), self.arrays.constants
         square = (
             d_c[CROSS_QUADRATIC] + d_c[STRIP_FORCE] * c[STRIP_FLOW] ** 2 + 2.0 * c[STRIP_FORCE] * c[STRIP_FLOW] * d_c[STRIP_FLOW]
@@ -178,7 +178,7 @@ class Sensitivities:
         return out
 
     def _input_jacobian(self, name: str) -> tuple[DriveDerivatives, FloatArray | None]:
-        """Return the derivatives of the drives by a parameter, and of the constants (16,) where there are any."""
+        """Return the derivatives of the drives by a parameter, and of the constants (17,) where there are any."""
         names = NAMES[self.layout.axis]
         share, ratio = self.scales
         exponent = self.values.get("damping_exponent", 1.0)
@@ -195,14 +195,12 @@ class Sensitivities:
         return self._of_effect(name)
 
     def _damping_exponent(self, factor: float, exponent: float) -> tuple[DriveDerivatives, FloatArray | None]:
-        """Return the derivatives of the drives, and of the constants (16,), by the exponent of the speed law."""
+        """Return the derivatives of the drives, and of the constants (17,), by the exponent of the speed law."""
         of_damping = self._damping(factor)
         if all(e.core is None for e in self.layout.effects):
             return of_damping, None
         up, down = (self._core(self.values | {"damping_exponent": exponent + s}) for s in (EXPONENT_STEP, -EXPONENT_STEP))
-        by_fin = (up.cross_fin - down.cross_fin) / (2 * EXPONENT_STEP)
-        constants = (constants_of(up) - constants_of(down)) / (2 * EXPONENT_STEP)
-        return {**of_damping, CROSS_INPUT: (by_fin, self.arrays.fin.mean)}, constants
+        return of_damping, (np.array(up) - np.array(down)) / (2 * EXPONENT_STEP)
 
     def _damping(self, factor: float) -> DriveDerivatives:
         shape = self.arrays.terms.damping_factor
@@ -262,9 +260,7 @@ class Sensitivities:
             return drives, None
         # a core is the sum of the effects' own: what the others add, and the factors that they set, stay
         up, down = (owner.core(values, self.scales[0]) for values in ends)
-        if up.cross_fin != down.cross_fin:
-            drives[CROSS_INPUT] = ((up.cross_fin - down.cross_fin) / width, self.arrays.fin.mean)
-        return drives, (constants_of(up) - constants_of(down)) / width
+        return drives, (np.array(up) - np.array(down)) / width
 
     def _changes(self, owner: Effect, above: Values, below: Values) -> dict[int, FloatArray]:
         """Return what an effect changes of the drives outside of its core from the one values to the other, (n-1,) by place."""
@@ -290,12 +286,10 @@ class Sensitivities:
         return fin_path(self.record, chain[place:], values, self.paths[owner.name])
 
     def _changes_of_fin(self, above: FinPath, below: FinPath) -> dict[int, FloatArray]:
-        b, terms, core = self.base.authority, self.arrays.terms, self.arrays.core
+        b, terms = self.base.authority, self.arrays.terms
         sides = zip(MOMENT, scaled_fin(above, terms), scaled_fin(below, terms), strict=True)
         changes = {place: b * (up - down) for place, up, down in sides}
-        if core.cross_fin != 0.0:
-            changes[CROSS_INPUT] = core.cross_fin * (above.mean - below.mean)
-        return changes
+        return changes if self.arrays.core.cross_fin == 0.0 else changes | {FIN: above.mean - below.mean}
 
     def _changes_of_terms(self, owner: Effect, above: Terms, below: Terms) -> dict[int, FloatArray]:
         changes, base, fin = dict[int, FloatArray](), self.base, self.arrays.fin

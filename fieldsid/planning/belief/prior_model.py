@@ -11,9 +11,10 @@ from scipy.linalg import solve_banded
 
 from fieldsid.dynamics.assemble import Base, combined_core
 from fieldsid.dynamics.free_run import base_at, effects_of
+from fieldsid.dynamics.steady_kernel import straight_slopes
 from fieldsid.errors import ModelError, UsageError
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Core
+from fieldsid.models.hull import Core
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.belief.prior_file import load_prior
@@ -70,8 +71,8 @@ def growth_of(base: Base, core: Core) -> float:
 
     y'' = -a y' - k y + m x, x' = -c x - c_r y': sway may hold a hull that is unstable without it, and upset another.
     """
-    a, k, c = base.damping, base.stiffness, core.cross_damping
-    roots = np.roots([1.0, a + c, k + a * c + core.cross_share * core.cross_rate, k * c])
+    a, k, c, by_rate, _ = straight_slopes(np.array([core]))[:, 0] + [base.damping, base.stiffness, 0.0, 0.0, 0.0]
+    roots = np.roots([1.0, a + c, k + a * c + by_rate, k * c])
     worst = float(np.max(roots.real))
     return worst if worst > 1e-6 else 0.0
 

@@ -10,11 +10,12 @@ import numpy as np
 
 from fieldsid.dynamics.assemble import KernelInputs, assemble, fin_path
 from fieldsid.dynamics.free_run import command_record
-from fieldsid.dynamics.nonlinear_kernel import nonlinear_motion
+from fieldsid.dynamics.nonlinear_kernel import over_interval
 from fieldsid.maneuvers import Autopilot, Limits, steer
+from fieldsid.models.hull import FIN, MOMENT_END, MOMENT_START, kinds_of, named
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.numerics.jit import jit
+from fieldsid.numerics.jit import inner, jit
 from fieldsid.planning.flight.operating_point import OperatingPoint
 
 ACTUATOR_ROUNDS = 4
@@ -31,6 +32,14 @@ class Response:
     rate: FloatArray
 
 
+@inner
+def hold_fin(drive: FloatArray, i: int, start: float, end: float, push_start: float, push_end: float) -> None:
+    """Add a fin (rad at both ends) to row i of a drive without one, with what a rad of it pushes at both ends."""
+    drive[i, MOMENT_START] += push_start * start
+    drive[i, MOMENT_END] += push_end * end
+    drive[i, FIN] = 0.5 * (start + end)
+
+
 @jit
 def closed_loop(
     steps: FloatArray, drive: FloatArray, c: FloatArray, pieces: int, asked: FloatArray, off: FloatArray,
@@ -39,29 +48,20 @@ def closed_loop(
     """Fill command (n,) and out (n, 3): angle, rate, cross state from rest.
 
     asked (n,): fin about trim, NaN where the autopilot steers. off (n-1, 2): fin angle minus command at both ends of each
-    interval. push (n-1, 3): moment per rad at start and end, input of the cross state per rad. gains (3,): angle, rate, fin limit
+    interval. push (n-1, 2): moment per rad at start and end. gains (3,): angle, rate, fin limit
     of the autopilot. limits (4,): low, high, rate, trim fin.
     """
-    n = asked.shape[0]
-    state = np.zeros(3)
-    pair = np.zeros((2, 3))
-    last = 0.0
-    out[0, 0], out[0, 1], out[0, 2] = 0.0, 0.0, 0.0
+    n, state, last = asked.shape[0], (0.0, 0.0, 0.0), 0.0
+    k, kinds = named(c), kinds_of(c)
     for i in range(n):
+        out[i, 0], out[i, 1], out[i, 2] = state
         fin = steer(asked[i], state[0], state[1], last, gains, limits[2] * steps[min(i, n - 2)], limits[0], limits[1])
         command[i] = fin
         last = fin
         if i == n - 1:
             break
-        start, end = limits[3] + fin + off[i, 0], limits[3] + fin + off[i, 1]
-        drive[i, 2] += push[i, 0] * start
-        drive[i, 3] += push[i, 1] * end
-        drive[i, 5] += push[i, 2] * 0.5 * (start + end)
-        nonlinear_motion(steps[i : i + 1], drive[i : i + 1], c, state, pieces, pair)
-        # Number by number: an array put into another compiles its own error message, two seconds of it.
-        for l in range(3):
-            state[l] = pair[1, l]
-            out[i + 1, l] = pair[1, l]
+        hold_fin(drive, i, limits[3] + fin + off[i, 0], limits[3] + fin + off[i, 1], push[i, 0], push[i, 1])
+        state = over_interval(k, kinds, drive, i, steps[i], pieces, -0.5 * steps[i], state)
 
 
 def respond(
@@ -86,8 +86,8 @@ def respond(
     bounds = np.array([min(-limits.fin - trim, 0.0), max(limits.fin - trim, 0.0), limits.fin_rate, trim])
     clean = ready.drive.copy()
     if moment is not None:
-        clean[:, 2] += moment[:-1]
-        clean[:, 3] += moment[1:]
+        clean[:, MOMENT_START] += moment[:-1]
+        clean[:, MOMENT_END] += moment[1:]
     idle = idle_records([scene], ready.time) if moving else {}
     for left in reversed(range(ACTUATOR_ROUNDS if moving else 1)):
         drive = clean.copy() if moving else clean
@@ -115,17 +115,14 @@ def prepared(scene: OperatingPoint, count: int, rate_hz: float) -> Prepared:
     time = np.arange(count) / rate_hz
     idle = scene.record(time, np.zeros(count))
     arrays = assemble(idle, scene.effects, replace(scene.base, authority=0.0), scene.values, scene.scale)
-    arrays.drive[:, 5] = 0.0
     return Prepared(time, idle.steps, arrays.drive, arrays.constants, arrays.pieces, fin_push(scene, arrays))
 
 
 def fin_push(scene: OperatingPoint, arrays: KernelInputs) -> FloatArray:
-    """Return what a rad of fin adds to the drives: moments at both ends of an interval, and the cross push, (n-1, 3)."""
+    """Return the moments that a rad of fin adds to the drives at both ends of each interval, (n-1, 2)."""
     n = arrays.drive.shape[0] + 1
     factor = np.ones(n) if arrays.terms.authority_factor is None else arrays.terms.authority_factor
-    cross = sum(e.core(scene.values, scene.scale).cross_fin for e in scene.effects if e.core is not None)
-    b = scene.base.authority
-    return np.column_stack([b * factor[:-1], b * factor[1:], np.full(n - 1, cross)])
+    return scene.base.authority * np.column_stack([factor[:-1], factor[1:]])
 
 
 def idle_records(scenes: Sequence[OperatingPoint], time: FloatArray) -> dict[float, Record]:

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldsid.dynamics.nonlinear_kernel import nonlinear_motion
-from fieldsid.dynamics.places import CONSTANTS, DRIVES
+from fieldsid.dynamics.nonlinear_kernel import over_interval
 from fieldsid.maneuvers import Autopilot, Flight, Limits, Maneuver, Parameters, Schedule, fly
+from fieldsid.models.hull import CONSTANTS, DRIVES, MOMENT_END, MOMENT_START, kinds_of, named
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
-from fieldsid.planning.flight.closed_loop import ACTUATOR_ROUNDS, fin_offset, idle_records, prepared
+from fieldsid.planning.flight.closed_loop import ACTUATOR_ROUNDS, fin_offset, hold_fin, idle_records, prepared
 from fieldsid.planning.flight.operating_point import OperatingPoint
 
 
@@ -24,20 +24,18 @@ def advance_all(
 ) -> None:  # fmt: skip
     """Move states (m, 3) on by the interval `at` with fins (m,) about trim (m,), and fill moved (2, m) with angles and rates.
 
-    drive (m, n-1, 6) before the fin, push (m, n-1, 3), off (m, n-1, 2) the fin's angle less its command at both ends.
+    drive (m, n-1, 6) before the fin, push (m, n-1, 2), off (m, n-1, 2) the fin's angle less its command at both ends.
     """
-    steps, pair, now = np.array([step]), np.empty((2, 3)), np.empty((1, drive.shape[2]))
+    now = np.empty((1, drive.shape[2]))
     for i in range(state.shape[0]):
         for j in range(drive.shape[2]):
             now[0, j] = drive[i, at, j]
         angle = trim[i] + fin[i]
-        start, end = angle + off[i, at, 0], angle + off[i, at, 1]
-        now[0, 2] += push[i, at, 0] * start
-        now[0, 3] += push[i, at, 1] * end
-        now[0, 5] += push[i, at, 2] * 0.5 * (start + end)
-        nonlinear_motion(steps, now, c[i], state[i], pieces, pair)
-        for j in range(3):
-            state[i, j] = pair[1, j]
+        hold_fin(now, 0, angle + off[i, at, 0], angle + off[i, at, 1], push[i, at, 0], push[i, at, 1])
+        held = (state[i, 0], state[i, 1], state[i, 2])
+        state[i, 0], state[i, 1], state[i, 2] = over_interval(
+            named(c[i]), kinds_of(c[i]), now, 0, step, pieces, -0.5 * step, held
+        )
         moved[0, i], moved[1, i] = state[i, 0], state[i, 1]
 
 
@@ -84,7 +82,7 @@ class OperatingPointPlant:
 def plant_of(scenes: Sequence[OperatingPoint], n: int, rate_hz: float, moments: FloatArray | None) -> OperatingPointPlant:
     """Return scenes at rest as one plant over n samples; moments (m, n) rad/s^2 disturb them."""
     count = len(scenes)
-    drive, push = np.empty((count, n - 1, len(DRIVES))), np.empty((count, n - 1, 3))
+    drive, push = np.empty((count, n - 1, len(DRIVES))), np.empty((count, n - 1, 2))
     constants = np.empty((count, len(CONSTANTS)))
     pieces = 1
     for i, scene in enumerate(scenes):
@@ -92,8 +90,8 @@ def plant_of(scenes: Sequence[OperatingPoint], n: int, rate_hz: float, moments: 
         drive[i], constants[i], push[i] = ready.drive, ready.constants, ready.push
         pieces = max(pieces, ready.pieces)
     if moments is not None:
-        drive[:, :, 2] += moments[:, :-1]
-        drive[:, :, 3] += moments[:, 1:]
+        drive[:, :, MOMENT_START] += moments[:, :-1]
+        drive[:, :, MOMENT_END] += moments[:, 1:]
     trim = np.array([s.trim_fin for s in scenes])
     return OperatingPointPlant(drive, constants, pieces, push, trim, np.zeros((count, n - 1, 2)), np.zeros((count, 3)))
 

@@ -9,13 +9,11 @@ import numpy as np
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 from fieldsid.schedule.flown.closed_loop_kernel import DIVERGED_RATE_RAD_S, at_rest, commanded, gains_at
-from fieldsid.turning.maneuvering.equations import LEAST_SURGE_M_S, rudder_lift, slope
+from fieldsid.turning.maneuvering.equations import LEAST_SURGE_M_S, OFFSET, rudder_lift, slope
 
 SETTINGS = 5
 """Columns of a vehicle's row: which way the fin turns (1 to port as the equations' rudder, else -1), its offset (rad), lag (s),
 largest rate (rad/s), delay (s)."""
-OFFSET = 13
-"""Place of the rudder's offset among the coefficients."""
 
 
 @jit
@@ -34,17 +32,16 @@ def close_hull_loop(
     settings (n, 5); push (t,) is a disturbance moment in rad/s^2; a loop starts from where it rests on a straight run at `speed`
     m/s. What diverges is inf from there on.
     """
-    now, rest = np.empty(table.shape[1]), np.array([0.0, 0.0, 1.0, 0.0])
+    now = np.empty(table.shape[1])
     for case in range(hulls.shape[0]):
         p = hulls[case].copy()
         way, lag, most, late = settings[case, 0], settings[case, 2], settings[case, 3], settings[case, 4] / step
-        rest[3] = settings[case, 1]
-        p[OFFSET] = way * rest[3]
+        p[OFFSET] = way * settings[case, 1]
         keep, half = math.exp(-step / lag), math.exp(-0.5 * step / lag)
         whole = int(late)
         lift = rudder_lift(p, speed)
         gains_at(table, speed, now)
-        y, integral, start = at_rest(rest, now)
+        y, integral, start = at_rest(0.0, 1.0, settings[case, 1], now)
         fin, u, v, r = start, speed, 0.0, 0.0
         for i in range(out.shape[1]):
             out[case, i, 0], out[case, i, 2], out[case, i, 3] = y, 0.0, u

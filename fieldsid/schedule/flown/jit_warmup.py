@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.schedule.flown.closed_loop_kernel import GAIN_COLUMNS, OUT_COLUMNS, PLANT_COLUMNS, close_loop
+from fieldsid.dynamics.steady_kernel import settled_rates, straight_slopes
+from fieldsid.models.hull import CONSTANTS
+from fieldsid.schedule.flown.closed_loop_kernel import GAIN_COLUMNS, OUT_COLUMNS, Plants, close_loop
 from fieldsid.schedule.flown.hull_kernel import SETTINGS, close_hull_loop
-from fieldsid.turning.maneuvering.equations import settle, simulate
+from fieldsid.turning.maneuvering.equations import about_straight, settle, simulate
 
 COEFFICIENTS = 22
 STEP_S = 0.02
@@ -19,5 +21,10 @@ def compile_loops() -> None:
     time.setflags(write=False)  # as that of a run is
     simulate(p, 1.0, np.ones((1, 3)), np.zeros(1, dtype=np.int64), time, np.zeros((1, 2)), np.ones(2), STEP_S)
     settle(p, 1.0, 0.0)
-    close_loop(np.zeros((1, PLANT_COLUMNS)), none, 0.0, 0.0, 0.0, 1.0, STEP_S, push, out)
+    about_straight(p[None], 1.0)
+    row, rows = np.zeros(1), np.zeros((1, len(CONSTANTS)))
+    plants = Plants(**{name: rows if name.startswith("core") else row for name in Plants._fields})
+    straight_slopes(rows)
+    settled_rates(rows, row, row, row, 1.0, np.zeros(0), np.zeros(0), np.zeros(1))
+    close_loop(plants, none, 0.0, 0.0, 0.0, 1.0, STEP_S, push, out)
     close_hull_loop(np.ones((1, COEFFICIENTS)), np.ones((1, SETTINGS)), none, 0.0, 1.0, STEP_S, push, out)

@@ -50,8 +50,8 @@ def pace_of(plant: LinearPlant, fin_limit: float, error: float) -> Pace:
     """Return the pace of a plant whose fin is limited to +/-fin_limit rad, for steps about `error` rad."""
     bandwidth = max(full_bandwidth(plant, fin_limit, error), LEAST_RAD_S)
     times = SLOWEST_RAD_S / min(bandwidth, SLOWEST_RAD_S) * QUICKEST_RAD_S / max(bandwidth, QUICKEST_RAD_S)
-    coupled = (plant.cross_rate != 0.0) | (plant.cross_fin != 0.0)
-    own = (plant.damping, np.sqrt(np.abs(plant.stiffness)), np.where(coupled, plant.cross_damping, 0.0))
+    damping, stiffness, crossed, of_rate, of_fin = plant.straight
+    own = (damping, np.sqrt(np.abs(stiffness)), np.where((of_rate != 0.0) | (of_fin != 0.0), crossed, 0.0))
     fastest = max(float(np.max(np.abs(part))) for part in own)
     most = max(LARGEST_TURN / max(fastest, LEAST_RAD_S), STEP_S)
     return Pace(STEP_S * times if times <= 1.0 else min(STEP_S * times, most), FLIGHT_S * times)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fieldsid.display import Brief
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.schedule.flown.closed_loop_kernel import OUT_COLUMNS, close_loop
+from fieldsid.schedule.flown.closed_loop_kernel import OUT_COLUMNS, Plants, close_loop
 from fieldsid.schedule.flown.hull_kernel import close_hull_loop
 from fieldsid.schedule.flown.pace import STEP_S
 from fieldsid.schedule.linear_plant import LinearPlant
@@ -152,20 +152,19 @@ class _Flight:
 def _run(plant: LinearPlant, rows: Sequence[Row] | Row, flight: _Flight, push: FloatArray | None = None) -> Steps:
     if plant.hull is not None:
         return _run_hulls(plant, plant.hull, rows, flight, push)
-    plants = np.column_stack(
-        [
-            plant.damping, plant.stiffness, plant.authority, plant.offset + flight.offset, plant.quadratic, plant.beyond_square,
-            plant.cross_damping, plant.cross_rate, plant.cross_fin, plant.cross_quadratic,
-            np.exp(-flight.step / np.maximum(plant.lag, FASTEST_LAG_S)), np.round(plant.delay / flight.step),
-            np.minimum(plant.fin_rate, 1e6) * flight.step, plant.powers, plant.speed_loss, plant.cross_share, plant.strip_moment,
-            plant.strip_force, plant.strip_flow,
-        ]
+    of_damping, of_authority, of_core, drag, fin_loss, turn_loss = (
+        np.ascontiguousarray(part) for part in (*plant.powers[:, :2].T, plant.powers[:, 2:], *plant.speed_loss.T)
+    )
+    plants = Plants(
+        plant.damping, plant.stiffness, plant.authority, plant.offset + flight.offset, np.ascontiguousarray(plant.core),
+        of_damping, of_authority, of_core, np.exp(-flight.step / np.maximum(plant.lag, FASTEST_LAG_S)),
+        np.round(plant.delay / flight.step), np.minimum(plant.fin_rate, 1e6) * flight.step, drag, fin_loss, turn_loss,
     )  # fmt: skip
     time = flight.times()
     out = np.zeros((plant.count, time.size, OUT_COLUMNS))
     pushed = np.zeros(time.size) if push is None else push
     asked = (flight.reference, flight.depth, flight.pitch_limit)
-    close_loop(np.ascontiguousarray(plants), _table(rows), *asked, plant.speed, flight.step, pushed, out)
+    close_loop(plants, _table(rows), *asked, plant.speed, flight.step, pushed, out)
     return _steps(time, out)
 
 

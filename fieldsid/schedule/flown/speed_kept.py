@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldsid.models.axis import Axis
+from fieldsid.models.hull import QUADRATIC, STRIP_MOMENT
 from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.turning.steady.speed_loss import TYPICAL_LOSS, SurgeModel, draw_speed_loss
 
@@ -22,7 +23,7 @@ def slowing(plant: LinearPlant, surge: SurgeModel | None, fin_limit: float, seed
 
 def _full_rate(one: LinearPlant, fin_limit: float) -> float:
     """Return the steady rate (rad/s) of a fin at its limit, r of a r + q r^2 = |b| delta; one that nothing holds by q alone."""
-    a, q = float(one.slow_damping[0]), float(one.quadratic[0] + one.strip_moment[0])
+    a, q = float(one.slow_damping[0]), float(one.core[0, QUADRATIC] + one.core[0, STRIP_MOMENT])
     push = abs(float(one.slow_authority[0])) * fin_limit
     if q > 0.0:
         return float((-a + np.sqrt(a * a + 4.0 * q * push)) / (2.0 * q))

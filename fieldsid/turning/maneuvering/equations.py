@@ -41,6 +41,9 @@ HEIGHTS = 0.1 * np.sqrt(1.0 - np.abs(2.0 * STATIONS) ** 3)
 SUMS = np.concatenate([np.zeros((1, 4)), np.cumsum(HEIGHTS[:, None] * STATIONS[:, None] ** np.arange(4), axis=0)])
 """Sums of h x^n over the first stations (11, 4): the flow across changes its sign at one place along the hull at most."""
 FIRST_STATION, STATION_STEP = float(STATIONS[0]), float(STATIONS[1] - STATIONS[0])
+OFFSET = NAMES.index("rudder_offset")
+DIFFERENCE = 1e-5
+"""Width of a difference, of speed, of speed over length, in rad: its third order is below 1e-10 of what it is of."""
 LEAST_SURGE_M_S = 0.02
 MOST_M_S = 50.0
 
@@ -182,14 +185,28 @@ def coefficients(theta: FloatArray) -> FloatArray:
     return np.where(IN_LOGARITHM, np.exp(np.where(IN_LOGARITHM, theta, 0.0)), theta)
 
 
+@jit
+def about_straight(hulls: FloatArray, speed: float) -> FloatArray:
+    """Return the derivatives (d, 2, 3) of the accelerations in sway and yaw by sway, rate and rudder, of hulls (d, 22).
+
+    On a straight run at a speed in m/s, by central differences of `slope`; of two widths, as the cross flow goes with v|v|.
+    """
+    out = np.zeros((hulls.shape[0], 2, 3))
+    for i in range(hulls.shape[0]):
+        p = hulls[i].copy()
+        p[OFFSET] = 0.0
+        lift, length = rudder_lift(p, speed), p[0]
+        for column in range(3):
+            unit = speed if column == 0 else speed / length if column == 1 else 1.0
+            for weight, width in ((4.0, 0.5 * DIFFERENCE * unit), (-1.0, DIFFERENCE * unit)):
+                v, r, delta = width * (column == 0), width * (column == 1), width * (column == 2)
+                _, dv, dr = slope(speed, v, r, delta, 1.0, speed, lift, p)
+                _, before_v, before_r = slope(speed, -v, -r, -delta, 1.0, speed, lift, p)
+                out[i, 0, column] += weight * (dv - before_v) / (2.0 * DIFFERENCE * unit)
+                out[i, 1, column] += weight * (dr - before_r) / (2.0 * DIFFERENCE * unit)
+    return out
+
+
 def growth_rate(p: FloatArray, speed: float) -> float:
     """Return the largest real part of the straight run's lateral modes at a speed in m/s, 1/s."""
-    length, rudder = p[0], p[4]
-    still = REFERENCE_SPEED_M_S / speed
-    lateral = np.array(
-        [
-            [-(p[7] + p[18] * still + rudder) / length, -(p[8] + rudder * p[5])],
-            [-(p[9] + rudder * p[5]) / (p[6] * length**2), -(p[10] + p[19] * still + rudder * p[5] ** 2) / (p[6] * length)],
-        ]
-    )
-    return float(speed * np.max(np.linalg.eigvals(lateral).real))
+    return float(np.max(np.linalg.eigvals(about_straight(p[None], speed)[0, :, :2]).real))

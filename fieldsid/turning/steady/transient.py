@@ -7,18 +7,20 @@ tactical diameter across the approach track at 180 degrees.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from fieldsid.models.effect import power_drag
-from fieldsid.models.helpers.strip_theory import strip_force, strip_moment
+from fieldsid.dynamics.steady_kernel import between
+from fieldsid.models.hull import core_at, kinds_of, named, power, slope, surge_slope
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.jit import jit
 from fieldsid.plant.yaw_plant import YawPlant, fin_after_step
 from fieldsid.turning.steady.speed_loss import SpeedLoss
 
 STEP_S = 0.04
 MAX_TRANSIENT_S = 240.0
-CHECK_EVERY = 100
+LEAST_SURGE_M_S = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,50 +38,80 @@ class Transient:
     tactical_diameter: FloatArray
 
 
+class _Vehicle(NamedTuple):
+    """The estimate of a plant and of its loss of speed, and what the thrust keeps: see `YawPlant` and `SpeedLoss`."""
+
+    core: FloatArray
+    powers: FloatArray
+    law: tuple[FloatArray, FloatArray]
+    reference: float
+    damping: float
+    damping_exponent: float
+    damping_more: float
+    authority: float
+    trim: float
+    trim_per_authority: float
+    drag: float
+    fin_loss: float
+    turn_loss: float
+    drift_per_rate: float
+
+
 def turn_transient(plant: YawPlant, speed_loss: SpeedLoss, entry: FloatArray, side: float, command: float) -> Transient:
     """Simulate the estimate (draw 0) of a plant through a turn to `side` at a rudder command (rad, magnitude)."""
-    one, slow = plant.one(), speed_loss.one()
-    fin_time, fin_angle = fin_after_step(plant, side, command)
-    count = round(MAX_TRANSIENT_S / STEP_S)
-    state = np.zeros((7, entry.size))
-    state[2] = entry
-    track: FloatArray = np.empty((count + 1, 4, entry.size), dtype=np.float64)
-    track[0] = 0.0
-    done = count
-    for i in range(count):
-        middle = (i + 0.5) * STEP_S
-        fin = float(np.interp(middle, fin_time, fin_angle))
-        half = state + 0.5 * STEP_S * _slope(state, one, slow, entry, fin)
-        state = state + STEP_S * _slope(half, one, slow, entry, fin)
-        track[i + 1, 0], track[i + 1, 1:] = state[0], state[3:6]
-        if i % CHECK_EVERY == 0 and bool(np.all(np.abs(state[0]) > np.pi + 0.2)):
-            done = i + 1
-            break
-    return read_off(STEP_S * np.arange(done + 1, dtype=np.float64), track[: done + 1], side)
+    vehicle, moment = _vehicle(plant, speed_loss.one()), np.broadcast_to(plant.moment[0], entry.shape)
+    fins = np.interp((np.arange(round(MAX_TRANSIENT_S / STEP_S)) + 0.5) * STEP_S, *fin_after_step(plant, side, command))
+    track = np.empty((entry.size, fins.size + 1, 4))
+    for j, speed in enumerate(entry):
+        fly_turn(vehicle, float(speed), float(moment[j]), fins, STEP_S, track[j])
+    return read_off(STEP_S * np.arange(fins.size + 1, dtype=np.float64), track.transpose(1, 2, 0), side)
 
 
-def _slope(state: FloatArray, plant: YawPlant, speed_loss: SpeedLoss, entry: FloatArray, fin: float) -> FloatArray:
-    """Return the derivative (7, s) of heading, rate, surge, x, y, path, and the cross state over the speed's scale.
+def _vehicle(plant: YawPlant, loss: SpeedLoss) -> _Vehicle:
+    one, reference = plant.one(), plant.model.law.reference
+    known = reference if np.isfinite(reference) and reference > 0.0 else 0.0
+    there = one.authority_at(np.full((1, 1), known or 1.0))
+    of_fin = one.trim * one.factors[1] / there if plant.model.law.trim_of_fin else np.zeros((1, 1))
+    trim = np.zeros((1, 1)) if plant.model.law.trim_of_fin else one.trim
+    numbers = (
+        one.damping * one.factors[0], one.damping_exponent, one.damping_more, one.authority_ratio * one.factors[1], trim, of_fin,
+        loss.drag, loss.fin, loss.turn, loss.drift_per_rate,
+    )  # fmt: skip
+    return _Vehicle(one.core[0].copy(), one.powers, one.law, known, *(float(n[0, 0]) for n in numbers))
 
-    The cross state is a moment -a21 v with a21 ~ u, so x/scale goes with v and stays itself while the speed falls.
+
+@jit
+def fly_turn(vehicle: _Vehicle, entry: float, pushed: float, fins: FloatArray, step: float, track: FloatArray) -> None:
+    """Fill track (n + 1, 4) with heading, north, east and path of a turn under fins (n,) by the midpoint rule.
+
+    The cross state is a moment -a21 v with a21 ~ u: over the speed's scale it goes with v and stays itself while the speed falls.
     """
-    heading, rate, surge = state[0], state[1], np.maximum(state[2], 0.05)
-    speed = surge[None, :]
-    scale = plant.scale(speed)[0]
-    core = {n: c.at(plant.scale(speed))[0] for n, c in plant.core.items()}
-    moment = plant.authority_at(speed)[0] * fin + plant.trim_at(speed)[0] + plant.moment[0]
-    moment = moment - plant.damping_at(speed)[0] * rate - core["quadratic"] * power_drag(rate, core["beyond_square"])
-    moment = moment + core["cross_share"] * scale * state[6]
-    along_hull = core["strip_flow"] * scale * state[6]
-    moment = moment - core["strip_moment"] * strip_moment(along_hull, rate)
-    drift = (core["cross_fin"] * fin - core["cross_rate"] * rate - core["strip_force"] * strip_force(along_hull, rate)[0]) / scale
-    drift = drift - (core["cross_damping"] + core["cross_quadratic"] * scale * np.abs(state[6])) * state[6]
-    drag, turn, loss = speed_loss.drag[0], speed_loss.turn[0], speed_loss.fin[0]
-    slower = drag * (entry**2 - surge**2 * (1.0 + loss * fin**2) - turn * rate**2)
-    sway = -speed_loss.drift_per_rate[0] * rate
-    along = surge * np.cos(heading) - sway * np.sin(heading)
-    across = surge * np.sin(heading) + sway * np.cos(heading)
-    return np.stack([rate, moment, slower, along, across, np.hypot(surge, sway), drift])
+    kinds, core = kinds_of(vehicle.core), np.empty(vehicle.core.size)
+    heading, rate, surge, north, east, path, cross = 0.0, 0.0, entry, 0.0, 0.0, 0.0, 0.0
+    track[0, :] = 0.0
+    for i in range(fins.size):
+        t, to_heading, to_rate, to_surge, to_north, to_east, to_path, to_cross = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for _ in range(2):
+            r, u, at = rate + t * to_rate, max(surge + t * to_surge, LEAST_SURGE_M_S), heading + t * to_heading
+            scale = u / vehicle.reference if vehicle.reference > 0.0 else 1.0
+            core_at(vehicle.core, vehicle.powers, scale, core)
+            authority = vehicle.authority * between(np.log(u), *vehicle.law) * u * u
+            damping = vehicle.damping * power(scale, vehicle.damping_exponent) + vehicle.damping_more
+            moment = authority * (fins[i] + vehicle.trim_per_authority) + vehicle.trim + pushed
+            now = slope(named(core), kinds, damping, 0.0, moment, fins[i], 1.0, 0.0, r, scale * (cross + t * to_cross), 0.0)
+            sway = -vehicle.drift_per_rate * r
+            to_heading, to_rate, to_cross = r, now.rate, now.cross / scale
+            to_surge = surge_slope(u, entry, vehicle.drag, vehicle.fin_loss, vehicle.turn_loss, fins[i], r)
+            to_north, to_east = u * np.cos(at) - sway * np.sin(at), u * np.sin(at) + sway * np.cos(at)
+            to_path, t = np.sqrt(u * u + sway * sway), 0.5 * step
+        heading, rate, surge, cross = (
+            heading + step * to_heading,
+            rate + step * to_rate,
+            surge + step * to_surge,
+            cross + step * to_cross,
+        )
+        north, east, path = north + step * to_north, east + step * to_east, path + step * to_path
+        track[i + 1, 0], track[i + 1, 1], track[i + 1, 2], track[i + 1, 3] = heading, north, east, path
 
 
 def read_off(time: FloatArray, track: FloatArray, side: float) -> Transient:

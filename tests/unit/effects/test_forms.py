@@ -11,8 +11,9 @@ from fieldsid.dynamics.assemble import Base, assemble, integrate_record, measure
 from fieldsid.dynamics.free_run import command_record
 from fieldsid.effects import all_effects, pick_effect
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Core, Motion, as_fitted, with_variant
+from fieldsid.models.effect import Motion, as_fitted, with_variant
 from fieldsid.models.fin_path import FinPath
+from fieldsid.models.hull import Core
 from fieldsid.models.record import first_part
 
 NEUTRAL = {

@@ -12,6 +12,7 @@ from truth.paper import PITCH, YAW
 
 from fieldsid.errors import ArtifactError, ModelError, UsageError
 from fieldsid.models.axis import Axis
+from fieldsid.models.hull import CONSTANTS, Core
 from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.plant.laws.axis_laws import save_laws
@@ -57,29 +58,26 @@ def pitch(tmp_path):
     return source_of(tmp_path, PITCH, ("c22", "c23", "d2", "Cb"))
 
 
+POWERS = {
+    "cross_damping": 1.0, "cross_rate": 2.0, "cross_fin": 3.0, "cross_quadratic": -1.0, "strip_force": 1.0, "strip_flow": -1.0,
+}  # fmt: skip
+
+
 def plant(speed=1.5, count=1, **own):
     base = {
         "damping": 1.2,
         "stiffness": 0.0,
         "authority": -1.6,
         "offset": 0.0,
-        "quadratic": 0.0,
-        "beyond_square": 0.0,
-        "cross_damping": 1.0,
-        "cross_rate": 0.0,
-        "cross_fin": 0.0,
-        "cross_quadratic": 0.0,
-        "cross_share": 1.0,
-        "strip_moment": 0.0,
-        "strip_force": 0.0,
-        "strip_flow": 0.0,
         "lag": 0.0,
         "delay": 0.0,
         "fin_rate": np.inf,
     }
-    arrays = {k: np.broadcast_to(np.asarray(v, dtype=float), count).copy() for k, v in (base | own).items()}
-    powers = np.tile([1.0, 2.0, 1.0, 2.0, 3.0, -1.0], (count, 1))
-    return LinearPlant(Axis.YAW, speed, **arrays, powers=powers, speed_loss=np.zeros((count, 3)))
+    core = Core(**({"cross_damping": 1.0} | {k: v for k, v in own.items() if k in CONSTANTS}))
+    arrays = {k: np.broadcast_to(np.asarray(v, dtype=float), count).copy() for k, v in (base | own).items() if k not in CONSTANTS}
+    powers = [1.0, 2.0, *(POWERS.get(name, 0.0) for name in CONSTANTS)]
+    arrays |= {"core": np.tile(np.array(core), (count, 1)), "powers": np.tile(powers, (count, 1))}
+    return LinearPlant(Axis.YAW, speed, **arrays, speed_loss=np.zeros((count, 3)))
 
 
 def model_at(folder, speed, effects=("servo_lag",), **values):

@@ -9,7 +9,6 @@ from fieldsid.dynamics.free_run import command_record, simulate
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import as_fitted
-from fieldsid.models.helpers.strip_theory import strip_moment
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.plant.yaw_plant import yaw_plant
@@ -102,11 +101,6 @@ def test_an_unstable_model_turns_steadily_only_where_its_drag_holds_it():
     assert np.isnan(turn_of(model_of("plain", a22=-0.3), 1.0)[1].radius[0, 0])
     held = turn_of(model_of("quadratic", a22=-0.3), 1.0)[1].rate[0, 0]
     assert -0.3 * held + 3.0 * held**2 == pytest.approx(2.0 * 0.3 + 0.02, rel=1e-6)
-
-
-def test_crossflow_without_drift_is_quadratic_damping():
-    rate = np.array([-0.5, 0.2, 1.0])
-    assert strip_moment(np.zeros(3), rate) == pytest.approx(rate * np.abs(rate), rel=1e-12)
 
 
 @pytest.mark.parametrize("name", ["plain", "all"])
