@@ -86,17 +86,13 @@ def diagnose(
     told = partial(_diagnosis, unlogged=unlogged, skipped=unlogged | narrow, notes=notes)
     begin = partial(Search, learned, unseen, axis, catalogue, known, report, thorough=thorough)
     work = begin()
-    with work.parallel:
-        work.base()
-        if not work.is_noiseless:
-            return told(_best_result(work))
-        found = noiseless_search(work, lambda h: excess_explained(work, h) > MAIN_EXPLAINED_SHARE)
-        if found is not None and excess_explained(work, found) > MAIN_EXPLAINED_SHARE:
-            ending = _search_result(work, found, found.likelihood_fit, Verdict("effect", added_effects(work, found)))
-            return told(ending)
-    again = begin()
-    with again.parallel:
-        return told(_best_result(again))
+    work.base()
+    if not work.is_noiseless:
+        return told(_best_result(work))
+    found = noiseless_search(work, lambda h: excess_explained(work, h) > MAIN_EXPLAINED_SHARE)
+    if found is not None and excess_explained(work, found) > MAIN_EXPLAINED_SHARE:
+        return told(_search_result(work, found, found.likelihood_fit, Verdict("effect", added_effects(work, found))))
+    return told(_best_result(begin()))
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Iterable, Sequence
-from functools import wraps
 from io import BytesIO
 from typing import Any, TypeVar
 
@@ -15,38 +14,41 @@ from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect, variant_of, with_variant
 from fieldsid.models.record import Record
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
-from fieldsid.runtime.lockstep import Lockstep
+from fieldsid.runtime.parallel_map import parallel_map
 from fieldsid.runtime.pickling import WorkerPickler, dumps
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 
-class ParallelMap(Lockstep):
-    """The objects that two processes share: records by their place, effects by their name, the counter of evaluations.
-
-    `state` is a number that is equal in two searches that have come to the same place.
-    """
+class ParallelMap:
+    """The objects that two processes share: records by their place, effects by their name, the counter of evaluations."""
 
     def __init__(
-        self, records: Iterable[Record], effects: Iterable[Effect], evaluations: EvaluationCounter | None = None,
-        state: Callable[[], int] = int,
+        self, records: Iterable[Record], effects: Iterable[Effect], evaluations: EvaluationCounter | None = None
     ) -> None:  # fmt: skip
         self.records, self.evaluations = tuple(records), evaluations or EvaluationCounter()
-        self.effects = {e.name: e for e in effects}
-        super().__init__(self.dumps, self.loads, state)
+        self.effects, self._is_sharing = {e.name: e for e in effects}, False
 
     def map(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
-        """Return a function of every item as `Lockstep.map` does, and count the evaluations of each, whoever has done them."""
+        """Return a function of every item as `parallel_map` does, and count the evaluations of each, whoever has done them.
 
-        @wraps(function)
+        A map within a map is not shared.
+        """
+        if self._is_sharing:
+            return [function(item) for item in items]
+
         def counted(item: T) -> tuple[R, int]:
             before = self.evaluations.count
             value = function(item)
             used, self.evaluations.count = self.evaluations.count - before, before
             return value, used
 
-        done = super().map(counted, items)
+        self._is_sharing = True
+        try:
+            done = parallel_map(counted, items, self.dumps, self.loads)
+        finally:
+            self._is_sharing = False
         self.evaluations.add(sum(used for _, used in done))
         return [value for value, _ in done]
 

@@ -11,7 +11,7 @@ from fieldsid.logs.run import Run
 from fieldsid.logs.several.sifting import Refused, attempt, sifted
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import Record, record_of
-from fieldsid.runtime.lockstep import parallel_map
+from fieldsid.runtime.parallel_map import parallel_map
 
 
 def records_of(groups: Sequence[Sequence[Run]], axis: Axis, unfit: Refused[Run] | None = None) -> list[list[tuple[Run, Record]]]:

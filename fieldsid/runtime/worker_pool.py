@@ -10,9 +10,8 @@ cores):
     executor, start method spawn        2.23 to 3.23 s     52 to 73 % more
     one process, one core               1.72 to 3.01 s     30 to 45 % more
 
-What is kept from map to map, as lockstep.py has it, takes less than the first. Only spawn works on macOS and with other threads,
-and there a second process costs more than it saves: where this process cannot be forked (`can_fork`), it does all of the work
-itself.
+Only spawn works on macOS and with other threads, and there a second process costs more than it saves: where this process cannot
+be forked (`can_fork`), it does all of the work itself.
 """
 
 from __future__ import annotations

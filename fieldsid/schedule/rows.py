@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from math import ceil, degrees
 
 from fieldsid.errors import UsageError
-from fieldsid.runtime.lockstep import parallel_map
+from fieldsid.runtime.parallel_map import parallel_map
 from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.margins import margins
 from fieldsid.schedule.plants import Plants

@@ -13,7 +13,7 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.plant.parameter_source import ParameterSource
-from fieldsid.runtime.lockstep import parallel_map
+from fieldsid.runtime.parallel_map import parallel_map
 from fieldsid.schedule.check import READ_OFF, Check, StepCheck
 from fieldsid.schedule.flown.pace import LONGER, Pace, pace_of
 from fieldsid.schedule.flown.response import (

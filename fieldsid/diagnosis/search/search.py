@@ -84,7 +84,7 @@ class Search:
         self.tried = Archive(self.root)
         length = float(np.mean([len(r) for r in both]))
         self.budget = Budget(len(both), length, np.inf) if self.thorough else Budget(len(both), length)
-        self.parallel = ParallelMap(both, self.catalogue, self.budget.evaluations, self._place)
+        self.parallel = ParallelMap(both, self.catalogue, self.budget.evaluations)
 
     def best(self) -> ScoredModel:
         """Return the accepted set of effects with the highest log evidence."""
@@ -283,8 +283,3 @@ class Search:
     def ranked(self) -> list[ScoredModel]:
         """Return all scored models by log evidence, the best first, without those that diverge."""
         return self.tried.ranked()
-
-    def _place(self) -> int:
-        """Return a number that is equal in two searches that have come to the same place."""
-        evidences = ((k, h.log_evidence if np.isfinite(h.log_evidence) else None) for k, h in self.tried.items())
-        return hash((self.budget.evaluations.count, tuple(evidences)))

@@ -14,7 +14,7 @@ from fieldsid.planning.design.leg import CIRCLE, Leg
 from fieldsid.planning.design.objective import make_objective
 from fieldsid.planning.flight.excitation import Excitation
 from fieldsid.planning.safety.envelope import MOST_TURNS
-from fieldsid.runtime.lockstep import parallel_map
+from fieldsid.runtime.parallel_map import parallel_map
 
 SETTLED_TURN = 2.5 * np.pi
 """Heading (rad) to turn through: half a circle to settle, one to be measured on."""

@@ -17,7 +17,7 @@ from fieldsid.planning.design.plan import SHORTEST_WINDOW_S, Plan, Request, chec
 from fieldsid.planning.discriminate.discriminate import FAST_HZ, Separation, as_flown, candidate_maneuvers, separate, worth
 from fieldsid.planning.flight.excitation import Excitation
 from fieldsid.planning.safety.envelope import check_room, check_speeds
-from fieldsid.runtime.lockstep import parallel_map
+from fieldsid.runtime.parallel_map import parallel_map
 
 COARSE_DRAWS = 60
 """Draws of the prior that each maneuver of the catalogue is first lowered by; the one that is flown is kept inside by many."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.runtime.lockstep import parallel_map
+from fieldsid.runtime.parallel_map import parallel_map
 from fieldsid.turning.maneuvering.equations import coefficients, settle
 from fieldsid.turning.maneuvering.fit import Fitted
 

@@ -11,7 +11,7 @@ from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.parameter_source import ParameterSource, draw_values
 from fieldsid.plant.yaw_plant import YawPlant, yaw_plant
-from fieldsid.runtime.lockstep import parallel_map
+from fieldsid.runtime.parallel_map import parallel_map
 from fieldsid.turning.prediction import SIDES
 from fieldsid.turning.steady.speed_loss import SpeedLoss, SurgeModel, draw_speed_loss, no_speed_loss
 from fieldsid.turning.steady.steady_turn import SteadyTurn, steady_turn
