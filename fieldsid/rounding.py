@@ -9,6 +9,8 @@ import math
 
 MANY = 100.0
 """Times its noise from which on an error is of a log with none to speak of, as of a towing tank or a simulation."""
+TWO_SIDED_95 = 1.96
+"""Quantile 0.975 of the normal distribution: standard errors to either side that 95 of 100 lie within."""
 
 
 def digits_of_error(error: float) -> int:

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldsid.fitting.fin_history import BLOCK_S
 from fieldsid.fitting.predict.predict import Prediction
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.block_means import block_means, block_width
 
-BLOCK_S = 0.25
 FEWEST_BLOCKS = 20
 
 

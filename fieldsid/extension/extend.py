@@ -123,14 +123,12 @@ def extend(
     parts = _with_signals((*(effect_held(n, parent.own) for n in parent.effects), *new), [*learned, *judged])
     notes = (*notes, *left_out([run for run, _ in (*fitted, *checked)], parent.axis))
     work = Search(learned, judged, parent.axis, parts, parent.effects, report, thorough=True)
-    with work.parallel:
-        before, after = base_from(work, parent), _with_all(work)
-        found = _extension(work, before, after, new, notes)
+    before, after = base_from(work, parent), _with_all(work)
+    found = _extension(work, before, after, new, notes)
     if found.pays or not judged or not is_accepted(before, after):
         return found
     work = Search((*learned, *judged), (), parent.axis, parts, parent.effects, report, thorough=True)
-    with work.parallel:
-        return _extension(work, base_from(work, parent), _with_all(work), new, (*notes, FITTED_TO_ALL))
+    return _extension(work, base_from(work, parent), _with_all(work), new, (*notes, FITTED_TO_ALL))
 
 
 def _extension(

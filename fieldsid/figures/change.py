@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from fieldsid.change.record import CHANGED, Answers, Change, GainChange, ParameterChange
 from fieldsid.figures import canvas
+from fieldsid.rounding import TWO_SIDED_95
 
 TITLE_WIDTH = 100
 MOST_TIMES = 3.0
@@ -43,8 +44,8 @@ def draw(parameters: list[ParameterChange], ax: Axes) -> None:
         rows.append((p.word, p.change, p.interval95, True))
         if len(p.speeds) > 1:
             rows += [
-                (f"{a.speed:.2f} m/s", a.change, (a.change - 1.96 * a.std_error, a.change + 1.96 * a.std_error), False)
-                for a in p.speeds
+                (f"{a.speed:.2f} m/s", a.change, (a.change - reach, a.change + reach), False)
+                for a, reach in ((a, TWO_SIDED_95 * a.std_error) for a in p.speeds)
             ]
     places = -np.arange(len(rows), dtype=float)
     ax.axvline(0.0, color="0.4", linewidth=0.8)

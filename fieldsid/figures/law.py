@@ -10,6 +10,7 @@ from fieldsid.figures import canvas
 from fieldsid.models.axis import NAMES
 from fieldsid.plant.laws.axis_laws import Laws
 from fieldsid.plant.laws.parameter_law import ParameterLaw
+from fieldsid.rounding import TWO_SIDED_95
 
 COLOURS = {
     "affine": canvas.SIMULATED,
@@ -71,7 +72,7 @@ def draw_other(law: ParameterLaw, ax: Axes) -> None:
 
 
 def _points(ax: Axes, law: ParameterLaw, x: np.ndarray, y: np.ndarray) -> None:
-    error = None if law.std_errors is None else 1.96 * law.std_errors
+    error = None if law.std_errors is None else TWO_SIDED_95 * law.std_errors
     ax.errorbar(x, y, yerr=error, fmt="o", color="0.15", markersize=5, capsize=3, linewidth=1.0, zorder=5)
     odd = [i for i, p in enumerate(law.points) if not p.belongs]
     if odd:

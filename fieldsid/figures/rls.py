@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from fieldsid.figures import canvas
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.rounding import TWO_SIDED_95
 
-BAND = 1.96
 START_UP = 0.15
 """Share of the record whose wild first estimates do not set the scale of a panel."""
 
@@ -35,7 +35,7 @@ class TrackView:
 def draw(view: TrackView, ax: Axes, index: int) -> None:
     """Draw one parameter (by its place in `names`) over time."""
     name = view.names[index]
-    value, band = view.values[:, index], BAND * view.std_errors[:, index]
+    value, band = view.values[:, index], TWO_SIDED_95 * view.std_errors[:, index]
     unit = view.units.get(name, "")
     canvas.dress(ax, y=f"{name}, {unit}" if unit else name)
     ax.fill_between(view.time, value - band, value + band, color=canvas.SECOND, alpha=0.2, linewidth=0, label="95 % band")

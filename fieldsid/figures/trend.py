@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from fieldsid.batch.trend import Trend
 from fieldsid.figures import canvas
+from fieldsid.rounding import TWO_SIDED_95
 
 DATES: Any = import_module("matplotlib.dates")  # its functions have no types
 FORMATS = ("%Y", "%b\n%Y", "%d %b", "%H:%M", "%H:%M", "%S.%f")
@@ -49,7 +50,7 @@ def draw(trend: Trend, ax: Axes) -> None:
     """Draw one parameter: runs with 95 % errors, the mean of each stretch, a line at each change."""
     dates = DATES.date2num([datetime.fromtimestamp(t, UTC) for t in trend.start.tolist()])
     ax.errorbar(
-        dates, trend.values, 1.96 * trend.std_errors, fmt="o", markersize=3.2, color=canvas.MEASURED, elinewidth=0.8,
+        dates, trend.values, TWO_SIDED_95 * trend.std_errors, fmt="o", markersize=3.2, color=canvas.MEASURED, elinewidth=0.8,
         label="run, 95 % error",
     )  # fmt: skip
     cuts = np.flatnonzero(np.diff(trend.means)) + 1

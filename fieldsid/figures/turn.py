@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fieldsid.figures import canvas
+from fieldsid.rounding import TWO_SIDED_95
 from fieldsid.turning.measured.measured_turn import MeasuredTurn
 from fieldsid.turning.prediction import SIDES, TurnPrediction, TurnRow
 
@@ -37,8 +38,8 @@ def draw_radius(prediction: TurnPrediction, ax: Axes) -> None:
         speed = m.turn.flown_at
         label = f"measured circle, {side}" if m is next(x for x in prediction.measured if x.turn.side == side) else None
         ax.errorbar(
-            [speed], [circle.radius], yerr=[1.96 * circle.radius_std_error], fmt="D", color=COLOURS[side], markeredgecolor="0.1",
-            markersize=7, zorder=6, label=label,
+            [speed], [circle.radius], yerr=[TWO_SIDED_95 * circle.radius_std_error], fmt="D", color=COLOURS[side],
+            markeredgecolor="0.1", markersize=7, zorder=6, label=label,
         )  # fmt: skip
         if np.isfinite(m.predicted) and abs(abs(m.turn.fin) - prediction.rudder_max) > 0.05 * prediction.rudder_max:
             words = f"{np.degrees(abs(m.turn.fin)):.0f}°: predicted {m.predicted:.2f} m"

@@ -6,9 +6,7 @@ from dataclasses import dataclass
 
 from fieldsid.fitting.fin_offset import offset_of
 from fieldsid.models.model import Model
-
-TWO_SIDED_95 = 1.96
-"""Quantile 0.975 of the normal distribution."""
+from fieldsid.rounding import TWO_SIDED_95
 
 
 @dataclass(frozen=True, slots=True)

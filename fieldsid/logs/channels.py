@@ -8,6 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Literal
 
+from fieldsid.logs.convert.clock import GAP_FACTOR
 from fieldsid.logs.convert.frames import Frame
 
 Stamp = Literal["header", "receive"]
@@ -107,7 +108,7 @@ class ChannelMap:
     frame: Frame = field(default_factory=Frame)
     stamp: Stamp | None = None
     clock: str | None = None
-    gap_factor: float = 2.5
+    gap_factor: float = GAP_FACTOR
     pressure: Pressure = field(default_factory=Pressure)
     table: TableForm = field(default_factory=TableForm)
     origin: Path | None = None

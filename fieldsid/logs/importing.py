@@ -14,7 +14,7 @@ from fieldsid.artifacts import check_output, plain
 from fieldsid.errors import UsageError
 from fieldsid.logs.channels import ChannelMap, Source
 from fieldsid.logs.convert.assemble import WHOLE
-from fieldsid.logs.convert.conditioning import MAIN, ROUNDING, gap_limit, gaps_in
+from fieldsid.logs.convert.conditioning import MAIN, MAX_GAP_S, ROUNDING, gap_limit, gaps_in
 from fieldsid.logs.load import load_run
 from fieldsid.logs.run import EXPLAINING, Note, Run
 from fieldsid.logs.save import SUFFIXES, save_run
@@ -72,7 +72,7 @@ class Importer:
     channels: tuple[str, ...] = ()
     msg_path: Path | None = None
     part: tuple[float, float] = WHOLE
-    max_gap_s: float = 2.0
+    max_gap_s: float = MAX_GAP_S
     salvage: bool = False
     whole: bool = False
     joined: tuple[Path, ...] = ()

@@ -19,6 +19,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.linalg import solveh_banded
 
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.white_noise import MEDIAN_OF_NORMAL
 
 LONGEST_TIME_CONSTANT_S = 10.0
 """Largest T; what changes more slowly than that over a run is no noise of a sensor."""
@@ -96,7 +97,7 @@ def _is_outlier(values: FloatArray) -> npt.NDArray[np.bool_]:
     """
     around = sliding_window_view(np.pad(values, MEDIAN_WIDTH // 2, mode="edge"), MEDIAN_WIDTH)
     off = np.abs(values - np.median(around, axis=1))
-    usual = 1.4826 * float(np.median(off))
+    usual = float(np.median(off)) / MEDIAN_OF_NORMAL
     return np.asarray((off > OUTLIER_SPREADS * usual) & (off > OUTLIER_RANGE_SHARE * float(np.ptp(values))))
 
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 from math import comb
 
 import numpy as np
+from scipy.special import ndtri
 
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 DIFFERENCE_ORDER = 3
-MEDIAN_OF_NORMAL = 0.6745
+MEDIAN_OF_NORMAL = float(ndtri(0.75))
 """Median of |x| of a standard normal x."""
 
 MAX_FLOOR_SAMPLES, BLOCK_SAMPLES = 50_000, 1_000

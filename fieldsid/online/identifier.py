@@ -28,8 +28,8 @@ from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.white_noise import white_noise_std
 from fieldsid.online.sample_filter import SampleFilter, present_step
+from fieldsid.rounding import TWO_SIDED_95
 
-TWO_SIDED_95 = 1.96
 """Quantile 0.975 of the normal distribution."""
 NOISE_WINDOW, NOISE_EVERY = 1024, 256
 """Samples that the sensors' noise is learnt from, and samples between two looks."""

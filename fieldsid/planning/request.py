@@ -16,6 +16,7 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
 from fieldsid.planning.belief.prior_file import load_believed
 from fieldsid.planning.belief.prior_model import checked_prior, named_prior
+from fieldsid.planning.design.best_leg import RUN_UP_S
 from fieldsid.planning.design.plan import WINDOW, Plan, Request, make_plan
 from fieldsid.planning.discriminate.rivals import rivals_from, rivals_named
 from fieldsid.planning.discriminate.separating_plan import LONGEST_WINDOW_S, separating_plan
@@ -63,7 +64,7 @@ class PlanRequest:
     minutes: float | None = None
     limiting: EnvelopeLimits = UNLIMITED
     window: float | None = None
-    run_up: float = 10.0
+    run_up: float = RUN_UP_S
     rate: float = 20.0
     radius: bool = False
     separate: tuple[str, ...] = ()

@@ -12,7 +12,7 @@ from fieldsid.extension import Generation
 from fieldsid.models.axis import NAMES
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.reporting.chart import Band, Panel, Series, bars, chart, legend, thinned
-from fieldsid.rounding import MANY
+from fieldsid.rounding import MANY, TWO_SIDED_95
 
 DEG = np.degrees(1.0)
 MOST_BARS = 8
@@ -73,7 +73,7 @@ def over_speed(source: ParameterSource, name: str, unit: str) -> str | None:
         return None
     speeds = np.array([p.speed for p in points])
     values = np.array([p.values[name] for p in points])
-    errors = np.array([1.96 * p.std_errors.get(name, 0.0) for p in points])
+    errors = np.array([TWO_SIDED_95 * p.std_errors.get(name, 0.0) for p in points])
     dots = Series(speeds, values, "measured", name, "points", errors)
     if source.laws is None or name not in source.laws.by_name or np.ptp(speeds) == 0:
         margin = np.array([speeds.min() * 0.9, speeds.max() * 1.1])

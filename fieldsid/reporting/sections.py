@@ -14,7 +14,7 @@ from fieldsid.comparison.sufficient import is_noise, pooled
 from fieldsid.reporting import figures
 from fieldsid.reporting.made_from import lineage_rows
 from fieldsid.reporting.material import AxisMaterial, Material, Shown
-from fieldsid.rounding import MANY, in_unit, interval, number, probability, with_error
+from fieldsid.rounding import MANY, TWO_SIDED_95, in_unit, interval, number, probability, with_error
 from fieldsid.trial_folder.journal import Entry
 from fieldsid.trial_folder.next_step import REPORT, verification_of
 from fieldsid.trial_folder.patterns import shortened
@@ -228,7 +228,7 @@ def _parameters(shown: Shown) -> list[dict[str, str]]:
             "model": shown.path,
             "name": model.shown(n),
             "value": with_error(v, model.std_error(n)),
-            "interval": interval(v - 1.96 * model.std_error(n), v + 1.96 * model.std_error(n)),
+            "interval": interval(v - TWO_SIDED_95 * model.std_error(n), v + TWO_SIDED_95 * model.std_error(n)),
             "unit": in_unit(model.units.get(n, "")),
         }
         for n, v in model.values.items()

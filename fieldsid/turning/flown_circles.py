@@ -12,6 +12,7 @@ from fieldsid.logs.run import Note, Run
 from fieldsid.logs.several.sifting import Refused, attempt, sifted
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.plant.parameter_source import ParameterSource
+from fieldsid.rounding import TWO_SIDED_95
 from fieldsid.turning.measured.circle import LEAST_TURN_FOR_CURRENT_RAD
 from fieldsid.turning.measured.measured_turn import MeasuredTurn, measure_turn
 from fieldsid.turning.prediction import MeasuredRow, TurnRow
@@ -83,5 +84,5 @@ def _repeatable(turn: MeasuredTurn) -> tuple[float, float]:
     """Return the 95 % interval of a measured circle as another flight would give it: the water is not the same again."""
     low, high = turn.circle.interval95
     middle = turn.circle.radius
-    half = float(np.hypot(0.5 * (high - low), 1.96 * REPEATED_SD * middle))
+    half = float(np.hypot(0.5 * (high - low), TWO_SIDED_95 * REPEATED_SD * middle))
     return middle - half, middle + half

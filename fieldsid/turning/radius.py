@@ -16,7 +16,7 @@ from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.plant.remedies import damping_that_holds, in_radians, wider_fin
 from fieldsid.turning.believed_rows import believed_rows, doubts_of_draws
 from fieldsid.turning.flown_circles import against_rudder, circles_of, compared_with, turned_against, with_measurement
-from fieldsid.turning.maneuvering.belief import Belief, believe, not_fitted
+from fieldsid.turning.maneuvering.belief import SEED, Belief, believe, not_fitted
 from fieldsid.turning.model_error import DataCoverage, data_coverage, model_error, model_error_draws
 from fieldsid.turning.paper_formulas import (
     FIN_ZERO_TOLERANCE,
@@ -31,7 +31,6 @@ from fieldsid.turning.steady.blended_turns import BlendedTurns, blended_turns
 from fieldsid.turning.steady.speed_loss import SurgeModel, fit_surge
 
 RADIUS_DRAWS = 500
-SEED = 20240511
 METHODS = ("auto", "u_turn", "steady", "simulated", "maneuvering")
 MIN_REPORTED_OFFSET_RAD = 0.0025
 """An offset in rad that moves a radius by a hundredth."""

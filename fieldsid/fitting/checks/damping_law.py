@@ -32,7 +32,7 @@ SQUARE = 2.0
 APART = 0.1
 """Half the distance over which the profile's curvature is taken."""
 CLEAR_STD_ERRORS = 2.0
-"""Standard errors from which a slope's sign is clear."""
+"""Standard errors from which a value's sign is clear."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from fieldsid.fitting.checks.authority_checks import authority_check
-from fieldsid.fitting.checks.damping_law import LIMITING_EFFECTS, slope_at_rest
+from fieldsid.fitting.checks.damping_law import CLEAR_STD_ERRORS, LIMITING_EFFECTS, slope_at_rest
 from fieldsid.fitting.problem.estimator import Solution
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.logs.run import Note
@@ -16,8 +16,6 @@ from fieldsid.models.model import Noise
 from fieldsid.rounding import in_unit
 
 MAX_CORRELATION = 0.95
-CLEAR_STD_ERRORS = 2.0
-"""Standard errors above which a value differs significantly from zero."""
 CLEAR_GAIN = 10.0
 """Log likelihood that a law of damping must be worse by not to count."""
 

@@ -38,9 +38,10 @@ COMMANDS = frozenset({"rudder_rad", "elevator_rad", "thrust", "thrust_ratio", "p
 ANGLES_AND_RATES = ("yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s", "roll_rad", "roll_rate_rad_s")
 """Signals whose clock the others come to, the first one where rates are equal."""
 
-
 SLOWER = 1.5
 """Steps of the clock from which on a signal's own step is slower."""
+GAP_FACTOR = 2.5
+"""Steps of the usual length above which one is a gap, unless a mapping says another number."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +69,7 @@ def base_of(tracks: Mapping[str, Track], asked: str | None = None) -> str:
 
 
 def one_clock(
-    tracks: Mapping[str, Track], *, clock: str | None = None, gap_factor: float = 2.5
+    tracks: Mapping[str, Track], *, clock: str | None = None, gap_factor: float = GAP_FACTOR
 ) -> tuple[FloatArray, dict[str, FloatArray], list[Note]]:
     """Return the time (n,), the signals (n,) on it, and a note that says how they came there."""
     base = base_of(tracks, clock)

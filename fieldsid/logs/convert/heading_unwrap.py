@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.logs.convert.clock import Track, straight
+from fieldsid.logs.convert.clock import GAP_FACTOR, Track, straight
 from fieldsid.logs.convert.frames import unwrapped
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
@@ -52,7 +52,7 @@ RARE, HELD = 0.02, 0.8
 SHOWN = 5
 
 
-def unwrapped_over(heading: Track, rate: Track | None = None, gap_factor: float = 2.5) -> tuple[Track, list[Note]]:
+def unwrapped_over(heading: Track, rate: Track | None = None, gap_factor: float = GAP_FACTOR) -> tuple[Track, list[Note]]:
     """Return a heading (n,) in rad without jumps of a turn, and a note where samples were interpolated across its wrap.
 
     Those samples come to lie straight between their neighbours, or are NaN where these are further apart than

@@ -21,6 +21,8 @@ from fieldsid.registry import near
 
 DEGREE = math.pi / 180.0
 KNOT = 1852.0 / 3600.0
+GRAVITY = 9.80665
+"""Standard acceleration of free fall in m/s^2."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +76,7 @@ _PLAIN: Mapping[str, Mapping[str, tuple[float, str]]] = {
         "d": (86400.0, "day days datenum"),
     },
     "ratio": {"1": (1.0, "- ratio"), "%": (1e-2, "percent percentage pct perc")},
-    "force": {"N": (1.0, "newton newtons"), "kN": (1e3, ""), "kgf": (9.80665, "")},
+    "force": {"N": (1.0, "newton newtons"), "kN": (1e3, ""), "kgf": (GRAVITY, "")},
 }
 """Units by dimension: the factor to SI, and how else they are spelled."""
 _QUOTIENTS: Mapping[str, Mapping[str, str]] = {
@@ -187,6 +189,6 @@ def scaled(values: FloatArray, factor: float) -> FloatArray:
     return values if factor == 1.0 else values * factor
 
 
-def depth_of_pressure(pressure_pa: FloatArray, *, density: float, surface_pa: float, gravity: float = 9.80665) -> FloatArray:
+def depth_of_pressure(pressure_pa: FloatArray, *, density: float, surface_pa: float, gravity: float = GRAVITY) -> FloatArray:
     """Return depth in m, positive down, of an absolute pressure (n,) in Pa: (p - p_surface) / (rho g)."""
     return np.asarray((pressure_pa - surface_pa) / (density * gravity))

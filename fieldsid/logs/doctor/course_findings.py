@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.logs.convert.units import factor_to
+from fieldsid.logs.doctor.angle_and_rate import TRUSTED
 from fieldsid.logs.doctor.pair_findings import SPEEDS, UNIT_LIMIT, goes_with_way
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import Note, Run
@@ -23,8 +24,6 @@ AGREES = 0.9
 """Length of the mean unit vector of the angle between two directions from which on they agree."""
 TURNED = 0.2
 """How much better the one must agree than the other: the heading must have turned for that."""
-TRUSTED = 0.8
-"""Correlation from which on a sign is believed."""
 ALL_BUT = 0.95
 """Share of the windows in which the vehicle must have moved for its course to be followed round."""
 RATIO = 2.0

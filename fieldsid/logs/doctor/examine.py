@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from fieldsid.logs.convert.clock import GAP_FACTOR
 from fieldsid.logs.convert.conditioning import MAIN, likely_unit
 from fieldsid.logs.convert.times.time_column import FASTEST_S, SLOW_S
 from fieldsid.logs.doctor.angle_and_rate import angle_findings
@@ -19,8 +20,6 @@ from fieldsid.logs.run import LINES, Note, Run
 
 JITTER_LIMIT = 0.2
 """Standard deviation of the sampling step over its median."""
-GAP_FACTOR = 2.5
-"""A step longer than this many medians is a gap."""
 _FINS = ("rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad")
 
 

@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field
 
 from fieldsid.errors import MappingError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, COMBINED, POSITION, ChannelMap, Pressure, Source, TableForm
+from fieldsid.logs.convert.clock import GAP_FACTOR
 from fieldsid.logs.convert.frames import Body, Frame, World
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, SUMMED, counts_unit
 from fieldsid.logs.convert.times.clock_parts import parts_of
@@ -112,7 +113,7 @@ class _File(StrictModel):
     stamp: Literal["header", "receive"] | None = _key("which stamps every topic has", "stamp: receive")
     clock: str | None = _key("the signal whose samples give the clock, else the fastest angle or rate", "clock: yaw_rad")
     gap_factor: Annotated[float, Field(ge=1.0, le=1000.0)] = _key(
-        "over how many of its periods a measurement is interpolated at most", "gap_factor: 4.0", 2.5
+        "over how many of its periods a measurement is interpolated at most", "gap_factor: 4.0", GAP_FACTOR
     )
     time: _Time | None = _key("the time of a table", "time: {column: Time, unit: s}")
     pressure: _Pressure = _key("what turns a pressure into a depth", "pressure: {density: 1000.0, surface_pa: 0.0}", _Pressure())

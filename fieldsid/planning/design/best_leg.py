@@ -28,6 +28,8 @@ DESIGN_PROBABILITY_SHARE, CHANCE_PROBABILITY_SHARE = 0.7, 0.75
 COARSE_DRAWS, DRAWS, ERROR_DRAWS = 200, 500, 12
 FINALISTS = 3
 SMALLEST = 0.02
+RUN_UP_S = 10.0
+"""Straight run before the window of each leg, unless another is asked for."""
 EFFORT = SearchEffort(20, 12, 2)
 
 
@@ -39,7 +41,7 @@ class Setting:
     envelope: Envelope
     window: Window
     want: Mapping[str, float]
-    run_up_s: float = 10.0
+    run_up_s: float = RUN_UP_S
     seed: int = 1
     open_loop: bool = False
     effort: SearchEffort = EFFORT

@@ -14,13 +14,13 @@ from fieldsid.models.allocation import PlaneFins
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
 from fieldsid.planning.belief.prior_model import checked_prior
-from fieldsid.planning.design.best_leg import Setting, best_leg
+from fieldsid.planning.design.best_leg import RUN_UP_S, Setting, best_leg
 from fieldsid.planning.design.circle_legs import circle_legs
 from fieldsid.planning.design.leg import Leg
 from fieldsid.planning.flight.excitation import Excitation, Window
 from fieldsid.planning.safety.envelope import Envelope, check_room, check_speeds
 from fieldsid.planning.specify.accuracy_goals import accuracy_goals_text
-from fieldsid.runtime.lockstep import parallel_map
+from fieldsid.runtime.parallel_map import parallel_map
 
 SHORTEST_WINDOW_S = 15.0
 MOST_PASSES = 40
@@ -37,7 +37,7 @@ class Request:
     want: Mapping[str, float]
     minutes: float | None = None
     window: Window = WINDOW
-    run_up_s: float = 10.0
+    run_up_s: float = RUN_UP_S
     radius: bool = False
     open_loop: bool = False
     seed: int = 1

@@ -10,12 +10,12 @@ import numpy as np
 
 from fieldsid.angles import said
 from fieldsid.errors import UsageError
+from fieldsid.logs.convert.units import GRAVITY
 from fieldsid.maneuvers import Limits
 from fieldsid.models.axis import Axis
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.flight.closed_loop import Response
 
-GRAVITY = 9.80665
 LARGEST_FIN = 0.7
 LARGEST_SPEED = 15.0
 MOST_TURNS = 4.0

@@ -17,15 +17,13 @@ from fieldsid.display import Brief
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.tail_probabilities import student_quantile, student_tail
-from fieldsid.plant.laws.regression import Regression, fit_power_law, fit_powers, rounding_of, t_factor
+from fieldsid.plant.laws.regression import ROUNDING_SHARE, Regression, fit_power_law, fit_powers, rounding_of, t_factor
 from fieldsid.rounding import nine_digits, p_value
 
 FAMILY_ALPHA = 0.05
 MIN_DEGREES_OF_FREEDOM = 2
 """Degrees of freedom of the others' scatter above which a point is tested against it: with one, two points in line by chance
 (rounded digits make such) put a third any number of its standard errors off."""
-ROUNDING_SHARE = 1e-9
-"""Share of a value below which its scatter is that of the arithmetic."""
 AUTHORITY = (("affine", (0.0, 2.0)), ("through_zero", (2.0,)))
 OTHERS = (("constant", (0.0,)), ("linear", (0.0, 1.0)), ("affine", (0.0, 2.0)))
 EXPONENT_OF_LIFT = 2.0

@@ -14,12 +14,10 @@ import numpy as np
 from fieldsid.display import Brief
 from fieldsid.errors import DataError
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.plant.laws.regression import t_factor
+from fieldsid.numerics.white_noise import MEDIAN_OF_NORMAL
+from fieldsid.plant.laws.regression import ROUNDING_SHARE, t_factor
 
 HUBER = 1.345
-MAD_TO_SD = 1.4826
-ROUNDING_SHARE = 1e-9
-"""Share of the track's size below which its extent, or its curvature, is rounding."""
 LEAST_SAMPLES = 12
 MAX_REWEIGHTINGS = 12
 LEAST_TURN_RAD = 1.5
@@ -173,7 +171,7 @@ def _turned(points: FloatArray, circle: FloatArray) -> float:
 
 
 def _robust_sd(residual: FloatArray) -> float:
-    return float(MAD_TO_SD * np.median(np.abs(residual - np.median(residual))))
+    return float(np.median(np.abs(residual - np.median(residual)))) / MEDIAN_OF_NORMAL
 
 
 def _effective(residual: FloatArray) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.geodetic import north_and_east
+from fieldsid.logs.doctor.course_findings import AGREES, TURNED, WINDOW_S
 from fieldsid.logs.mapping.canonical_names import unit_in_name
 from fieldsid.logs.mapping.name_words import words_of
 from fieldsid.logs.mapping.vocabulary import COMMANDED, LATITUDE, LONGITUDE, OF_ANOTHER, OVER_GROUND
@@ -23,11 +24,6 @@ from fieldsid.logs.reader import Samples
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
-WINDOW_S = 3.0
-AGREES = 0.9
-"""Length of the mean unit vector of the angle between two directions from which on they agree."""
-TURNED = 0.2
-"""How much better the one must agree than the other: the vehicle must have turned for that."""
 NEAR = math.pi / 4
 """How far the angle between them may be from what it should be: sideslip, a current and a compass' error lie in it."""
 FEWEST = 50
