@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fieldsid.logs.convert.units import GRAVITY
 from fieldsid.maneuvers import Autopilot, Schedule
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model
@@ -15,7 +16,7 @@ from fieldsid.planning.flight.closed_loop import ACTUATOR_ROUNDS, closed_loop, f
 from fieldsid.planning.flight.excitation import Excitation, Window, asked_of
 from fieldsid.planning.flight.operating_point import OperatingPoint, operating_point
 from fieldsid.planning.flight.rule_flight import OperatingPointPlant, fly_operating_points, plant_of
-from fieldsid.planning.safety.envelope import GRAVITY, Envelope
+from fieldsid.planning.safety.envelope import Envelope
 
 ROLL_SPREAD = 0.4
 TRIM_SPREAD = 0.005
