@@ -18,6 +18,7 @@ from ruamel.yaml.scalarstring import LiteralScalarString
 
 from fieldsid._version import __version__
 from fieldsid.errors import ArtifactError
+from fieldsid.records.keys import body_of, has_keys
 from fieldsid.records.named_inputs import sha256_of
 
 OWN_HANDLES = Path("/proc/self/fd")
@@ -148,7 +149,9 @@ def to_yaml(body: Mapping[str, Any]) -> str:
 
 
 def plain(value: Any) -> Any:  # noqa: PLR0911 - one return per kind of value
-    """Return a value as nested dict, list and plain numbers; numbers that are not finite become None."""
+    """Return a value as nested dict, list and plain numbers; numbers that are not finite become None, a record its JSON."""
+    if has_keys(value):
+        return plain(body_of(value))
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, np.ndarray):

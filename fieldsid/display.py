@@ -45,14 +45,15 @@ def _unread(_table: DataFrame, _name: str) -> Any:
 class View(Generic[T]):
     """How records of one class are shown; `name` is the class's in small letters, `turn_row` of TurnRow.
 
-    `line` says what matters, `page` everything in words. `frames` and `figures` make tables and matplotlib figures by the
+    `line` says what matters, `page` everything in words, angles in the unit that it is
+    given or in rad. `frames` and `figures` make tables and matplotlib figures by the
     name of a part, the first unasked. `label` tells records of one kind apart. `read` makes a record of a table, `system`
     python-control systems at a speed.
     """
 
     name: str
     line: Callable[[T], str]
-    page: Callable[[T], Page]
+    page: Callable[..., Page]
     frames: Callable[[T], Mapping[str, Callable[[], DataFrame]]]
     label: Callable[[T], str] = str
     figures: Callable[[T], Mapping[str, Callable[[], Any]]] = _none
@@ -64,6 +65,11 @@ def view_of(kind: type) -> View[Any]:
     """Return the view of a class of records; raises UsageError where there is none."""
     view: View[Any] = pick("fieldsid.views", "VIEW", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind.__name__).lower())
     return view
+
+
+def page_of(record: Any, *more: Any) -> Page:
+    """Return the page of a record; more: what its view takes besides, the unit of angles first."""
+    return view_of(type(record)).page(record, *more)
 
 
 class Brief:
@@ -86,10 +92,10 @@ class Displayed(Brief):
 
     def summary(self) -> str:
         """Return the whole record as text in fixed blocks: warnings first, then statistics, then its tables."""
-        return text_of(view_of(type(self)).page(self))
+        return text_of(page_of(self))
 
     def _repr_html_(self) -> str:
-        return html_of(view_of(type(self)).page(self))
+        return html_of(page_of(self))
 
     def to_frame(self, part: str = "") -> DataFrame:
         """Return a part of the record as a pandas table, without a name its first; raises UsageError naming the parts."""

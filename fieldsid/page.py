@@ -30,11 +30,14 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """What a record says: a title, what must be read before any number, blocks in their order, and closing sentences."""
+    """What a record says: a title, what must be read before any number, blocks and sentences in their order.
+
+    A sentence belongs to what stands before it, unless it begins with an empty line.
+    """
 
     title: str
     warnings: tuple[str, ...] = ()
-    blocks: tuple[Block, ...] = ()
+    blocks: tuple[Block | str, ...] = ()
     closing: tuple[str, ...] = ()
 
 
@@ -43,10 +46,22 @@ def facts(title: str, pairs: Iterable[tuple[str, str]]) -> Block:
     return Block(title, tuple(pair for pair in pairs if pair[1]), left=2)
 
 
+def paragraph(lines: Sequence[str]) -> tuple[str, ...]:
+    """Return sentences that stand together, apart from what stands before them."""
+    return tuple(line if i else f"\n{line}" for i, line in enumerate(lines))
+
+
 def text_of(page: Page) -> str:
     """Return a page as text: title and warnings first, then its blocks; sentences are folded, tables are not."""
     head = [_folded(line) for line in (page.title, *(f"warning: {w}" for w in page.warnings))]
-    parts = ["\n".join(head), *(_block_text(b) for b in page.blocks if b.rows)]
+    parts = ["\n".join(head)]
+    for b in page.blocks:
+        if isinstance(b, Block):
+            parts += [_block_text(b)] if b.rows else []
+        elif b.startswith("\n"):
+            parts.append(_folded(b[1:]))
+        else:
+            parts[-1] += f"\n{_folded(b)}"
     return "\n\n".join([*parts, *(["\n".join(map(_folded, page.closing))] if page.closing else [])])
 
 
@@ -54,9 +69,14 @@ def html_of(page: Page) -> str:
     """Return a page as a fragment of HTML that is well-formed XML too; every word of the record is escaped."""
     warnings = "".join(f"<li>{escape(w)}</li>" for w in page.warnings)
     parts = [f"<p><b>{escape(page.title)}</b></p>", f"<ul>{warnings}</ul>" if warnings else ""]
-    parts += [_block_html(b) for b in page.blocks if b.rows]
+    parts += [_block_html(b) if isinstance(b, Block) else f"<p>{escape(b.strip())}</p>" for b in page.blocks if told(b)]
     parts += [f"<p>{escape(line)}</p>" for line in page.closing]
     return f'<div class="fieldsid">{"".join(parts)}</div>'
+
+
+def told(block: Block | str) -> bool:
+    """Whether a block says anything."""
+    return bool(block.rows if isinstance(block, Block) else block)
 
 
 def cut(text: str, longest: int) -> str:
@@ -85,7 +105,7 @@ def _block_text(block: Block) -> str:
         GAP.join(w.ljust(n) if i < block.left else w.rjust(n) for i, (w, n) in enumerate(zip(row, widths, strict=True))).rstrip()
         for row in rows
     ]
-    return "\n".join([block.title, *(f"{INDENT}{line}" for line in lines)])
+    return "\n".join([*([block.title] if block.title else []), *(f"{INDENT}{line}" for line in lines)])
 
 
 def _fact_lines(rows: Sequence[tuple[str, ...]]) -> list[str]:
@@ -97,7 +117,8 @@ def _fact_lines(rows: Sequence[tuple[str, ...]]) -> list[str]:
 def _block_html(block: Block) -> str:
     head = f"<tr>{_cells('th', block.columns, block.left)}</tr>" if block.columns else ""
     rows = "".join(f"<tr>{_cells('td', row, block.left)}</tr>" for row in block.rows)
-    return f"<table><caption>{escape(block.title)}</caption>{head}{rows}</table>"
+    caption = f"<caption>{escape(block.title)}</caption>" if block.title else ""
+    return f"<table>{caption}{head}{rows}</table>"
 
 
 def _cells(tag: str, words: Sequence[str], left: int) -> str:

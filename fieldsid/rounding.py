@@ -6,6 +6,10 @@ And a number as it decides: processors add up in different orders, and of two th
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from re import Match
+from re import compile as pattern
 
 MANY = 100.0
 """Times its noise from which on an error is of a log with none to speak of, as of a towing tank or a simulation."""
@@ -84,3 +88,40 @@ def p_value(p: float) -> str:
 def in_unit(unit: str) -> str:
     """Return a unit as it is printed behind a number: nothing where the number is a plain one, whose unit is 1."""
     return "" if unit == "1" else unit
+
+
+@dataclass(frozen=True, slots=True)
+class Angles:
+    """The unit that angles are shown in, and what one in rad is multiplied by for that: the one place that turns units."""
+
+    unit: str
+    factor: float
+
+    def of(self, unit: str) -> tuple[float, str]:
+        """Return what a number in a unit is multiplied by to be shown, and the unit it is then in; a plain number has none.
+
+        Of a unit the radian is changed wherever it stands, to the power it stands in.
+        """
+        if self.factor == 1.0 or "rad" not in unit:
+            return 1.0, in_unit(unit)
+        above, _, below = unit.partition("/")
+        power = above.count("rad") + above.count("rad^2") - below.count("rad") - below.count("rad^2")
+        return self.factor**power, unit.replace("rad", self.unit)
+
+    def estimate(self, value: float, std_error: float, interval95: Sequence[float], unit: str) -> tuple[str, str, str]:
+        """Return an estimate as the cells of a table: value with its error, unit, 95 % interval."""
+        factor, unit = self.of(unit)
+        low, high = interval95
+        return with_error(factor * value, factor * std_error), unit, interval(factor * low, factor * high)
+
+    def words(self, text: str) -> str:
+        """Return a sentence with the angles in it as they are shown: `rate: 0.05 .. 0.1 rad/s`."""
+        return text if self.factor == 1.0 else _ANGLE.sub(self._turned, text)
+
+    def _turned(self, found: Match[str]) -> str:
+        numbers = [f"{float(found[name]) * self.factor:.3g}" for name in ("low", "high") if found[name]]
+        return f"{' .. '.join(numbers)} {self.unit}{found['rest']}"
+
+
+_ANGLE = pattern(r"(?P<low>-?[\d.]+)(?: \.\. (?P<high>-?[\d.]+))? rad\b(?P<rest>(?:/s(?:\^2)?)?)")
+RADIANS, DEGREES = Angles("rad", 1.0), Angles("deg", 180.0 / math.pi)

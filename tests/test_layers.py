@@ -21,7 +21,7 @@ ORDER = (
     "artifacts", "rounding", "angles", "strict",
     "templates", "guide", "logs", "maneuvers", "models", "vehicle", "effects", "dynamics", "noise", "fitting", "estimators",
     "comparison", "planning", "online", "diagnosis", "extension", "batch", "plant", "turning", "schedule", "exports",
-    "trial_folder", "change", "reporting", "figures", "views", "face",
+    "trial_folder", "change", "figures", "views", "reporting", "face", "results",
     "demo", "cli", "__main__",
 )  # fmt: skip
 """A room may import itself and what stands before it."""

@@ -14,12 +14,14 @@ from dataclasses import dataclass
 from datetime import datetime
 from itertools import pairwise
 from math import isfinite, sqrt
+from typing import Annotated
 
 import numpy as np
 
 from fieldsid.batch.rows import Row
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.numerics.arrays import BoolArray, FloatArray, IntArray
+from fieldsid.records.keys import Key, Number
 
 FEWEST_RUNS = 6
 SHORTEST_STRETCH = 4
@@ -38,14 +40,14 @@ LARGEST_RELATIVE_ERROR = 0.5
 class Change:
     """A change of a parameter: the first run after it and its start, means before and after, standard error of the difference."""
 
-    run: str
-    start_utc: str
-    before: float
-    after: float
-    std_error: float
+    run: Annotated[str, Key("The first run after it.")]
+    start_utc: Annotated[str, Key("That run's start.")]
+    before: Annotated[float, Key("Mean before, at the trend's speed.")]
+    after: Annotated[float, Key("Mean after.")]
+    std_error: Annotated[float, Key("Standard error of the difference.")]
 
     @property
-    def share(self) -> float:
+    def share(self) -> Annotated[Number, Key()]:
         """The change as a share of the value before: -0.18 is 18 % less of it, of either sign; NaN where it was zero."""
         return (self.after - self.before) / self.before if self.before else float("nan")
 
@@ -57,14 +59,21 @@ class Trend:
     `speed` is that speed in m/s (NaN where unknown), `scatter` tau.
     """
 
-    name: str
+    name: Annotated[str, Key("Its name.", "parameter")]
     start: FloatArray
     values: FloatArray
     std_errors: FloatArray
     means: FloatArray
-    speed: float
-    scatter: float
-    changes: tuple[Change, ...]
+    speed: Annotated[
+        Number, Key("The speed all runs are carried to; null where the parameter does not go with speed.", "speed_m_s")
+    ]
+    scatter: Annotated[float, Key("Scatter from run to run beyond the stated errors.")]
+    changes: Annotated[tuple[Change, ...], Key("Where it changed.")]
+
+    @property
+    def runs(self) -> Annotated[int, Key()]:
+        """Runs that know it."""
+        return self.values.size
 
 
 def trends_of(rows: Sequence[Row], axis: Axis) -> tuple[Trend, ...]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import degrees
-from typing import Any
+from typing import Annotated, Literal
 
 from fieldsid.display import Brief, Plotted
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.records.keys import Interval, Key, Number, Side
 from fieldsid.rounding import number, with_error
 
 TRIM_ANGLE = "trim_angle"
@@ -31,14 +32,14 @@ VERDICTS: Mapping[str, str] = {
 class AtSpeed(Brief):
     """One quantity at one speed (m/s): before and after with standard errors, and the change as `ParameterChange` has it."""
 
-    speed: float
-    old: float
-    old_std_error: float
-    new: float
-    new_std_error: float
-    change: float
-    std_error: float
-    p_adjusted: float
+    speed: Annotated[Number, Key("The speed; null for a coefficient that has none.", "speed_m_s")]
+    old: Annotated[float, Key("Its value before.", "before")]
+    old_std_error: Annotated[float, Key("The standard error of that.", "before_std_error")]
+    new: Annotated[float, Key("Its value after.", "after")]
+    new_std_error: Annotated[float, Key("The standard error of that.", "after_std_error")]
+    change: Annotated[float, Key("The change, as a share of the value before where `is_relative`.")]
+    std_error: Annotated[float, Key("The standard error of the change.")]
+    p_adjusted: Annotated[Number, Key("The p-value of no change, by Holm over all tests; null where no error is known.")]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -49,16 +50,18 @@ class ParameterChange(Brief):
     interval lies within what matters) or unclear.
     """
 
-    name: str
-    word: str
-    unit: str
-    is_relative: bool
-    change: float
-    std_error: float
-    interval95: tuple[float, float]
-    p_adjusted: float
-    state: str
-    speeds: tuple[AtSpeed, ...]
+    name: Annotated[str, Key("The parameter, an effect's coefficient, or `trim_angle`: the fin that the trim amounts to.")]
+    word: Annotated[str, Key("What it is: authority, damping, stiffness, trim.", "what")]
+    unit: Annotated[str, Key("Its unit.")]
+    is_relative: Annotated[bool, Key("Whether changes are shares of the value before.")]
+    change: Annotated[float, Key("The change over all speeds.")]
+    std_error: Annotated[float, Key("Its standard error.")]
+    interval95: Annotated[Interval, Key("Its 95 % interval.")]
+    p_adjusted: Annotated[Number, Key("The smallest p-value of its tests, by Holm over all tests.")]
+    state: Annotated[
+        str, Key("Beyond its errors, within what matters, or neither.", of=Literal["changed", "unchanged", "unclear"])
+    ]
+    speeds: Annotated[tuple[AtSpeed, ...], Key("At each speed.")]
 
     @property
     def amount(self) -> str:
@@ -69,7 +72,7 @@ class ParameterChange(Brief):
         return f"{'+' if self.change > 0 else ''}{with_error(scale * self.change, scale * self.std_error)}{unit.rstrip()}"
 
     @property
-    def says(self) -> str:
+    def says(self) -> Annotated[str, Key()]:
         """The change in a few words."""
         if self.state == CHANGED:
             return f"{self.word} {self.amount}"
@@ -83,25 +86,27 @@ class GainChange(Brief):
     And what the loop is with the old gains on the vehicle as it is now: least damping ratio, phase margin in deg.
     """
 
-    speed: float
-    old: float
-    new: float
-    change: float
-    interval95: tuple[float, float]
-    damping_with_old: float
-    phase_with_old_deg: float
+    speed: Annotated[float, Key("The speed.", "speed_m_s")]
+    old: Annotated[float, Key("The gain of before.", "kp_before")]
+    new: Annotated[float, Key("The gain that would be designed now.", "kp_after")]
+    change: Annotated[float, Key("Its change as a share.")]
+    interval95: Annotated[Interval, Key("The 95 % interval of that, all speeds together.")]
+    damping_with_old: Annotated[
+        float, Key("Least damping ratio of the loop as it is now, with the gain of before.", "damping_ratio_with_old")
+    ]
+    phase_with_old_deg: Annotated[Number, Key("Phase margin of that loop.", "phase_margin_with_old_deg")]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class RadiusChange(Brief):
     """The settled turning radius in m at one speed (m/s) to one side, before and after, each with its 95 % interval."""
 
-    speed: float
-    side: str
-    old: float
-    old95: tuple[float, float]
-    new: float
-    new95: tuple[float, float]
+    speed: Annotated[float, Key("The speed.", "speed_m_s")]
+    side: Annotated[str, Key("The side.", of=Side)]
+    old: Annotated[float, Key("The radius before.", "before_m")]
+    old95: Annotated[Interval, Key("Its 95 % interval.", "before_interval95")]
+    new: Annotated[float, Key("The radius after.", "after_m")]
+    new95: Annotated[Interval, Key("Its 95 % interval.", "after_interval95")]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -119,20 +124,28 @@ class Answers(Brief):
 class Change(Plotted):
     """What has changed on one axis, of the parameters, the effects, the gains and the radius; `verdict` is a key of VERDICTS."""
 
-    axis: Axis
-    speeds: tuple[float, ...]
-    parameters: tuple[ParameterChange, ...]
-    added: tuple[str, ...]
-    removed: tuple[str, ...]
-    gains: tuple[GainChange, ...]
-    radius: tuple[RadiusChange, ...]
-    rudder: float | None
+    axis: Annotated[Axis, Key("The plane.")]
+    speeds: Annotated[tuple[float, ...], Key("Speeds at which both sides were flown.", "speeds_m_s")]
+    parameters: Annotated[
+        tuple[ParameterChange, ...], Key("The parameters, and the coefficients of effects that both sides have.")
+    ]
+    added: Annotated[tuple[str, ...], Key("Effects in the models after alone.", "effects_added")]
+    removed: Annotated[tuple[str, ...], Key("Effects in the models before alone.", "effects_removed")]
+    gains: Annotated[tuple[GainChange, ...], Key("The gains.")]
+    radius: Annotated[tuple[RadiusChange, ...], Key("The radius; none in pitch.")]
+    rudder: Annotated[float | None, Key("The fin of the turn, and the limit the gains are designed for.", "rudder_rad")]
     answers: Answers | None
-    verdict: str
-    notes: tuple[Note, ...]
+    verdict: Annotated[
+        str,
+        Key(
+            "New gains needed; they hold; more runs are needed to say; no gain can be designed; the effects are not the same.",
+            of=Literal["needed", "hold", "unclear", "none", "form"],
+        ),
+    ]
+    notes: Annotated[tuple[Note, ...], Key("What to read before the numbers.", "warnings")]
 
     @property
-    def line(self) -> str:
+    def line(self) -> Annotated[str, Key()]:
         """What has changed, and what follows for the gains, in one line."""
         return f"{self.axis.value} {', '.join(self._parts())}: {VERDICTS[self.verdict]}"
 
@@ -142,71 +155,6 @@ class Change(Plotted):
         words = [p.says for p in sorted(shown, key=lambda p: order[p.state])]
         words += [f"{e} only after" for e in self.added] + [f"{e} only before" for e in self.removed]
         return words
-
-    def record(self) -> dict[str, Any]:
-        """Return the record by the names of `--json`."""
-        return {
-            "axis": self.axis.value,
-            "line": self.line,
-            "verdict": self.verdict,
-            "speeds_m_s": list(self.speeds),
-            "parameters": [_parameter(p) for p in self.parameters],
-            "effects_added": list(self.added),
-            "effects_removed": list(self.removed),
-            "gains": [
-                {
-                    "speed_m_s": g.speed,
-                    "kp_before": g.old,
-                    "kp_after": g.new,
-                    "change": g.change,
-                    "interval95": list(g.interval95),
-                    "damping_ratio_with_old": g.damping_with_old,
-                    "phase_margin_with_old_deg": g.phase_with_old_deg,
-                }
-                for g in self.gains
-            ],
-            "radius": [
-                {
-                    "speed_m_s": r.speed,
-                    "side": r.side,
-                    "before_m": r.old,
-                    "before_interval95": list(r.old95),
-                    "after_m": r.new,
-                    "after_interval95": list(r.new95),
-                }
-                for r in self.radius
-            ],
-            "rudder_rad": self.rudder,
-            "warnings": [{"code": n.code, "message": n.message} for n in self.notes],
-        }
-
-
-def _parameter(p: ParameterChange) -> dict[str, Any]:
-    return {
-        "name": p.name,
-        "what": p.word,
-        "unit": p.unit,
-        "is_relative": p.is_relative,
-        "change": p.change,
-        "std_error": p.std_error,
-        "interval95": list(p.interval95),
-        "p_adjusted": p.p_adjusted,
-        "state": p.state,
-        "says": p.says,
-        "speeds": [
-            {
-                "speed_m_s": a.speed,
-                "before": a.old,
-                "before_std_error": a.old_std_error,
-                "after": a.new,
-                "after_std_error": a.new_std_error,
-                "change": a.change,
-                "std_error": a.std_error,
-                "p_adjusted": a.p_adjusted,
-            }
-            for a in p.speeds
-        ],
-    }
 
 
 def shown(value: float, error: float) -> str:

@@ -25,6 +25,7 @@ from fieldsid.artifacts import plain
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.voice import voice
 from fieldsid.logs.run import Note
+from fieldsid.page import Block, Page, told
 from fieldsid.text.one_line import one_line
 
 T = TypeVar("T")
@@ -78,7 +79,7 @@ def emit(
     alone. Only what is no result, as a page of the guide, has no headline. Where what `render` prints `is_file`, to be redirected
     to one, the headline goes to stderr, and the file is what is left where it is to be quiet.
     """
-    whole = body if headline is None else {**body, "headline": headline.record()}
+    whole = body if headline is None else {**body, "headline": headline}
     if as_json:
         sys.stdout.write(json.dumps(plain(whole), allow_nan=False) + "\n")
         return whole
@@ -112,6 +113,17 @@ def print_file(to: Console, text: str) -> None:
         return
     for line in text.removesuffix("\n").split("\n"):
         to.print(line, soft_wrap=True)
+
+
+def print_page(to: Console, page: Page) -> None:
+    """Print the blocks and sentences of a page: the first lines of the result stand for its title and warnings."""
+    for i, block in enumerate(filter(told, page.blocks)):
+        if i and (isinstance(block, Block) or block.startswith("\n")):
+            to.print()
+        if isinstance(block, Block):
+            to.print(table(block.title, block.columns, block.rows, left=block.left))
+        else:
+            to.print(block.removeprefix("\n"))
 
 
 class Rows(Table):

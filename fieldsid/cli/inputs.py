@@ -134,15 +134,27 @@ def one_run(command: str, logs: Sequence[Path], *, join: bool) -> list[Path]:
     return list(logs)
 
 
-def refuse_swapped(command: str, model: Path, runs: Sequence[Path]) -> None:
-    """Raise UsageError where a model stands among the runs and something else in its place."""
+def model_first(model: Path, runs: Sequence[Path]) -> tuple[Path, list[Path]]:
+    """Return the model and the runs of a line, whichever of them comes first in it."""
     from fieldsid.logs.unknown_file import own_kind
 
-    models = [path for path in runs if own_kind(path) == "model"]
-    if own_kind(model) == "model" or not models:
-        return
-    words = ["sysid", command, str(models[0]), str(model), *(str(path) for path in runs if path != models[0])]
-    raise UsageError("the model comes first, then the runs", found=f"`{model}` first", hint=f"`{shlex.join(words)}`")
+    given = [model, *runs]
+    first = next((path for path in given if own_kind(path) == "model"), model)
+    return first, [path for path in given if path != first]
+
+
+def models_among(paths: Sequence[Path]) -> list[Path]:
+    """Return the models among the files of a pattern, saying which of this program's others are passed over; all without one."""
+    from fieldsid.cli.console import say
+    from fieldsid.logs.unknown_file import own_kind
+
+    kinds = {path: own_kind(path) for path in paths} if len(paths) > 1 else {}
+    if "model" not in kinds.values():
+        return list(paths)
+    others = [path for path in paths if kinds[path] not in ("model", None)]
+    if others:
+        say(f"passed over, no model: {', '.join(f'{path} ({kinds[path]})' for path in others)}")
+    return [path for path in paths if path not in others]
 
 
 def files_of(runs: Sequence[Run]) -> list[Path]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
 from fieldsid.cli.console import complain
 from fieldsid.errors import FieldsidError
+from fieldsid.results.result import Skipped
 from fieldsid.text.one_line import one_line
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ class Skips:
     """The logs that one command skips; a step calls `skip` for each log that it cannot use."""
 
     def __init__(self) -> None:
-        self.records: list[dict[str, Any]] = []
+        self.records: list[Skipped] = []
         self._runs: set[str] = set()
 
     def skip(self, log: Path | Run, error: FieldsidError) -> None:
@@ -32,7 +33,7 @@ class Skips:
         if not isinstance(log, Path):
             self._runs.add(name)
         shown = str(file or "-")
-        self.records.append({"run": name, "file": shown, "what": error.what, "found": error.found, "hint": error.hint})
+        self.records.append(Skipped(name, shown, error.what, error.found, error.hint))
         complain(*f"skipped `{one_line(shown)}`: {error}\n".split("\n"))
 
     def left_of(self, runs: Sequence[Run]) -> list[Run]:

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
 from itertools import takewhile
-from math import pi
-from re import Match
-from re import compile as pattern
 
-from fieldsid.rounding import in_unit, interval, with_error
+from fieldsid.rounding import DEGREES as IN_DEGREES
+from fieldsid.rounding import RADIANS, Angles
 
 QUIET, VERBOSE, DEGREES = "--quiet", "-v", "--deg"
 SAYS = {
@@ -34,7 +32,6 @@ class Voice:
 
 AS_USUAL = Voice()
 _VOICE = ContextVar("voice", default=AS_USUAL)
-_ANGLE = pattern(r"(?P<low>-?[\d.]+)(?: \.\. (?P<high>-?[\d.]+))? rad\b(?P<rest>(?:/s(?:\^2)?)?)")
 
 
 def voice() -> Voice:
@@ -59,31 +56,21 @@ def command_first(arguments: Sequence[str]) -> list[str]:
     return [*rest[:end], *before, *rest[end:]]
 
 
-def shown_in(unit: str) -> tuple[float, str]:
-    """Return what a number in a unit is multiplied by to be shown, and the unit it is then in; a plain number has none.
+def angles() -> Angles:
+    """Return the unit that angles are shown in."""
+    return IN_DEGREES if voice().is_in_degrees else RADIANS
 
-    The one place that knows of `--deg`. Of a unit the radian is changed wherever it stands, to the power it stands in.
-    """
-    above, _, below = unit.partition("/")
-    power = above.count("rad") - below.count("rad")
-    if not voice().is_in_degrees or "rad" not in unit:
-        return 1.0, in_unit(unit)
-    squares = above.count("rad^2") - below.count("rad^2")
-    return (180.0 / pi) ** (power + squares), unit.replace("rad", "deg")
+
+def shown_in(unit: str) -> tuple[float, str]:
+    """Return what a number in a unit is multiplied by to be shown, and the unit it is then in."""
+    return angles().of(unit)
 
 
 def shown_estimate(value: float, std_error: float, interval95: Sequence[float], unit: str) -> tuple[str, str, str]:
     """Return an estimate as the cells of a table: value with its error, unit, 95 % interval."""
-    factor, unit = shown_in(unit)
-    low, high = interval95
-    return with_error(factor * value, factor * std_error), unit, interval(factor * low, factor * high)
+    return angles().estimate(value, std_error, interval95, unit)
 
 
 def shown_words(text: str) -> str:
-    """Return a sentence with the angles in it as they are shown: `rate: 0.05 .. 0.1 rad/s`."""
-    return _ANGLE.sub(_turned, text) if voice().is_in_degrees else text
-
-
-def _turned(found: Match[str]) -> str:
-    numbers = [f"{float(found[name]) * 180.0 / pi:.3g}" for name in ("low", "high") if found[name]]
-    return f"{' .. '.join(numbers)} deg{found['rest']}"
+    """Return a sentence with the angles in it as they are shown."""
+    return angles().words(text)

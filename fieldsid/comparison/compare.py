@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 from fieldsid.comparison.conditions import conditions
 from fieldsid.comparison.localize import Place, Stretch, places, stretches
@@ -19,6 +20,7 @@ from fieldsid.logs.several.sifting import Refused, attempt, sifted
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import record_of
 from fieldsid.noise.white_floor import white_noise_floor
+from fieldsid.records.keys import INLINE, Key
 from fieldsid.rounding import MANY
 
 
@@ -39,12 +41,12 @@ def badness(over_floor: float, fit: float) -> tuple[float, float]:
 class Channel(Brief):
     """One measured channel, `angle` or `rate`: rms over its noise floor, fit in percent, metrics, and where its error falls."""
 
-    name: str
+    name: Annotated[str, Key("The channel.", "channel", of=Literal["angle", "rate"])]
     over_floor: float
     fit: float
-    metrics: Metrics
-    where: tuple[Place, ...]
-    worst: tuple[Stretch, ...]
+    metrics: Annotated[Metrics, INLINE]
+    where: Annotated[tuple[Place, ...], Key("Where it fails, the worst first.")]
+    worst: Annotated[tuple[Stretch, ...], Key("The worst stretches of two seconds.")]
 
     @property
     def badness(self) -> tuple[float, float]:

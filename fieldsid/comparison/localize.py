@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from fieldsid.comparison.conditions import Condition, Mask
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.records.keys import Key
 
 SMALLEST_SHARE = 0.02
 """Share of the samples below which a condition says nothing."""
@@ -21,21 +23,26 @@ MOST_STRETCHES = 3
 class Place:
     """Where: the condition, its share of the squared error and of the samples, its rms over the run's, its worst time."""
 
-    condition: str
-    share_of_error: float
-    share_of_samples: float
-    rms_ratio: float
-    start_s: float
-    end_s: float
+    condition: Annotated[str, Key("In words: `phase: onset`, `side: port`, `rate: above 0.14 rad/s`.")]
+    share_of_error: Annotated[float, Key("Share of the squared error that falls on it, 0 to 1.")]
+    share_of_samples: Annotated[float, Key("Share of the samples at which it holds.")]
+    rms_ratio: Annotated[float, Key("Error under it over that of the whole run.")]
+    start_s: Annotated[float, Key("Start of its worst unbroken stretch.", "t_start_s")]
+    end_s: Annotated[float, Key("End of that stretch.", "t_end_s")]
+
+    @property
+    def beyond(self) -> float:
+        """The share of the squared error beyond that of the samples: by this it is told where a model fails most."""
+        return self.share_of_error - self.share_of_samples
 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
     """A stretch of time and its share of the squared error."""
 
-    start_s: float
-    end_s: float
-    share_of_error: float
+    start_s: Annotated[float, Key("Its start.", "t_start_s")]
+    end_s: Annotated[float, Key("Its end.", "t_end_s")]
+    share_of_error: Annotated[float, Key("Share of the squared error in it.")]
 
 
 def places(time: FloatArray, square: FloatArray, ok: Mask, conditions: Sequence[Condition]) -> tuple[Place, ...]:
@@ -50,7 +57,7 @@ def places(time: FloatArray, square: FloatArray, ok: Mask, conditions: Sequence[
         share = float(square[here].sum()) / total
         start, end = worst_run(time, square, here)
         found.append(Place(condition.words, share, float(share_of_samples), float(np.sqrt(share / share_of_samples)), start, end))
-    return tuple(sorted(found, key=lambda p: p.share_of_samples - p.share_of_error))
+    return tuple(sorted(found, key=lambda p: -p.beyond))
 
 
 def worst_run(time: FloatArray, square: FloatArray, here: Mask) -> tuple[float, float]:

@@ -8,21 +8,23 @@ depends on where north is. Whiteness is the p-value of Ljung and Box 1978.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from fieldsid.fitting.predict.predict import Prediction
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.ljung_box import FEWEST_SAMPLES, ljung_box_p
+from fieldsid.records.keys import Key, Number
 
 
 @dataclass(frozen=True, slots=True)
 class Metrics:
     """Theil's coefficient and R^2 of the channel that was judged, and the p-value of its residual being white."""
 
-    theil: float
-    r2: float
-    whiteness_p: float
+    theil: Annotated[Number, Key("Theil's inequality coefficient, 0 perfect, 1 worst.")]
+    r2: Annotated[Number, Key("1 - |y - s|^2 / |y - mean y|^2.")]
+    whiteness_p: Annotated[Number, Key("p-value of the residual being white.")]
 
 
 def metrics(shown: Prediction, channel: int) -> Metrics:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from fieldsid.fitting.fin_history import BLOCK_S
 from fieldsid.fitting.predict.predict import Prediction
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.block_means import block_means, block_width
+from fieldsid.records.keys import Key
 
 FEWEST_BLOCKS = 20
 
@@ -22,8 +24,8 @@ FEWEST_BLOCKS = 20
 class Companion:
     """A signal, and the share (0..1) of the missing moment's variance that it and its square with sign explain."""
 
-    signal: str
-    explained: float
+    signal: Annotated[str, Key("The signal, in words.")]
+    explained: Annotated[float, Key("Share of the missing moment's variance that it explains.")]
 
 
 def missing_moment(shown: Prediction, damping: float) -> tuple[FloatArray, FloatArray]:

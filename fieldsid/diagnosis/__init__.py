@@ -1,7 +1,7 @@
 """Which physical effect is missing, how sure that is, and what it could be instead."""
 
-from fieldsid.diagnosis.diagnose import body_of, diagnose
+from fieldsid.diagnosis.diagnose import diagnose
 from fieldsid.diagnosis.records import Candidate, Diagnosis, Errors, Pair
 from fieldsid.diagnosis.report.report_text import what_it_does
 
-__all__ = ["Candidate", "Diagnosis", "Errors", "Pair", "body_of", "diagnose", "what_it_does"]
+__all__ = ["Candidate", "Diagnosis", "Errors", "Pair", "diagnose", "what_it_does"]

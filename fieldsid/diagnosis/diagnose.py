@@ -51,6 +51,7 @@ from fieldsid.models.record import Record, left_out
 SEARCH_ENDED = Note(
     "search_ended", "the search ended with what it had found by then: more might explain what is left; `--thorough` goes on"
 )
+SCREENED = "screened alone and beside what was found: it explains less than those listed"
 FinalModel = tuple[Model, tuple[Note, ...]]
 
 
@@ -167,7 +168,8 @@ def _diagnosis(
         base_model=base_model,
         where=where,
         next_maneuver=next_maneuver(work, verdict, found, unlogged, floor),
-        skipped=skipped,
+        unusual=apart_from_the_hulls_own(added_effects(work, named))[0],
+        skipped={**skipped, **{name: SCREENED for name in _of_the_user(work) if not any(name in h.names for h in end.leading)}},
         notes=(
             *notes,
             *diverged,
@@ -180,11 +182,23 @@ def _diagnosis(
 
 
 def _leading(work: Search, found: ScoredModel) -> list[ScoredModel]:
-    """Return all models but the base: the one found, the accepted sets by log evidence, and the others, small ones first."""
+    """Return all models but the base: the one found, the accepted sets by log evidence, and the others, small ones first.
+
+    Of an effect of the user's own the best model is among those that are listed.
+    """
     base, sums = work.base(), work.evidences()
     others = [h for h in work.ranked() if h is not found and h is not base]
     others.sort(key=lambda h: (-sums[key], 0) if (key := frozenset(h.names)) in sums else (np.inf, len(key)))
-    return [*([found] if found is not base else []), *others]
+    whole = [*([found] if found is not base else []), *others]
+    first = [next((i for i, h in enumerate(whole) if name in h.names), 0) for name in _of_the_user(work)]
+    beyond = sorted({i for i in first if i >= MAX_CANDIDATES})[:MAX_CANDIDATES]
+    before = MAX_CANDIDATES - len(beyond)
+    return [*whole[:before], *(whole[i] for i in beyond), *(h for i, h in enumerate(whole[before:], before) if i not in beyond)]
+
+
+def _of_the_user(work: Search) -> list[str]:
+    """Return the user's own effects that the search was told to try."""
+    return [e.name for e in work.catalogue if e.definition is not None and e.name not in work.known]
 
 
 def _candidates(end: _SearchResult, floor: Noise, left: float) -> tuple[Candidate, ...]:
@@ -250,60 +264,3 @@ def where_of(h: ScoredModel, records: Sequence[Record]) -> tuple[tuple[Place, ..
     seen, squared = worst.record, worst.residual[channel] ** 2
     found = places(seen.time, squared, seen.ok[channel], conditions(seen, worst.rate, 0.0))
     return found, tuple(notes)
-
-
-def body_of(d: Diagnosis) -> dict[str, Any]:
-    """Return a diagnosis as the JSON object of the contract, without its schema."""
-    return {
-        "axis": d.axis.value,
-        "verdict": d.verdict,
-        "says": d.says,
-        "short": d.short,
-        "effects": list(d.effects),
-        "unusual": list(apart_from_the_hulls_own(d.effects)[0]),
-        "base": _pair(d.base),
-        "final": _pair(d.final),
-        "noise_floor": {"angle_rad": d.noise_floor.angle, "rate_rad_s": d.noise_floor.rate},
-        "noiseless": d.noiseless,
-        "left": {
-            "ratio": d.left.ratio,
-            "unexplained": d.left.unexplained,
-            "where": d.left.where or None,
-            "moves_with": d.left.moves_with or None,
-        },
-        "candidates": [
-            {
-                "effect": c.effect,
-                "probability": c.probability,
-                "parameters": dict(c.parameters),
-                **_pair(c.errors),
-                "explained": c.explained,
-                "log_evidence": c.score,
-                "worse": c.worse,
-                "evidence": c.evidence,
-                "confusable_with": list(c.confusable_with),
-            }
-            for c in d.candidates
-        ],
-        "where": [
-            {
-                "condition": w.condition,
-                "share_of_error": w.share_of_error,
-                "rms_ratio": w.rms_ratio,
-                "t_start_s": w.start_s,
-                "t_end_s": w.end_s,
-            }
-            for w in d.where
-        ],
-        "next_maneuver": d.next_maneuver,
-        "skipped": dict(d.skipped),
-        "notes": [{"code": n.code, "message": n.message} for n in d.notes],
-        "speed_law": {"reference_m_s": d.model.law.reference},
-    }
-
-
-def _pair(p: Any) -> dict[str, Any]:
-    return {
-        side: {"angle_rms_rad": e.angle_rms_rad, "rate_rms_rad_s": e.rate_rms_rad_s}
-        for side, e in (("train", p.train), ("validation", p.validation))
-    }

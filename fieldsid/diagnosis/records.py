@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import isfinite, prod
-from typing import Any
+from typing import Annotated, Literal
 
+from fieldsid.comparison.localize import Place
 from fieldsid.comparison.sufficient import pooled_over_noise
 from fieldsid.display import Brief, Displayed, Plotted
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise
+from fieldsid.records.keys import INLINE, Key, Number, Words
 from fieldsid.rounding import number
 
 
@@ -19,8 +21,8 @@ from fieldsid.rounding import number
 class Errors(Brief):
     """Free-run error over some runs: rms of measured minus simulated angle (rad) and rate (rad/s), and that of each run."""
 
-    angle_rms_rad: float
-    rate_rms_rad_s: float
+    angle_rms_rad: Annotated[Number, Key("Of the angle, in rad.")]
+    rate_rms_rad_s: Annotated[Number, Key("Of the rate, in rad/s.")]
     each: tuple[Errors, ...] = ()
 
     @property
@@ -48,8 +50,8 @@ class Errors(Brief):
 class Pair(Brief):
     """Errors on the training and on the validation runs."""
 
-    train: Errors
-    validation: Errors
+    train: Annotated[Errors, Key("On the runs the model was fitted to.")]
+    validation: Annotated[Errors, Key("On runs the fit did not see; null inside where there are none.")]
 
     @property
     def runs(self) -> tuple[Errors, ...]:
@@ -66,17 +68,21 @@ class Candidate(Displayed):
     """
 
     effects: tuple[str, ...]
-    probability: float
-    parameters: Mapping[str, float]
-    errors: Pair
-    explained: float
-    score: float
-    evidence: str
-    confusable_with: tuple[str, ...] = ()
-    worse: bool = False
+    probability: Annotated[
+        float, Key("Its probability among all that are worth having and the base, from half the log evidence.")
+    ]
+    parameters: Annotated[Mapping[str, Number], Key("Its values at the law's reference speed.")]
+    errors: Annotated[Pair, INLINE]
+    explained: Annotated[float, Key("Share of the base's excess over the noise floor that it takes away, 0 to 1.")]
+    score: Annotated[float, Key("Log evidence over that of the base.", "log_evidence")]
+    evidence: Annotated[str, Key("What speaks for it, in one sentence.")]
+    confusable_with: Annotated[
+        tuple[str, ...], Key("Hypotheses of the same size that take away nearly as much on these data.")
+    ] = ()
+    worse: Annotated[bool, Key("Whether it raises the error instead of taking some away.")] = False
 
     @property
-    def effect(self) -> str:
+    def effect(self) -> Annotated[str, Key()]:
         """The effects joined by a plus."""
         return "+".join(self.effects) if self.effects else "none"
 
@@ -90,18 +96,47 @@ class Left(Brief):
     average, and follows `moves_with`, empty where no test says so.
     """
 
-    ratio: float
-    unexplained: bool
+    ratio: Annotated[Number, Key("The error over the noise floor, of fitted or of unseen runs, whichever is larger.")]
+    unexplained: Annotated[bool, Key("Whether it is visible and no disturbance.")]
     run: str = ""
     start_s: float = float("nan")
     end_s: float = float("nan")
     burst: float = 1.0
-    moves_with: str = ""
+    moves_with: Annotated[Words, Key("The signal it follows; null where no test says so.")] = ""
 
     @property
-    def where(self) -> str:
-        """The place in words; empty where nothing is left."""
+    def where(self) -> Annotated[Words, Key()]:
+        """The run and the seconds where it is largest; empty where nothing is left."""
         return f"{self.run} at {self.start_s:.0f}-{self.end_s:.0f} s" if self.run else ""
+
+
+@dataclass(frozen=True, slots=True)
+class NextManeuver:
+    """What to fly next."""
+
+    maneuver: Annotated[str, Key("The maneuver, or what else to do.")]
+    why: Annotated[str, Key("What it is expected to show.")]
+    separates: Annotated[tuple[str, ...] | None, Key("The effects it tells apart.", is_optional=True)] = None
+    command: Annotated[str | None, Key("The command that plans it.", is_optional=True)] = None
+    note: Annotated[str | None, Key("What to know about it.", is_optional=True)] = None
+    expected_log_odds: Annotated[float | None, Key("Log odds it is expected to give for the right one.", is_optional=True)] = None
+    spec: Annotated[str | None, Key("The maneuver with its parameters, as `--maneuver` takes it.", is_optional=True)] = None
+    parameters: Annotated[Mapping[str, float] | None, Key("Its parameters.", is_optional=True)] = None
+    speed_m_s: Annotated[float | None, Key("The speed to fly it at.", is_optional=True)] = None
+    duration_s: Annotated[float | None, Key("Its length.", is_optional=True)] = None
+    expected_odds: Annotated[float | None, Key("The same as odds.", is_optional=True)] = None
+    pairs: Annotated[Mapping[str, Number] | None, Key("Log odds for each true one against each other.", is_optional=True)] = None
+    decides: Annotated[bool | None, Key("Whether one pass is expected to give odds of 20 to 1.", is_optional=True)] = None
+    alternatives: Annotated[
+        Mapping[str, Number] | None, Key("Other maneuvers, with what they are expected to give.", is_optional=True)
+    ] = None
+
+
+@dataclass(frozen=True, slots=True)
+class HeldAt:
+    """The speed that the model's parameters hold at."""
+
+    reference: Annotated[Number, Key("In m/s.", "reference_m_s")]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -112,20 +147,26 @@ class Diagnosis(Plotted):
     `noiseless`: the logs show almost no noise, so that errors are told in their units and not over the noise floor.
     """
 
-    axis: Axis
-    verdict: str
-    effects: tuple[str, ...]
-    says: str
-    short: str
-    base: Pair
-    final: Pair
-    noise_floor: Noise
-    candidates: tuple[Candidate, ...]
+    axis: Annotated[Axis, Key("The plane.")]
+    verdict: Annotated[str, Key("The verdict.", of=Literal["effect", "sufficient", "disturbed", "unexplained", "undecided"])]
+    effects: Annotated[tuple[str, ...], Key("The effects named, in the order to add them.")]
+    says: Annotated[str, Key("The verdict in a sentence, with its numbers.")]
+    short: Annotated[str, Key("The same with the effects by their names alone.")]
+    base: Annotated[Pair, Key("Errors of the model as it is.")]
+    final: Annotated[Pair, Key("Errors with the named effects added; those of the base where none is.")]
+    noise_floor: Annotated[Noise, Key("Noise of the sensors.")]
+    candidates: Annotated[tuple[Candidate, ...], Key("What was tried, the one found first, then by evidence.")]
     model: Model
     base_model: Model
-    where: tuple[Any, ...] = ()
-    next_maneuver: Mapping[str, Any] | None = None
-    skipped: Mapping[str, str] = field(default_factory=dict)
-    notes: tuple[Note, ...] = ()
-    noiseless: bool = False
-    left: Left = Left(float("nan"), unexplained=False)
+    where: Annotated[tuple[Place, ...], Key("Where the model as it is fails, the worst first.")] = ()
+    next_maneuver: Annotated[NextManeuver | None, Key("What to fly next; null where nothing is open.")] = None
+    skipped: Annotated[Mapping[str, str], Key("Effects that could not be tried, and why.")] = field(default_factory=dict)
+    notes: Annotated[tuple[Note, ...], Key("What else there is to know.")] = ()
+    noiseless: Annotated[bool, Key("Whether the logs show almost no noise, so that errors are told in their units.")] = False
+    left: Annotated[Left, Key("What remains beside the named effects.")] = Left(float("nan"), unexplained=False)
+    unusual: Annotated[tuple[str, ...], Key("Those of the named effects that not every hull has.")] = ()
+
+    @property
+    def speed_law(self) -> Annotated[HeldAt, Key()]:
+        """The speed that the parameters hold at."""
+        return HeldAt(self.model.law.reference)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fieldsid.exports._target import Target, decimal, notes_of
+from fieldsid.records.keys import body_of
 from fieldsid.schedule.record import Row, Schedule
 
 MAV, COMPONENT, REAL32 = 1, 1, 9
@@ -26,7 +27,7 @@ def render(schedule: Schedule, node: str, template: Path | None) -> str:
     lines = [f"# {line}" for line in (*notes_of(schedule), *LEFT_OUT)]
     last = len(schedule.rows) - 1
     for i, row in enumerate(schedule.rows):
-        held = row.record()
+        held = body_of(row)
         lines.append("# row: " + ", ".join(f"{name} = {decimal(float(held[name]))}" for name in schedule.columns))
         lines += [("" if i == last else "# ") + line for line in _parameters(schedule, row, node)]
     return "\n".join(lines) + "\n"

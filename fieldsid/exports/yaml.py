@@ -7,7 +7,8 @@ from typing import Any
 
 from fieldsid.artifacts import plain, to_yaml
 from fieldsid.exports._target import NAMES, Target, notes_of
-from fieldsid.schedule.record import Schedule, body_of
+from fieldsid.records.keys import body_of
+from fieldsid.schedule.record import Schedule
 from fieldsid.text.one_line import one_line
 
 
@@ -21,7 +22,7 @@ def render(schedule: Schedule, node: str, template: Path | None) -> str:
         "axis": body["axis"],
         "angle": NAMES[schedule.axis],
         "controller": body["controller"],
-        **({} if schedule.fins is None else {"fins": schedule.fins.record()}),
+        **({} if schedule.fins is None else {"fins": body_of(schedule.fins)}),
         "rows": rows,
         "provenance": _in_lines(plain(body["provenance"])),
     }

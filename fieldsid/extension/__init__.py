@@ -7,13 +7,13 @@ from fieldsid.extension.lineage import (
     MISSING,
     Generation,
     Step,
-    gain_body,
     history_of,
     kept_by,
     parent_of,
     save_extension,
 )
-from fieldsid.extension.steps import extend_in_steps
+from fieldsid.extension.loop import Loop, LoopStep, loop_of
+from fieldsid.extension.steps import extend_in_steps, save_steps, whole_of
 
 __all__ = [
     "CHANGED",
@@ -22,12 +22,16 @@ __all__ = [
     "Extension",
     "Gain",
     "Generation",
+    "Loop",
+    "LoopStep",
     "Step",
     "extend",
     "extend_in_steps",
-    "gain_body",
     "history_of",
     "kept_by",
+    "loop_of",
     "parent_of",
     "save_extension",
+    "save_steps",
+    "whole_of",
 ]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -32,6 +33,7 @@ from fieldsid.logs.several.sifting import Refused
 from fieldsid.models.effect import Effect, effect_held
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record, left_out
+from fieldsid.records.keys import Key
 
 EQUAL_LOG_LIKELIHOOD = 1e-3
 """Log likelihoods that differ by less are one optimum."""
@@ -43,6 +45,14 @@ BEAM_WIDTH = 2
 """Orders in which several effects are added that are followed from one addition to the next."""
 
 
+@dataclass(frozen=True, slots=True)
+class Fall:
+    """Free-run error over the noise floor, both channels pooled."""
+
+    before: Annotated[float, Key("Without the addition.")]
+    after: Annotated[float, Key("With it.")]
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Gain(Brief):
     """What an addition changed: errors before and after over one noise floor, on named runs.
@@ -50,19 +60,24 @@ class Gain(Brief):
     `unseen` tells whether there were data to judge by that were not fitted.
     """
 
-    added: tuple[str, ...]
-    before: Pair
-    after: Pair
-    noise_floor: Noise
-    unseen: bool
-    learned_on: tuple[str, ...]
-    judged_on: tuple[str, ...]
+    added: Annotated[tuple[str, ...], Key("The effects added.")]
+    before: Annotated[Pair, Key("Errors without them.")]
+    after: Annotated[Pair, Key("Errors with them.")]
+    noise_floor: Annotated[Noise, Key("Noise of the sensors.")]
+    unseen: Annotated[bool, Key("Whether there were runs to judge by that were not fitted.")]
+    learned_on: Annotated[tuple[str, ...], Key("Runs that were fitted.")]
+    judged_on: Annotated[tuple[str, ...], Key("Runs it was judged by.")]
 
     @property
     def judged(self) -> tuple[Errors, Errors]:
         """The error before and after, on unseen data where there are any."""
         before, after = (p.validation if self.unseen else p.train for p in (self.before, self.after))
         return before, after
+
+    @property
+    def fall(self) -> Annotated[Fall, Key(name="over_floor")]:
+        """The errors it is judged by, over the noise floor."""
+        return Fall(*self.over_floor)
 
     @property
     def over_floor(self) -> tuple[float, float]:

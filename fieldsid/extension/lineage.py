@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.display import Brief
@@ -14,6 +14,7 @@ from fieldsid.extension.extend import Extension, Gain
 from fieldsid.logs.run import Run
 from fieldsid.models.model import KIND, Noise, load_model, save_model
 from fieldsid.records.check import ShapeError, check
+from fieldsid.records.keys import INLINE, Key, body_of
 from fieldsid.records.model import EXTENSION
 from fieldsid.records.named_inputs import beside, sha256_of, sha256_of_named
 from fieldsid.records.reading import load_record
@@ -25,51 +26,35 @@ INTACT, CHANGED, MISSING = "intact", "changed", "missing"
 class Step(Brief):
     """One addition: what it changed, why it was kept, and the logs that are no longer what it was made from."""
 
-    gain: Gain
-    kept_by: str
-    changed_data: tuple[str, ...] = ()
+    gain: Annotated[Gain, INLINE]
+    kept_by: Annotated[str, Key("What it was kept for.")]
+    changed_data: Annotated[tuple[str, ...], Key("Data files that have changed since.")] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Parent:
     """The file a model was made from: where it is now, and whether it is still as it was (`intact`, `changed`, `missing`)."""
 
-    path: Path
-    sha256: str
-    state: str
+    path: Annotated[Path, Key("Its file.")]
+    sha256: Annotated[str, Key("The file's hash.")]
+    state: Annotated[str, Key("Whether it is as it was when its child was made.", of=Literal["intact", "changed", "missing"])]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Generation(Brief):
     """One model of a line: its file, its effects, whether the file is as its child knew it, and how it came about."""
 
-    path: Path
-    effects: tuple[str, ...]
-    state: str
-    step: Step | None
+    path: Annotated[Path, Key("Its file.", "model")]
+    effects: Annotated[tuple[str, ...], Key("Its effects.")]
+    state: Annotated[
+        str, Key("Whether the file is as it was when its child was made.", of=Literal["intact", "changed", "missing"])
+    ]
+    step: Annotated[Step | None, Key(is_inline=True, is_optional=True)]
 
-
-def errors_body(pair: Pair) -> dict[str, dict[str, float]]:
-    """Return errors as the JSON contract has them."""
-    return {
-        side: {"angle_rms_rad": e.angle_rms_rad, "rate_rms_rad_s": e.rate_rms_rad_s}
-        for side, e in (("train", pair.train), ("validation", pair.validation))
-    }
-
-
-def gain_body(gain: Gain) -> dict[str, Any]:
-    """Return a gain as it is written and printed; `_step` reads it back."""
-    before, after = gain.over_floor
-    return {
-        "added": list(gain.added),
-        "before": errors_body(gain.before),
-        "after": errors_body(gain.after),
-        "noise_floor": {"angle_rad": gain.noise_floor.angle, "rate_rad_s": gain.noise_floor.rate},
-        "over_floor": {"before": before, "after": after},
-        "unseen": gain.unseen,
-        "learned_on": list(gain.learned_on),
-        "judged_on": list(gain.judged_on),
-    }
+    @property
+    def added(self) -> Annotated[tuple[str, ...], Key()]:
+        """The effects added to its parent; none for the first."""
+        return () if self.step is None else self.step.gain.added
 
 
 def kept_by(extension: Extension) -> str:
@@ -92,7 +77,7 @@ def save_extension(
     roles = [("training", r) for r in training] + [("validation", r) for r in validation]
     files = [(role, r.name, r.source) for role, r in roles if r.source is not None and r.source.exists()]
     body = {
-        **gain_body(extension.gain),
+        **body_of(extension.gain),
         "log_evidence": extension.evidence,
         "kept_by": kept_by(extension),
         "data": [{"run": n, "role": role, "path": str(p), "sha256": sha256_of(p)} for role, n, p in files],

@@ -121,11 +121,11 @@ def extend(
     validate: runs that no fit sees, to judge by; without them a part of the runs is held back. Raises UsageError for an effect
     that is unknown, of the other axis or in the model already, DataError for runs that cannot be used, and as `load` does.
     """
-    from fieldsid.extension import extend as extend_model
+    from fieldsid.extension import extend_in_steps, whole_of
 
     own_effects()
     known = model_of(model)
-    return extend_model(known, names_of(add), *_both(runs, validate, mapping))
+    return whole_of(extend_in_steps(known, names_of(add), *_both(runs, validate, mapping)))
 
 
 def _both(runs: Logs, validate: Logs, mapping: ChannelMap | File | None) -> tuple[Several[Run], Several[Run]]:

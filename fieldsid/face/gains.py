@@ -70,7 +70,7 @@ def turn_radius(
     source, known = source_of(models, law), vehicle_of(vehicle)
     return radius_over_speed(
         source,
-        speeds_of(speeds) or [float(s) for s in dict.fromkeys(source.speeds)],
+        speeds_of(speeds) or source.knots,
         rudder_of(known, source, _say) if rudder_max is None else rudder_max,
         runs=runs_mapped(run_files(source, _say) if runs is None else runs, mapping),
         measured=runs_mapped(measured, mapping),

@@ -32,6 +32,8 @@ WARM = "#E69F00"
 QUIET = "0.75"
 SERIES = (SIMULATED, SECOND, THIRD, FOURTH, WARM, "#56B4E9", "0.2")
 DPI = 120
+TWO_SIDED_99 = 2.576
+"""Quantile 0.995 of the normal distribution: bands are those of 99 %."""
 MOST_DOTS = 4000
 
 
@@ -66,8 +68,17 @@ def dress(ax: Axes, *, x: str = "", y: str = "", title: str = "") -> Axes:
     return ax
 
 
+def band(ax: Axes, half: float, label: str = "_") -> None:
+    """Draw the two edges of a band about zero, which hide neither the grid nor what lies inside."""
+    for edge in (-half, half):
+        ax.axhline(edge, color="0.55", linewidth=0.9, linestyle="--", label=label if edge > 0.0 else "_")
+
+
 def legend_above(ax: Axes, columns: int = 4) -> None:
-    """Put the legend above the plot, at its right, where it hides no data."""
+    """Put the legend above the plot, at its right, where it hides no data; the plot's title goes above it."""
+    rows = -(-len(ax.get_legend_handles_labels()[1]) // columns)
+    if title := ax.get_title(loc="left"):
+        ax.set_title(title, loc="left", fontsize=10, pad=6.0 + 14.0 * rows)
     ax.legend(
         loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, frameon=False, fontsize=9, handlelength=1.6,
         borderaxespad=0.2, columnspacing=1.2,

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure, SubFigure
 from fieldsid.comparison.compare import Channel, Comparison, left_in_words
 from fieldsid.figures import canvas, motion, where
 from fieldsid.models.model import Model
-from fieldsid.rounding import number
+from fieldsid.rounding import DEGREES, number
 
 MOST_BARS = 12
 TITLE_WIDTH = 44
@@ -39,8 +39,9 @@ def _draw_places(failing: Sequence[Channel], right: SubFigure) -> None:
     """Draw where each failing channel fails, the worse one at the top."""
     for channel, ax in zip(failing, right.subplots(len(failing), 1, squeeze=False)[:, 0], strict=True):
         shown = channel.where[: MOST_BARS // len(failing)]
-        where.draw([where.Bar(p.condition, p.share_of_error, p.rms_ratio) for p in shown], ax)
-        says = f"the {channel.name} fails most at {shown[0].condition}" if shown else f"where the {channel.name} fails"
+        where.draw(shown, ax)
+        at = f" most at {DEGREES.words(shown[0].condition)}" if shown else ""
+        says = f"the {channel.name} fails{at}"
         how = f"{left_in_words(channel.over_floor, channel.fit)}; beside a bar: rms there\nover that of the whole run"
         ax.set_title(f"{fill(says, TITLE_WIDTH)}\n{how}", loc="left", fontsize=10)
 

@@ -18,8 +18,6 @@ from fieldsid.figures.motion import MotionView
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.shifted_correlation import shifted_correlations
 
-TWO_SIDED_99 = 2.576
-"""Quantile 0.995 of the normal distribution."""
 LONGEST_LAG_S, MOST_LAGS = 5.0, 400
 
 
@@ -58,9 +56,9 @@ def draw_own(residual: FloatArray, step: float, ax: Axes) -> float:
     """Draw the autocorrelation of a residual (n,) sampled every step s; return the share of lags outside the band."""
     reach = _reach(residual.size, step)
     own = shifted_correlations(residual, residual, reach)[reach + 1 :]
-    band = TWO_SIDED_99 / sqrt(residual.size)
+    band = canvas.TWO_SIDED_99 / sqrt(residual.size)
     lags = step * np.arange(1, reach + 1)
-    ax.axhspan(-band, band, color="0.9", linewidth=0)
+    canvas.band(ax, band)
     ax.vlines(lags, 0.0, own, color=canvas.SECOND, linewidth=1.0)
     ax.axhline(0.0, color="0.4", linewidth=0.8)
     ax.set_ylim(min(-0.3, float(own.min()) - 0.05), max(0.5, float(own.max()) + 0.05))
@@ -72,9 +70,9 @@ def draw_with_fin(residual: FloatArray, fin: FloatArray, step: float, ax: Axes) 
     reach = _reach(residual.size, step)
     cross = shifted_correlations(residual, fin, reach)
     both = shifted_correlations(residual, residual, reach) @ shifted_correlations(fin, fin, reach)
-    band = TWO_SIDED_99 * sqrt(max(float(both), 1.0) / residual.size)
+    band = canvas.TWO_SIDED_99 * sqrt(max(float(both), 1.0) / residual.size)
     canvas.dress(ax)
-    ax.axhspan(-band, band, color="0.9", linewidth=0)
+    canvas.band(ax, band)
     ax.vlines(step * np.arange(-reach, reach + 1), 0.0, cross, color=canvas.SIMULATED, linewidth=1.0)
     ax.axhline(0.0, color="0.4", linewidth=0.8)
     ax.axvline(0.0, color="0.4", linewidth=0.8)

@@ -12,11 +12,13 @@ from matplotlib.figure import Figure
 from fieldsid.diagnosis import Diagnosis, Pair
 from fieldsid.figures import canvas, where
 from fieldsid.models.model import Noise
-from fieldsid.rounding import probability
+from fieldsid.rounding import DEGREES, probability
 
 MOST_BARS = 10
 TITLE_WIDTH = 150
 LABEL_WIDTH = 30
+BELOW = 0.36
+"""How far below the middle of its bar the ring of the fitted runs lies: the bar's label is beside the bar."""
 MOST_TIMES = 3.0
 """Bars longer than so many times the first are cut: an addition that makes things worse needs no scale of its own."""
 
@@ -42,15 +44,16 @@ class Bar:
 def figure(found: Diagnosis) -> Figure:
     """Return a sheet with the candidates at the left and where the model fails at the right."""
     sheet = canvas.sheet(13.0, 6.4)
-    left, right = sheet.subplots(1, 2, width_ratios=(1.25, 1.0))
+    left, *right = sheet.subplots(1, 2 if found.where else 1, squeeze=False, width_ratios=(1.25, 1.0) if found.where else None)[0]
     chances = [c.probability for c in found.candidates]
     sure = f", probability {probability(chances[0])}" if found.effects and chances[0] == max(chances) else ""
     says = f"{found.axis.value}, {found.verdict}: {found.says}{sure}"
     sheet.suptitle(fill(says, TITLE_WIDTH), x=0.01, ha="left", fontsize=11)
     draw(bars_of(found), left, noiseless=found.noiseless)
-    where.draw([where.Bar(p.condition, p.share_of_error, p.rms_ratio) for p in found.where[:MOST_BARS]], right)
-    most = f"the model as it is fails most at {found.where[0].condition}" if found.where else "the model as it is fails nowhere"
-    right.set_title(f"{most}\nbeside a bar: rms there over that of the whole run", loc="left", fontsize=10)
+    for ax in right:
+        where.draw(found.where[:MOST_BARS], ax)
+        most = f"the model as it is fails most at {DEGREES.words(found.where[0].condition)}"
+        ax.set_title(f"{most}\nbeside a bar: rms there over that of the whole run", loc="left", fontsize=10)
     return sheet
 
 
@@ -74,21 +77,21 @@ def bars_of(found: Diagnosis) -> list[Bar]:
 
 
 def draw(bars: list[Bar], ax: Axes, *, noiseless: bool = False) -> None:
-    """Draw the error of each candidate: bars for unseen runs, rings for fitted ones, the noise floor, if any, at 1."""
+    """Draw the error of each candidate: bars for unseen runs, rings below them for fitted ones, the noise floor, if any, at 1."""
     canvas.dress(ax, x=f"free-run error over {'that of the model as it is' if noiseless else 'the noise floor'}")
     judged = any(isfinite(b.unseen) for b in bars)
     errors = [b.unseen if judged else b.fitted for b in bars]
     rows = list(range(len(bars)))[::-1]
     end = min(max(*errors, *(b.fitted for b in bars), 1.0), MOST_TIMES * max(errors[0], 1.0))
     colours = [canvas.SIMULATED if b.named else canvas.QUIET for b in bars]
-    ax.barh(rows, errors, color=colours, height=0.62, label="unseen runs" if judged else "fitted runs")
+    ax.barh(rows, errors, color=colours, height=0.5, label="unseen runs" if judged else "fitted runs")
     if judged:
-        fitted = [b.fitted for b in bars]
-        ax.plot(fitted, rows, "o", markerfacecolor="white", markeredgecolor="0.25", markersize=6, label="fitted runs")
+        rings = ([b.fitted for b in bars], [row - BELOW for row in rows])
+        ax.plot(*rings, "o", markerfacecolor="white", markeredgecolor="0.25", markersize=6, label="fitted runs")
     if not noiseless:
         ax.axvline(1.0, color=canvas.SECOND, linewidth=1.4, linestyle="--", label="noise floor")
     for row, b, error in zip(rows, bars, errors, strict=True):
-        place = (min(max(error, b.fitted), end), row)
+        place = (min(error, end), row)
         ax.annotate(words_of(b), place, xytext=(7, 0), textcoords="offset points", va="center", fontsize=8.5)
     ax.set_yticks(rows, [fill(b.effect.replace("+", " +"), LABEL_WIDTH) for b in bars], fontsize=9)
     ax.set_xlim(0.0, 1.95 * end)

@@ -27,15 +27,13 @@ def figure(laws: Laws) -> Figure:
     """Return one panel per parameter, the authority large and against u^2."""
     others = [law for n, law in laws.by_name.items() if n != NAMES[laws.axis].authority]
     sheet = canvas.sheet(11.0, 6.0 if len(others) < 3 else 7.0)
-    left, right = np.asarray(sheet.subfigures(1, 2, width_ratios=(1.6, 1.0)), dtype=object)
-    draw_authority(laws.authority, left.subplots())
-    axes = np.atleast_1d(right.subplots(max(len(others), 1), 1, sharex=True))
-    for law, ax in zip(others, axes, strict=False):
+    parts = sheet.subfigures(1, 2 if others else 1, squeeze=False, width_ratios=(1.6, 1.0) if others else None)[0]
+    draw_authority(laws.authority, parts[0].subplots())
+    axes = parts[1].subplots(len(others), 1, squeeze=False, sharex=True)[:, 0] if others else ()
+    for law, ax in zip(others, axes, strict=True):
         draw_other(law, ax)
-    if others:
-        axes[len(others) - 1].set_xlabel("speed u, m/s")
-    else:
-        axes[0].set_axis_off()
+        ax.label_outer()
+        ax.set_xlabel("speed u, m/s")
     return sheet
 
 

@@ -87,17 +87,17 @@ def draw_fin(view: MotionView, ax: Axes) -> None:
 
 
 def draw_residual(view: MotionView, ax: Axes) -> None:
-    """Draw measured less simulated over the sensor's noise, angle and rate, with the band of two sigma."""
+    """Draw measured less simulated over the sensor's noise, angle and rate, with the 99 % band of the noise."""
     time = view.record.time
     canvas.dress(ax, y="residual / noise")
-    ax.axhspan(-2, 2, color="0.9", linewidth=0, label="two sigma of the noise")
     parts = (
         ("angle", view.measured_angle - np.degrees(view.angle), view.noise_angle, canvas.THIRD),
         ("rate", view.measured_rate - np.degrees(view.rate), view.noise_rate, canvas.SECOND),
     )
     for name, residual, noise, colour in parts:
         if np.isfinite(residual).any() and noise > 0:
-            ax.plot(time, residual / np.degrees(noise), color=colour, linewidth=0.7, label=name, alpha=0.85)
+            ax.plot(time, residual / np.degrees(noise), color=colour, linewidth=0.7, label=name, alpha=0.6)
+    canvas.band(ax, canvas.TWO_SIDED_99, "99 % of the noise")
     canvas.legend_above(ax)
 
 

@@ -16,7 +16,7 @@ TITLE_WIDTH = 110
 
 
 def figure(found: Sequence[Comparison], names: Sequence[str]) -> Figure:
-    """Return a sheet of one run: angle, rate, what each model leaves of the rate, and the fin."""
+    """Return a sheet of one run: angle, rate, what each model leaves of the channel that tells most, and the fin."""
     sheet = canvas.sheet(10.0, 7.5)
     over = ", ".join(f"{n} {c.over_noise:.2f} x" for n, c in zip(names, found, strict=True))
     sheet.suptitle(fill(f"{found[0].run}: error over the noise: {over}", TITLE_WIDTH), x=0.01, ha="left", fontsize=11)
@@ -30,7 +30,7 @@ def figure(found: Sequence[Comparison], names: Sequence[str]) -> Figure:
     canvas.dress(axes[0], y="angle, deg")
     canvas.legend_above(axes[0])
     canvas.dress(axes[1], y="rate, deg/s")
-    canvas.dress(axes[2], y="rate error, deg/s")
+    canvas.dress(axes[2], y="rate error, deg/s" if record.rate_ok.any() else "angle error, deg")
     axes[3].step(record.time, np.degrees(record.fin), where="post", color="0.35", linewidth=1.2)
     canvas.dress(axes[3], x="time, s", y="fin, deg")
     sheet.align_ylabels(list(axes))
@@ -38,9 +38,11 @@ def figure(found: Sequence[Comparison], names: Sequence[str]) -> Figure:
 
 
 def draw(one: Comparison, name: str, color: str, axes: Sequence[Axes]) -> None:
-    """Draw one model's angle and rate, and measured less simulated rate, in degrees."""
+    """Draw one model's angle and rate, and measured less simulated rate, or angle where no rate was measured, in degrees."""
     shown = one.shown
     axes[0].plot(shown.record.time, np.degrees(shown.angle), color=color, linewidth=1.3, label=name)
     axes[1].plot(shown.record.time, np.degrees(shown.rate), color=color, linewidth=1.3)
-    ok = shown.record.rate_ok
-    axes[2].plot(shown.record.time[ok], np.degrees(shown.record.rate[ok] - shown.rate[ok]), color=color, linewidth=0.9)
+    record, ok = shown.record, shown.record.rate_ok
+    error = record.rate - shown.rate if ok.any() else record.angle - shown.angle
+    ok = ok if ok.any() else record.angle_ok
+    axes[2].plot(record.time[ok], np.degrees(error[ok]), color=color, linewidth=0.9)

@@ -1,32 +1,25 @@
-"""Where a model fails: the share of the squared error by condition, against the share of the samples."""
+"""Where a model fails: by condition, the share of the squared error beyond the share of the samples."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from matplotlib.axes import Axes
 
+from fieldsid.comparison.localize import Place
 from fieldsid.figures import canvas
+from fieldsid.rounding import DEGREES
 
 
-@dataclass(frozen=True, slots=True)
-class Bar:
-    """One condition: its words, its share of the squared error, and its error over the whole run's (rms ratio)."""
-
-    condition: str
-    share: float
-    ratio: float
-
-
-def draw(bars: Sequence[Bar], ax: Axes) -> None:
-    """Draw one bar per condition, the largest share at the top; the first of them, where the model fails most, stands out."""
-    canvas.dress(ax, x="share of the squared error, %")
-    ordered = sorted(bars, key=lambda b: b.share)
-    colours = [canvas.SIMULATED if b is bars[0] else canvas.QUIET for b in ordered]
-    ax.barh(range(len(ordered)), [100 * b.share for b in ordered], color=colours, height=0.66)
-    ax.set_yticks(range(len(ordered)), [b.condition for b in ordered], fontsize=9)
-    for i, b in enumerate(ordered):
-        ax.annotate(f"{b.ratio:.2f} x", (100 * b.share, i), xytext=(4, 0), textcoords="offset points", va="center", fontsize=8)
+def draw(places: Sequence[Place], ax: Axes) -> None:
+    """Draw one bar per condition worse than the rest, the longest, where the model fails most, at the top and in colour."""
+    canvas.dress(ax, x="share of the squared error beyond that of the time, %")
+    ordered = sorted((p for p in places if p.beyond > 0.0), key=lambda p: p.beyond)
+    lengths = [100.0 * p.beyond for p in ordered]
+    colours = [canvas.SIMULATED if p is ordered[-1] else canvas.QUIET for p in ordered]
+    ax.barh(range(len(ordered)), lengths, color=colours, height=0.66)
+    ax.set_yticks(range(len(ordered)), [DEGREES.words(p.condition) for p in ordered], fontsize=9)
+    for i, (p, length) in enumerate(zip(ordered, lengths, strict=True)):
+        ax.annotate(f"{p.rms_ratio:.2f} x", (length, i), xytext=(4, 0), textcoords="offset points", va="center", fontsize=8)
     ax.margins(x=0.12)
     ax.grid(visible=False, axis="y")

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from fieldsid.fitting.fin_offset import offset_of
 from fieldsid.models.model import Model
+from fieldsid.records.keys import Key, Number
 from fieldsid.rounding import TWO_SIDED_95
 
 
@@ -14,12 +16,12 @@ class Estimate:
     """A parameter's value and standard error in its unit; the error is NaN where it was not estimated."""
 
     name: str
-    value: float
-    std_error: float
-    unit: str
+    value: Annotated[float, Key("The estimate, in the unit below.")]
+    std_error: Annotated[Number, Key("Its standard error, corrected for coloured residuals.")]
+    unit: Annotated[str, Key("Its unit.")]
 
     @property
-    def interval95(self) -> tuple[float, float]:
+    def interval95(self) -> Annotated[tuple[float, float], Key()]:
         """The 95 % interval under a normal error: value -+ 1.96 standard errors."""
         half = TWO_SIDED_95 * self.std_error
         return self.value - half, self.value + half

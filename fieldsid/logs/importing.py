@@ -6,11 +6,11 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
-from fieldsid.artifacts import check_output, plain
+from fieldsid.artifacts import check_output
 from fieldsid.errors import UsageError
 from fieldsid.logs.channels import ChannelMap, Source
 from fieldsid.logs.convert.assemble import WHOLE
@@ -20,6 +20,7 @@ from fieldsid.logs.run import EXPLAINING, Note, Run
 from fieldsid.logs.save import SUFFIXES, save_run
 from fieldsid.logs.several.run_names import name_of_run, names_apart, stem_of
 from fieldsid.logs.several.stretches import stretches_of
+from fieldsid.records.keys import Key
 from fieldsid.registry import near
 
 FORMATS = {"parquet": ".parquet", "csv": ".csv", "csv.gz": ".csv.gz"}
@@ -37,21 +38,55 @@ class Imported:
         """The notes that the user should act on."""
         return tuple(n for n in self.run.notes if n.code not in EXPLAINING)
 
-    def record(self) -> dict[str, Any]:
-        """Return what was written as plain values."""
-        run = self.run
-        return {
-            "run": run.name,
-            "file": str(self.path),
-            "log": None if run.source is None else str(run.source),
-            "samples": len(run),
-            "start_s": float(run.time[0]),
-            "end_s": float(run.time[-1]),
-            "duration_s": float(run.time[-1] - run.time[0]),
-            "rate_hz": 1.0 / float(np.median(np.diff(run.time))),
-            "signals": {s: int(np.isfinite(v).sum()) for s, v in run.signals.items()},
-            "notes": [{"code": n.code, "message": n.message, "data": plain(n.data)} for n in run.notes],
-        }
+    @property
+    def name(self) -> Annotated[str, Key(name="run")]:
+        """Its name."""
+        return self.run.name
+
+    @property
+    def file(self) -> Annotated[str, Key()]:
+        """The file that was written."""
+        return str(self.path)
+
+    @property
+    def log(self) -> Annotated[str | None, Key()]:
+        """The log it came from."""
+        return None if self.run.source is None else str(self.run.source)
+
+    @property
+    def samples(self) -> Annotated[int, Key()]:
+        """Number of samples."""
+        return len(self.run)
+
+    @property
+    def start_s(self) -> Annotated[float, Key()]:
+        """Time of the first sample."""
+        return float(self.run.time[0])
+
+    @property
+    def end_s(self) -> Annotated[float, Key()]:
+        """Time of the last sample."""
+        return float(self.run.time[-1])
+
+    @property
+    def duration_s(self) -> Annotated[float, Key()]:
+        """Length."""
+        return self.end_s - self.start_s
+
+    @property
+    def rate_hz(self) -> Annotated[float, Key()]:
+        """Samples per second, by the median step."""
+        return 1.0 / float(np.median(np.diff(self.run.time)))
+
+    @property
+    def signals(self) -> Annotated[Mapping[str, int], Key()]:
+        """Number of measured samples of each signal."""
+        return {s: int(np.isfinite(v).sum()) for s, v in self.run.signals.items()}
+
+    @property
+    def notes(self) -> Annotated[tuple[Note, ...], Key()]:
+        """What was done and what was found."""
+        return self.run.notes
 
 
 def runs_under_way(load: Callable[[tuple[float, float], float], Run], max_gap_s: float) -> list[Run]:

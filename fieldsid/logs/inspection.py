@@ -8,9 +8,9 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from fieldsid.artifacts import plain, to_yaml, write_text
+from fieldsid.artifacts import to_yaml, write_text
 from fieldsid.display import Brief
 from fieldsid.errors import MappingError
 from fieldsid.logs.channels import TableForm
@@ -23,16 +23,14 @@ from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, ReadOptions,
 from fieldsid.logs.readers._tables_of_run import tables_beside
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.way_in import WayIn, way_in
+from fieldsid.records.keys import Key
 from fieldsid.text.one_line import one_line
 
-SCHEMA = "fieldsid/inspection/1"
 _EXAMPLE = "# Nothing was recognised. A line for each signal is missing, with its own place and unit, of this form:\n"
 _COLUMN_EXAMPLE = _EXAMPLE + "#   yaw_rad: {column: NAME_OR_PLACE_FROM_0, unit: UNIT}\n#   rudder_rad: {column: ..., unit: ...}\n"
 _TOPIC_EXAMPLE = (
     _EXAMPLE + "#   yaw_rad: {topic: TOPIC, field: FIELD, unit: UNIT}\n#   rudder_rad: {topic: ..., field: ..., unit: ...}\n"
 )
-LISTED = 100
-"""Channels that are listed; of more, how many there are."""
 NO_TIME = "# No column is a time; say how many rows there are a second:\n# time: {rate: 10}\n"
 FIELDS_SHOWN = 12
 """Fields of a topic that the page lists."""
@@ -40,6 +38,17 @@ SHORT = 120
 """Letters up to which a finding tells what was found beside what is wrong."""
 _PLAIN = re.compile(r"^[A-Za-z/_][\w/.]*$")
 _RESERVED = frozenset({"y", "n", "yes", "no", "on", "off", "true", "false", "null"})
+
+
+@dataclass(frozen=True, slots=True)
+class ShownChannel:
+    """A channel as the page shows it."""
+
+    name: Annotated[str, Key("Its name.")]
+    type: Annotated[str, Key("Its type.")] = ""
+    count: Annotated[int | Literal[""], Key("Number of samples; empty for a field.")] = ""
+    rate: Annotated[str, Key("Samples per second, in words.")] = ""
+    holds: Annotated[str, Key("Its range, or its first fields.")] = ""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -65,30 +74,6 @@ class Inspection(Brief):
         if signals:
             return head + to_yaml(body) + "signals:\n" + "".join(f"  {name}: {_line(item)}\n" for name, item in signals.items())
         return head + to_yaml(body) + "signals: {}\n" + (_TOPIC_EXAMPLE if self.inventory.by_topic else _COLUMN_EXAMPLE)
-
-    def record(self, written: Path | None) -> dict[str, Any]:
-        """Return the inspection as plain values, for JSON and for the page."""
-        inventory, run = self.inventory, self.run
-        duration = inventory.duration_s if run is None else float(run.time[-1] - run.time[0])
-        span = f"{duration:.2f} s" if math.isfinite(duration) else "length unknown"
-        return {
-            "schema": SCHEMA,
-            "path": str(inventory.path),
-            "format": inventory.form,
-            "span": span,
-            "duration_s": duration,
-            "channels": [_channel(c) for c in inventory.channels[:LISTED]],
-            "shown": [row for c in inventory.channels[:LISTED] for row in _shown(c)],
-            "more_channels": max(len(inventory.channels) - LISTED, 0) + inventory.more,
-            "mapping_needed": not self.needs_none,
-            "mapping": plain(self.proposal.body),
-            "mapping_file": None if written is None else str(written),
-            "joined": [str(p) for p in self.joined],
-            "import_options": list(self.way_in.options),
-            "signals": [] if run is None else [s for s in run.signals if run.has(s)],
-            "problem": None if self.proposal.problem is None else str(self.proposal.problem),
-            "findings": [{"code": n.code, "message": n.message, "data": plain(n.data)} for n in self.notes],
-        }
 
 
 def inspect_log(
@@ -172,21 +157,16 @@ def _scalar(value: Any) -> str:
     )
 
 
-def _channel(channel: ChannelInfo) -> dict[str, Any]:
-    fields = [{"path": f.path, "type": f.kind, "first": list(f.first), "span": f.span} for f in channel.fields]
-    return {"name": channel.name, "type": channel.kind, "count": channel.count, "rate_hz": channel.rate_hz, "fields": fields}
-
-
-def _shown(channel: ChannelInfo) -> Iterator[dict[str, Any]]:
+def shown_channels(channel: ChannelInfo) -> Iterator[ShownChannel]:
     """Yield the line of a column or a topic, and one for each of its fields where it has several."""
     rate = f"{channel.rate_hz:.4g}" if math.isfinite(channel.rate_hz) else "-"
     fields = [f for f in channel.fields if "covariance" not in f.path and not f.path.startswith("header.")]
     holds = _range(fields[0]) if len(fields) == 1 else ""
-    yield {"name": channel.name, "type": channel.kind, "count": channel.count, "rate": rate, "holds": holds}
+    yield ShownChannel(channel.name, channel.kind, channel.count, rate, holds)
     for info in fields[:FIELDS_SHOWN] if len(fields) > 1 else ():
-        yield {"name": f"  {info.path}", "type": "", "count": "", "rate": "", "holds": _range(info)}
+        yield ShownChannel(f"  {info.path}", holds=_range(info))
     if len(fields) > FIELDS_SHOWN:
-        yield {"name": f"  +{len(fields) - FIELDS_SHOWN} more: --json", "type": "", "count": "", "rate": "", "holds": ""}
+        yield ShownChannel(f"  +{len(fields) - FIELDS_SHOWN} more: --json")
 
 
 def _range(info: FieldInfo) -> str:

@@ -18,6 +18,7 @@ from fieldsid.logs.mapping.canonical_names import canonical
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.reader import JOINED, Inventory, Reader, ReadOptions, reader_of
 from fieldsid.logs.run import OF_LIMITS, READ_WITH, STEP_LINES, Note, Run, signal_of
+from fieldsid.records.reading import read_yaml
 
 if TYPE_CHECKING:
     from fieldsid.logs.mapping.certain import Certain
@@ -107,7 +108,7 @@ def map_for(
     notes: list[Note] = []
     chosen = _loaded(mapping) if mapping is not None else reader.own_map(path, options)
     if chosen is None:
-        file = next((f for f in (Path(MAPPING_FILE), path.parent / MAPPING_FILE) if f.is_file()), None)
+        file = next((f for f in (Path(MAPPING_FILE), path.parent / MAPPING_FILE) if f.is_file() and maps_anything(f)), None)
         chosen = None if file is None else _loaded(file)
     complete = chosen_map(None, chosen, channels)
     is_open = mapping is None and not channels and (chosen is None or chosen.origin is None)
@@ -135,6 +136,23 @@ def chosen_map(mapping: ChannelMap | Path | None, own: ChannelMap | None, channe
     return replace(base, sources={**kept, **sources}, time=channels.get(TIME, base.time))
 
 
+def maps_anything(mapping: Path) -> bool:
+    """Whether a mapping has a line for any signal: what `sysid init` writes, to be filled in, has none and says nothing."""
+    return bool(read_yaml(mapping).get("signals", True))
+
+
+def needs_mapping(log: Path) -> bool:
+    """Whether a log's own names do not give what an axis needs; raises LogError."""
+    own = reader_of(log).own_map(log, ReadOptions())
+    return own is None or not is_enough(own.sources)
+
+
+def to_map(log: Path, joined: Sequence[Path] = ()) -> str:
+    """Return the command that writes a first mapping of a log, in place of one that maps nothing."""
+    words = ["sysid", "inspect", *(["--join"] if joined else []), str(log), *map(str, joined), "--write-mapping", MAPPING_FILE]
+    return shlex.join([*words, *(["--force"] if Path(MAPPING_FILE).is_file() else [])])
+
+
 def _loaded(mapping: ChannelMap | Path) -> ChannelMap:
     if isinstance(mapping, ChannelMap):
         return mapping
@@ -157,8 +175,7 @@ def _unmapped(
 
     names = [c.name for c in found.channels]
     shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
-    files = shlex.join([*(["--join"] if options.joined else []), str(path), *map(str, options.joined)])
-    hint = f"write a mapping: `sysid inspect {files} --write-mapping {MAPPING_FILE}`"
+    hint = f"write a mapping: `{to_map(path, options.joined)}`"
     hint += f"; in doubt: {', '.join(f'{signal} ({why})' for signal, why in doubts.items())}" if doubts else ""
     if found.by_topic:
         what = "bag" if found.form.endswith("bag") else "run in several tables" if reader.name == JOINED else "log of topics"

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from fieldsid.logs.channels import ChannelMap, Source, TableForm
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN, not_a_log
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.records.keys import Interval, Key, Number
 from fieldsid.records.reading import near_files
 from fieldsid.registry import members
 
@@ -70,10 +71,12 @@ class FieldInfo:
     `means` is the signal that it is by the definition of the format itself, with what a mapping must say to read it.
     """
 
-    path: str
-    kind: str
-    first: tuple[Any, ...]
-    span: tuple[float, float] | None = None
+    path: Annotated[str, Key("Its path in a message; empty for the column of a table.")]
+    kind: Annotated[str, Key("`number`, `text` or the message's own type.", "type")]
+    first: Annotated[tuple[Any, ...], Key("Its first values.")]
+    span: Annotated[
+        tuple[float, float] | None, Key("Smallest and largest value; null where it is not a number.", of=Interval | None)
+    ] = None
     means: tuple[str, Mapping[str, Any]] | None = None
 
 
@@ -98,11 +101,11 @@ class Samples:
 class ChannelInfo:
     """One column or topic: how many samples, at which rate in Hz (NaN where unknown), what is inside, and the unit it states."""
 
-    name: str
-    kind: str
-    count: int
-    rate_hz: float
-    fields: tuple[FieldInfo, ...]
+    name: Annotated[str, Key("Its name.")]
+    kind: Annotated[str, Key("Its type.", "type")]
+    count: Annotated[int, Key("Number of samples.")]
+    rate_hz: Annotated[Number, Key("Samples per second; null for the columns of a table, which share one clock.")]
+    fields: Annotated[tuple[FieldInfo, ...], Key("What it holds.")]
     unit: str | None = None
 
 

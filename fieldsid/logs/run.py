@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,7 @@ import numpy.typing as npt
 from fieldsid.display import Brief, Plotted, view_of
 from fieldsid.errors import DataError
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.records.keys import Key
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -74,9 +75,11 @@ def signal_of(name: str) -> str:
 class Note(Brief):
     """One remark on the quality of a log or a fit: a code, a sentence, and the number behind it."""
 
-    code: str
-    message: str
-    data: Mapping[str, Any] = field(default_factory=dict)
+    code: Annotated[str, Key("A name that stays the same from version to version, such as `ignored_delay`.")]
+    message: Annotated[str, Key("The sentence that the command prints.")]
+    data: Annotated[Mapping[str, Any], Key("What the sentence rests on: values, limits, the hint's option.")] = field(
+        default_factory=dict
+    )
 
 
 SIMULATED = "simulated"

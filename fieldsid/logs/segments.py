@@ -95,6 +95,11 @@ def excited_axis(runs: Sequence[Run], *, written: str) -> str:
     )
 
 
+def plane_of(runs: Sequence[Run]) -> str:
+    """Return the axis that most runs excite, of several the one that more have a fin of, then yaw."""
+    return max(_FINS, key=lambda a: (sum(is_excited(run, a) for run in runs), sum(_fin_of(run, a) is not None for run in runs)))
+
+
 def may_show(run: Run, axis: str) -> bool:
     """Whether a run may show something of an axis: unless it excites the other one alone."""
     return is_excited(run, axis) or not any(is_excited(run, other) for other in _FINS)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from fieldsid.errors import UsageError
 from fieldsid.maneuvers._contract import Maneuver, Parameters
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 from fieldsid.numerics.jit import inner, jit
+from fieldsid.records.keys import Key
 
 
 class Plant(Protocol):
@@ -46,8 +47,8 @@ class Limits:
 class Autopilot:
     """Brings the vehicle back: fin = -(angle_gain angle + rate_gain rate), at most `fin` rad, the shorter way round."""
 
-    angle_gain: float
-    rate_gain: float
+    angle_gain: Annotated[float, Key("rad of fin per rad.")]
+    rate_gain: Annotated[float, Key("rad of fin per rad/s.")]
     fin: float = np.inf
 
     @property

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.records.keys import Key
 
 PARALLEL = 1e-6
 """Share of one row beside the other below which the two are one: rudder and elevator cannot be told apart."""
@@ -25,10 +26,10 @@ ROUNDING = 1e-9
 class PlaneFins:
     """The fins of one plane: name, what each is told for a command of one rad, its limit, and the unit of both."""
 
-    names: tuple[str, ...]
-    shares: tuple[float, ...]
-    limits: tuple[float, ...]
-    unit: str = "rad"
+    names: Annotated[tuple[str, ...], Key("What each is called.")]
+    shares: Annotated[tuple[float, ...], Key("What each is told for a command of one rad, in its unit.")]
+    limits: Annotated[tuple[float, ...], Key("How far each goes, in its unit.")]
+    unit: Annotated[str, Key("Their unit.")] = "rad"
 
     @property
     def reach(self) -> float:
@@ -42,10 +43,6 @@ class PlaneFins:
     def told(self, command: npt.ArrayLike) -> FloatArray:
         """Return what each fin is told (m, n) for commands (n,) in rad, none beyond its limit."""
         return _within(np.outer(self.shares, np.atleast_1d(command)), self.limits)
-
-    def record(self) -> dict[str, Any]:
-        """Return the fins as plain values, for files and JSON."""
-        return {"names": list(self.names), "shares": list(self.shares), "limits": list(self.limits), "unit": self.unit}
 
     def says(self, plane: str) -> list[str]:
         """Return how each fin goes with a plane's command, in words."""

@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from fieldsid.models.definition import NONE, Definition
 from fieldsid.models.fin_path import FinPath
 from fieldsid.models.hull import Core
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.records.keys import Key
 from fieldsid.records.named_inputs import sha256_of
 from fieldsid.registry import Outside, define, pick
 
@@ -53,16 +54,16 @@ class Coefficient:
     scales the points of the grid: the coefficients of a slow hull are small.
     """
 
-    name: str
-    unit: str
-    low: float
-    high: float
-    start: float
+    name: Annotated[str, Key("Its name.")]
+    unit: Annotated[str, Key("Its unit.")]
+    low: Annotated[float, Key("Lower bound.")]
+    high: Annotated[float, Key("Upper bound.")]
+    start: Annotated[float, Key("Start value.")]
     scan: tuple[float, ...] = ()
     step: float = 1e-4
     rate_exponent: int = 0
-    per_run: bool = False
-    says: str = ""
+    per_run: Annotated[bool, Key("Whether every run has its own.")] = False
+    says: Annotated[str, Key("What it is.")] = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,18 +151,18 @@ class Effect:
     `origin` says where the effect is defined, `definition` the same as a model keeps it; None where it is built in.
     """
 
-    name: str
-    says: str
-    stage: Stage
-    axes: tuple[Axis, ...]
-    equation: str
-    coefficients: tuple[Coefficient, ...]
-    telltale: str
-    excited_by: tuple[str, ...]
-    mistaken_for: tuple[str, ...]
-    source: str
-    needs: tuple[str, ...] = ()
-    extra_states: tuple[str, ...] = ()
+    name: Annotated[str, Key("Its name.")]
+    says: Annotated[str, Key("What it is, in plain words.")]
+    stage: Annotated[Stage, Key("Where in the signal path it acts.")]
+    axes: Annotated[tuple[Axis, ...], Key("The planes it acts in.")]
+    equation: Annotated[str, Key("Its equation.")]
+    coefficients: Annotated[tuple[Coefficient, ...], Key("Its numbers.")]
+    telltale: Annotated[str, Key("What its absence leaves in the residual.")]
+    excited_by: Annotated[tuple[str, ...], Key("Maneuvers that show it, the best first.")]
+    mistaken_for: Annotated[tuple[str, ...], Key("Effects it may be mistaken for.")]
+    source: Annotated[str, Key("Where the equation comes from.")]
+    needs: Annotated[tuple[str, ...], Key("Signals the log must have: surge, thrust, roll, depth.")] = ()
+    extra_states: Annotated[tuple[str, ...], Key("States it adds to the model.")] = ()
     order: int = 0
     fin: Callable[[FinPath, Values, Record], FinPath] | None = None
     terms: Callable[[Values, Record], Terms] | None = None
@@ -178,7 +179,7 @@ class Effect:
     is_of_the_water: bool = False
     heading_span: float = 0.0
     textbook: Effect | None = None
-    origin: str = field(default="built in")
+    origin: Annotated[str, Key("`built in`, or the file of a user's own.")] = field(default="built in")
     definition: Definition | None = None
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from fieldsid.models.effect import definitions_of, effect_held
 from fieldsid.models.speed_law import SpeedLaw, with_speed
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.records.check import ShapeError
+from fieldsid.records.keys import Key, Number
 from fieldsid.records.reading import load_record
 
 KIND = "fieldsid/model"
@@ -33,8 +34,8 @@ class Noise(Brief):
     constant moment that each run has of its own: its trim is not quite that of the next.
     """
 
-    angle: float
-    rate: float
+    angle: Annotated[Number, Key("Standard deviation of the angle, in rad.", "angle_rad")]
+    rate: Annotated[Number, Key("Standard deviation of the rate, in rad/s.", "rate_rad_s")]
     disturbance: float = 0.0
     disturbance_time: float = 1.0
     coloured_angle: float = 0.0

@@ -3,17 +3,67 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from math import isfinite, pi
-from typing import Any
+from typing import Annotated, Any
 
 from fieldsid.artifacts import plain
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.online.identifier import OnlineEstimate
-from fieldsid.online.progress import LOOK_BACK_S, ParameterProgress, Progress
+from fieldsid.online.progress import LOOK_BACK_S, ParameterProgress, Progress, Verdict
+from fieldsid.records.keys import INLINE, Interval, Key, Number, Result
 
-SCHEMA = "fieldsid/live/1"
 LONGEST_GUESS_S = 3600.0
 """A time to the goal beyond which it is not told: the pace of a few seconds says nothing of hours."""
+
+
+@dataclass(frozen=True, slots=True)
+class Excitation:
+    """How the vehicle was moved in the last 10 s."""
+
+    fin_rms_rad: Annotated[Number, Key("Root mean square of the fin about its mean, in rad.")]
+    rate_rms_rad_s: Annotated[Number, Key("Of the rate, in rad/s.")]
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterNow:
+    """One parameter now."""
+
+    progress: Annotated[ParameterProgress, INLINE]
+    interval95: Annotated[Interval, Key("Its 95 % interval.")]
+    unit: Annotated[str, Key("Its unit.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Look(Result):
+    """One look at the estimate of a vehicle under way."""
+
+    SCHEMA = "fieldsid/live/1"
+
+    axis: Annotated[Axis, Key("The plane.")]
+    source: Annotated[str, Key("Where the samples come from.")]
+    time_s: Annotated[Number, Key("Stamp of the newest sample.")]
+    verdict: Annotated[
+        Verdict,
+        Key(
+            "`enough`: every goal is reached and has settled; `moving`: reached, not settled; `not_excited`: the fin is still; "
+            "`contradicts`: angle and rate are not each other's."
+        ),
+    ]
+    said: Annotated[str, Key("The verdict in a sentence.")]
+    share: Annotated[float, Key("Share of the information that the goal takes which is in, of the parameter that limits.")]
+    limited_by: Annotated[str, Key("That parameter.")]
+    left_s: Annotated[Number, Key("Seconds to the goal at the pace of the last 10 s; null where unknown.")]
+    goals_from: Annotated[str, Key("Where the goals are from.")]
+    speed_m_s: Annotated[Number, Key("Mean surge.")]
+    samples: Annotated[int, Key("Rows that joined the estimate.")]
+    excitation: Annotated[Excitation, Key("How the vehicle was moved.")]
+    parameters: Annotated[Mapping[str, ParameterNow], Key("By name.")]
+    counts: Annotated[
+        Mapping[str, int],
+        Key("What was met: missing, repeated, late samples, gaps, restarts, spikes, lines that could not be read."),
+    ]
+    next: Annotated[str, Key("The command that comes next; empty where the source is no log.")]
 
 
 def look_body(
@@ -21,36 +71,24 @@ def look_body(
 ) -> dict[str, Any]:
     """Return a look as nested plain values; NaN as None."""
     bands, units = now.intervals95, units_of(now.axis)
-    body = {
-        "schema": SCHEMA,
-        "axis": now.axis.value,
-        "source": source,
-        "time_s": now.time,
-        "verdict": progress.verdict,
-        "said": said(progress),
-        "share": progress.share,
-        "limited_by": progress.limited_by,
-        "left_s": progress.left_s,
-        "goals_from": goals_from,
-        "speed_m_s": now.speed,
-        "samples": now.used,
-        "excitation": {"fin_rms_rad": progress.fin_rms, "rate_rms_rad_s": progress.rate_rms},
-        "parameters": {
-            p.name: {
-                "value": p.value,
-                "std_error": p.std_error,
-                "interval95": list(bands[p.name]),
-                "unit": units[p.name],
-                "goal_std_error": p.goal,
-                "share": p.share,
-                "settled": p.is_settled,
-            }
-            for p in progress.parameters
-        },
-        "counts": {**now.counts, "unreadable": unreadable},
-        "next": then,
-    }
-    out: dict[str, Any] = plain(body)
+    look = Look(
+        axis=now.axis,
+        source=source,
+        time_s=now.time,
+        verdict=progress.verdict,
+        said=said(progress),
+        share=progress.share,
+        limited_by=progress.limited_by,
+        left_s=progress.left_s,
+        goals_from=goals_from,
+        speed_m_s=now.speed,
+        samples=now.used,
+        excitation=Excitation(progress.fin_rms, progress.rate_rms),
+        parameters={p.name: ParameterNow(p, bands[p.name], units[p.name]) for p in progress.parameters},
+        counts={**now.counts, "unreadable": unreadable},
+        next=then,
+    )
+    out: dict[str, Any] = plain(look)
     return out
 
 

@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, isfinite, nan, sqrt
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.online.identifier import OnlineEstimate
+from fieldsid.records.keys import Key, Number
 
 Verdict = Literal["starting", "contradicts", "collecting", "not_excited", "moving", "enough"]
 DEFAULT_ACCURACY = 0.05
@@ -46,11 +47,13 @@ class ParameterProgress:
     """One parameter: value, standard error, the error wanted (NaN: none), share of the information that is in, settled or not."""
 
     name: str
-    value: float
-    std_error: float
-    goal: float
-    share: float
-    is_settled: bool
+    value: Annotated[Number, Key("Its value.")]
+    std_error: Annotated[Number, Key("Its standard error.")]
+    goal: Annotated[Number, Key("The standard error that is wanted; null where none is.", "goal_std_error")]
+    share: Annotated[float, Key("Share of the information for that which is in, 0 to 1.")]
+    is_settled: Annotated[
+        bool, Key("Whether it stayed, the last 10 s, within 5 % of its value or one standard error.", "settled")
+    ]
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,10 +17,10 @@ from fieldsid.planning.belief.prior_file import load_believed
 from fieldsid.planning.belief.prior_model import checked_prior, named_prior
 from fieldsid.planning.design.best_leg import RUN_UP_S
 from fieldsid.planning.design.plan import WINDOW, Plan, Request, make_plan
+from fieldsid.planning.discriminate.discriminate import Separation
 from fieldsid.planning.discriminate.rivals import rivals_from, rivals_named
 from fieldsid.planning.discriminate.separating_plan import LONGEST_WINDOW_S, separating_plan
 from fieldsid.planning.flight.excitation import Window
-from fieldsid.planning.output.plan_file import plan_body
 from fieldsid.planning.safety.envelope import LARGEST_FIN, Envelope
 from fieldsid.planning.specify.accuracy_goals import parse_accuracy_goals
 from fieldsid.planning.specify.quantities import parse_area, parse_band, parse_speeds
@@ -81,11 +80,11 @@ class PlanRequest:
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """A plan, the prior it was made on, and what there is to print."""
+    """A plan, the prior it was made on, and the maneuvers that tell effects apart, where that was asked."""
 
     plan: Plan
     model: Model
-    body: Mapping[str, Any]
+    found: tuple[Separation, ...] = ()
 
 
 def planned(asked: PlanRequest, step: Callable[[], None] = lambda: None, ready: Callable[[], None] = lambda: None) -> Made:
@@ -106,7 +105,7 @@ def planned(asked: PlanRequest, step: Callable[[], None] = lambda: None, ready: 
     request = replace(request, want=parse_accuracy_goals(asked.want, known) if asked.want else {})
     ready()
     plan = make_plan(model, request, step)
-    return Made(plan, model, plan_body(plan))
+    return Made(plan, model)
 
 
 def _request(asked: PlanRequest, model: Model, vehicle: Vehicle | None, axis: Axis, window_s: float = WINDOW.length) -> Request:
@@ -215,10 +214,7 @@ def _separating(asked: PlanRequest, vehicle: Vehicle | None, step: Callable[[], 
     request = _request(asked, rivals[0], vehicle, rivals[0].axis, LONGEST_WINDOW_S)
     ready()
     plan, found = separating_plan(rivals, request, step)
-    best = max(found, key=lambda s: s.expected_log_odds)
-    says = [line for s in found for line in s.says()]
-    body = {"separation": best.plain(), "separations": [s.plain() for s in found], "says": says}
-    return Made(plan, rivals[0], {**plan_body(plan), **body})
+    return Made(plan, rivals[0], tuple(found))
 
 
 def _rivals(asked: PlanRequest, vehicle: Vehicle | None) -> tuple[Model, ...]:

@@ -22,7 +22,15 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.laws.axis_laws import KIND as FIT_KIND
 from fieldsid.plant.laws.axis_laws import Laws, carried_models, fit_laws, load_laws, with_own_law
 from fieldsid.plant.laws.parameter_law import ParameterLaw
-from fieldsid.plant.points import EQUAL_SPEED_SHARE, Point, check_authority, distinct_speeds, of_known_sign, points_of
+from fieldsid.plant.points import (
+    EQUAL_SPEED_SHARE,
+    Point,
+    check_authority,
+    distinct_speeds,
+    meant_speeds,
+    of_known_sign,
+    points_of,
+)
 from fieldsid.plant.table import read_table
 from fieldsid.plant.yaw_plant import EXPONENT
 from fieldsid.records.named_inputs import where_now
@@ -58,6 +66,11 @@ class ParameterSource(Brief):
     def speeds(self) -> FloatArray:
         """Speeds of the points, (n,) m/s, rising."""
         return np.sort(np.array([p.speed for p in self.points]))
+
+    @property
+    def knots(self) -> list[float]:
+        """Speeds (m/s) at which something is said where none is asked for: a table's, or those that runs were to be flown at."""
+        return meant_speeds(self.speeds) if self.models else list(dict.fromkeys(self.speeds.tolist()))
 
     @property
     def largest_fin(self) -> float:

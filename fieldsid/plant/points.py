@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Annotated
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from fieldsid.errors import DataError
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.records.keys import Key, Number
 
 EQUAL_SPEED_SHARE = 0.03
 """Speeds closer than this fraction count as one: log-to-log spread of a held thrust setting."""
@@ -24,10 +26,10 @@ SIGN_STD_ERRORS = 3.0
 class Point(Brief):
     """Parameters identified at one speed (m/s), by name, with standard errors where they are known."""
 
-    name: str
-    speed: float
-    values: Mapping[str, float]
-    std_errors: Mapping[str, float]
+    name: Annotated[str, Key("The model, or the row of a table.")]
+    speed: Annotated[float, Key("Its speed.", "speed_m_s")]
+    values: Annotated[Mapping[str, float], Key("By parameter.")]
+    std_errors: Annotated[Mapping[str, Number], Key("Their standard errors, where they are known.")]
 
 
 def points_of(models: Sequence[Model], names: Sequence[str]) -> tuple[Axis, tuple[tuple[Point, ...], ...]]:
@@ -73,6 +75,25 @@ def distinct_speeds(speeds: FloatArray) -> int:
     """Count speeds that differ by more than the spread of one thrust setting."""
     ordered = np.sort(speeds)
     return int(1 + np.sum(np.diff(ordered) > EQUAL_SPEED_SHARE * ordered[:-1])) if ordered.size else 0
+
+
+def meant_speeds(speeds: FloatArray) -> list[float]:
+    """Return the speeds that were asked for when these (n,) m/s were flown, rising: those of one thrust setting as one.
+
+    Each is the mean of its flown ones, to as few digits as leave it well within their spread.
+    """
+    groups = list[list[float]]()
+    for speed in np.sort(speeds).tolist():
+        if groups and speed <= groups[-1][0] * (1.0 + 2.0 * EQUAL_SPEED_SHARE):
+            groups[-1].append(speed)
+        else:
+            groups.append([speed])
+    return [_rounded(float(np.mean(group))) for group in groups]
+
+
+def _rounded(speed: float) -> float:
+    shown = (float(f"{speed:.{digits}g}") for digits in range(1, 17))
+    return next(s for s in shown if abs(s - speed) <= 0.5 * EQUAL_SPEED_SHARE * speed)
 
 
 def check_authority(axis: Axis, points: Sequence[Point]) -> float:

@@ -1,18 +1,20 @@
-"""The charts of a report, one function each: free runs, laws over speed, radius, gains, the falling error, places of failure."""
+"""The charts of a report, one function each: free runs, laws over speed, radius, gains, the loop, places of failure."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
-from fieldsid.comparison.compare import Channel, Comparison
-from fieldsid.extension import Generation
+from fieldsid.comparison.compare import Comparison
+from fieldsid.comparison.localize import Place
+from fieldsid.extension import Loop
 from fieldsid.models.axis import NAMES
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.reporting.chart import Band, Panel, Series, bars, chart, legend, thinned
-from fieldsid.rounding import MANY, TWO_SIDED_95
+from fieldsid.rounding import DEGREES, TWO_SIDED_95
 
 DEG = np.degrees(1.0)
 MOST_BARS = 8
@@ -41,52 +43,69 @@ def free_run(found: Comparison, title: str) -> tuple[str, str]:
     return chart(panels, "time, s", title), legend(named)
 
 
-def failures(channel: Channel, title: str) -> str:
-    """Return bars of the shares of a channel's squared error by condition."""
-    return bars(
-        [
-            (p.condition, 100 * p.share_of_error, f"{100 * p.share_of_error:.0f} %, rms {p.rms_ratio:.2f} x")
-            for p in channel.where[:MOST_BARS]
-        ],
-        title,
-    )
+def loop_before(loop: Loop) -> tuple[str, str]:
+    """Return the chart of the first model's free run over its measurement, the worst stretches shaded, and its legend."""
+    return _loop_motion(loop, [(loop.start, loop.before, "second")], f"the {loop.start} and the measurement")
 
 
-def fall(line: Sequence[Generation], title: str) -> str | None:
-    """Return bars of the error over the noise floor, from the first model of a line to its last; None where none was extended."""
-    steps = [g for g in line if g.step is not None]
-    if not steps or steps[0].step is None:
-        return None
-    before = ", ".join(e for e in steps[0].effects if e not in steps[0].step.gain.added) or "plain model"
-    gains = [g.step.gain for g in steps if g.step is not None]
-    rows = [(before, gains[0].over_floor[0], gains[0].judged[0])]
-    rows += [(f"+ {', '.join(g.added)}", g.over_floor[1], g.judged[1]) for g in gains]
-    if rows[0][1] < MANY:
-        return bars([(n, v, f"{v:.2f} x") for n, v, _ in rows], title, mark=(1.0, "the sensors' noise"))
-    return bars([(n, v, errors.sized("deg", DEG).replace(" and ", ", ")) for n, v, errors in rows], title)
+def loop_after(loop: Loop) -> tuple[str, str]:
+    """Return the chart of the first and the last model's free runs over the measurement, and its legend."""
+    models = [(loop.start, loop.before, "second"), (f"with {', '.join(loop.added)}", loop.after, "simulated")]
+    return _loop_motion(loop, models, "the model with what was added, and the measurement")
+
+
+def _loop_motion(loop: Loop, models: Sequence[tuple[str, Comparison, str]], title: str) -> tuple[str, str]:
+    record, is_rate = loop.before.shown.record, loop.before.leading.name == "rate"
+    values, ok = (record.rate, record.rate_ok) if is_rate else (record.angle, record.angle_ok)
+    seen, there = thinned(record.time, np.where(ok, DEG * values, np.nan))
+    series = [Series(seen, there, "measured", "measured", "dots")]
+    for name, found, kind in models:
+        time, motion = thinned(record.time, DEG * (found.shown.rate if is_rate else found.shown.angle))
+        series.append(Series(time, motion, kind, name))
+    spans = [(s.start_s, s.end_s) for s in loop.before.leading.worst]
+    label = f"{record.axis.value} rate, deg/s" if is_rate else f"{record.axis.value}, deg"
+    return chart([Panel(label, series, height=140, spans=spans)], "time, s", title), legend(series)
+
+
+def loop_steps(loop: Loop) -> str:
+    """Return bars of the error on unseen and on fitted runs, before the first addition and after each."""
+    rows = []
+    for step in loop.steps:
+        sides = (("unseen", step.unseen, step.says[1]), ("fitted", step.fitted, step.says[0]))
+        rows += [(f"{step.added}, {side}", value, says) for side, value, says in sides if isfinite(value)]
+    return bars(rows, "the error step by step", mark=None if loop.is_noiseless else (1.0, "the sensors' noise"))
+
+
+def failures(places: Sequence[Place], title: str) -> str:
+    """Return bars of what each condition has of the squared error beyond its share of the time, in per cent."""
+    worse = [p for p in places[:MOST_BARS] if p.beyond > 0.0]
+    rows = [(DEGREES.words(p.condition), 100.0 * p.beyond, f"+{100.0 * p.beyond:.0f} %, {p.rms_ratio:.2f} x") for p in worse]
+    return bars(rows, title)
 
 
 def over_speed(source: ParameterSource, name: str, unit: str) -> str | None:
-    """Return a parameter's points over speed with 95 % errors, and its law with its band where two speeds allow one."""
+    """Return a parameter's points over speed with 95 % errors, and its law with its band where two speeds allow one.
+
+    The authority is drawn over the speed squared: a fin's lift is a straight line there.
+    """
     points = [p for p in source.points if name in p.values]
     if not points:
         return None
+    power, x_label = (2, "speed squared, m²/s²") if name == NAMES[source.axis].authority else (1, "speed, m/s")
     speeds = np.array([p.speed for p in points])
     values = np.array([p.values[name] for p in points])
     errors = np.array([TWO_SIDED_95 * p.std_errors.get(name, 0.0) for p in points])
-    dots = Series(speeds, values, "measured", name, "points", errors)
+    dots = Series(speeds**power, values, "measured", name, "points", errors)
     if source.laws is None or name not in source.laws.by_name or np.ptp(speeds) == 0:
-        margin = np.array([speeds.min() * 0.9, speeds.max() * 1.1])
-        return chart(
-            [Panel(f"{name}, {unit}", (dots, Series(margin, np.full(2, np.nan), "quiet")), height=130)], "speed, m/s", name
-        )
+        margin = np.array([speeds.min() * 0.9, speeds.max() * 1.1]) ** power
+        return chart([Panel(f"{name}, {unit}", (dots, Series(margin, np.full(2, np.nan), "quiet")), height=130)], x_label, name)
     law = source.laws.by_name[name]
     x = np.linspace(0.92 * speeds.min(), 1.08 * speeds.max(), 60)
     y, (low, high) = law.at(x), law.line.band(x)
     ends = np.sort(np.stack([law.sign * low, law.sign * high]), axis=0)
-    series = (Series(x, y, "simulated", f"law: {law.chosen.replace('_', ' ')}"), dots)
-    panel = Panel(f"{name}, {unit}", series, (Band(x, ends[0], ends[1], "simulated"),), height=130)
-    return chart([panel], "speed, m/s", f"{name} over speed")
+    series = (Series(x**power, y, "simulated", f"law: {law.chosen.replace('_', ' ')}"), dots)
+    panel = Panel(f"{name}, {unit}", series, (Band(x**power, ends[0], ends[1], "simulated"),), height=130)
+    return chart([panel], x_label, f"{name} over {x_label.partition(',')[0]}")
 
 
 def radius(body: Mapping[str, Any]) -> tuple[str, str]:

@@ -10,7 +10,7 @@ from typing import Any
 from fieldsid.comparison.compare import Comparison, compare_one
 from fieldsid.display import Brief
 from fieldsid.errors import FieldsidError, UsageError
-from fieldsid.extension import Generation, history_of
+from fieldsid.extension import Generation, Loop, history_of, loop_of
 from fieldsid.logs import Run, load_run
 from fieldsid.logs.segments import may_show
 from fieldsid.models.model import Model, load_model
@@ -40,11 +40,12 @@ class Shown(Brief):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class AxisMaterial(Brief):
-    """All of one axis: the models shown, the best first; its line; the points over speed; diagnosis, turns and gains as files."""
+    """All of one axis: the models shown, the best first, their line and loop, points over speed, the newest of other files."""
 
     axis: str
     shown: tuple[Shown, ...]
     line: tuple[Generation, ...]
+    loop: Loop | None
     source: ParameterSource | None
     diagnosis: Item | None
     turning: Item | None
@@ -121,6 +122,8 @@ def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]
         return None
     line = _line(state.folder / best[0], skipped) if len(best) == 1 else ()
     ancestors = [g.path for g in reversed(line[:-1]) if g.state != "missing"]
+    between = MOST_MODELS - 2
+    ancestors = [*ancestors[:between], *ancestors[between:][-1:]]
     paths = [*(state.folder / b for b in best), *ancestors][:MOST_MODELS]
     if len(best) > MOST_MODELS:
         skipped.append(f"{len(best) - MOST_MODELS} of {len(best)} {axis} models are not drawn")
@@ -132,6 +135,7 @@ def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]
         axis,
         shown,
         line,
+        loop_of(line, shown[-1].found, shown[0].found) if ancestors and len(shown) == len(paths) else None,
         _source(singles if len(singles) > 1 else [state.folder / b for b in best], skipped),
         *(_last(state, kind, axis, skipped) for kind in ("diagnosis", "turn-radius", "schedule")),
     )

@@ -11,18 +11,20 @@ import numpy as np
 from fieldsid._version import __version__
 from fieldsid.comparison.compare import Channel, Comparison, left_in_words
 from fieldsid.comparison.sufficient import is_noise, pooled
+from fieldsid.extension import Loop
+from fieldsid.page import Block
 from fieldsid.reporting import figures
 from fieldsid.reporting.made_from import lineage_rows
 from fieldsid.reporting.material import AxisMaterial, Material, Shown
-from fieldsid.rounding import MANY, TWO_SIDED_95, in_unit, interval, number, probability, with_error
+from fieldsid.rounding import DEGREES, MANY, TWO_SIDED_95, in_unit, interval, number, with_error
 from fieldsid.trial_folder.journal import Entry
 from fieldsid.trial_folder.next_step import REPORT, verification_of
 from fieldsid.trial_folder.patterns import shortened
 from fieldsid.trial_folder.state import FolderState, Item
 from fieldsid.turning.known_radius import BRACKETED, is_band_only, radius_cell, turn_words
+from fieldsid.views._candidates import candidates
 
 DONE = (0, 1)
-MOST_CANDIDATES = 12
 
 
 def context_of(material: Material) -> dict[str, Any]:
@@ -133,20 +135,32 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
         "failures": [
             {
                 "title": f"{run}: the {_followed(channel)}",
-                "chart": figures.failures(channel, f"where the {channel.name} of {run} fails"),
+                "chart": figures.failures(channel.where, f"where the {channel.name} of {run} fails"),
                 "moves": ", ".join(f"{m.signal} ({100 * m.explained:.0f} %)" for m in c.moves_with[:3]),
             }
             for run, channel, c in failing[:6]
         ],
         "candidates": _candidates(axis.diagnosis),
-        "errors_over": "" if _is_noiseless(axis.diagnosis) else ", x noise",
         "diagnosis": axis.diagnosis.body if axis.diagnosis is not None else None,
-        "fall": figures.fall(axis.line, f"the falling error of the {axis.axis} model"),
+        "loop": None if axis.loop is None else _loop(axis.loop),
         "parameters": [row for s in told for row in _parameters(s)],
         "parameters_of": told[0].path if len(told) == 1 else None,
         "laws": _laws(axis),
         "radius": None if axis.turning is None else _radius(axis.turning),
         "gains": None if axis.schedule is None else _gains(axis.schedule),
+    }  # fmt: skip
+
+
+def _loop(loop: Loop) -> dict[str, Any]:
+    """Return the loop in four charts: the first model fails, where; with what was added, and the error after each step."""
+    (before, before_key), (after, after_key) = figures.loop_before(loop), figures.loop_after(loop)
+    return {
+        "run": loop.run, "start": loop.start, "added": ", ".join(loop.added),
+        "before": before, "before_key": before_key, "before_left": loop.left_by(loop.before),
+        "after": after, "after_key": after_key, "after_left": loop.left_by(loop.after),
+        "where": figures.failures(loop.where, f"where the {loop.start} fails") if loop.where else "",
+        "most": DEGREES.words(loop.where[0].condition) if loop.where else "",
+        "steps": figures.loop_steps(loop),
     }  # fmt: skip
 
 
@@ -187,38 +201,8 @@ def _errors(shown: Shown) -> list[dict[str, str]]:
     ]
 
 
-def _candidates(item: Item | None) -> list[dict[str, str]]:
-    if item is None or item.body is None:
-        return []
-    body = item.body
-    floor = None if _is_noiseless(item) else body["noise_floor"]
-    base = {"effect": "as it is", "train": body["base"]["train"], "validation": body["base"]["validation"]}
-    return [
-        {
-            "effect": c["effect"],
-            "probability": probability(c["probability"]) if "probability" in c else "",
-            "fitted": _sized(c["train"], floor),
-            "unseen": _sized(c["validation"], floor),
-            "explained": "worse" if c.get("worse") else f"{100 * c['explained']:.0f} %" if "explained" in c else "",
-            "evidence": f"{c['log_evidence']:+z.0f}" if "log_evidence" in c else "",
-        }
-        for c in [base, *body["candidates"][:MOST_CANDIDATES]]
-    ]
-
-
-def _is_noiseless(item: Item | None) -> bool:
-    """Whether a diagnosis tells errors in their units; one kept by a release before has no word of it."""
-    return item is not None and item.body is not None and bool(item.body.get("noiseless", False))
-
-
-def _sized(errors: Mapping[str, Any], floor: Mapping[str, Any] | None) -> str:
-    """Return an error over the noise floor, the channels' root mean square; in its units where there is no floor."""
-    if floor is None:
-        parts = ((errors.get("angle_rms_rad"), "deg"), (errors.get("rate_rms_rad_s"), "deg/s"))
-        return ", ".join(f"{number(float(np.degrees(rms)), 2)} {unit}" for rms, unit in parts if rms is not None)
-    pairs = [(errors.get("angle_rms_rad"), floor["angle_rad"]), (errors.get("rate_rms_rad_s"), floor["rate_rad_s"])]
-    ratios = [float(e) / float(f) for e, f in pairs if e and f]
-    return f"{(sum(r * r for r in ratios) / len(ratios)) ** 0.5:.2f}" if ratios else ""
+def _candidates(item: Item | None) -> tuple[Block, str] | None:
+    return None if item is None or item.body is None else candidates(item.body, DEGREES)
 
 
 def _parameters(shown: Shown) -> list[dict[str, str]]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
 from fieldsid.display import Brief, Displayed
+from fieldsid.records.keys import INLINE, Interval, Key, Number
 from fieldsid.schedule.flown.response import LIMIT_CYCLE_SHARE
 from fieldsid.schedule.search.objective import Outcome
 
@@ -26,26 +27,30 @@ class StepCheck(Brief):
     where what was flown does not say them (`_with_what_is_known`).
     """
 
-    size: float
-    overshoot: float
-    overshoot_most: float
-    settling: float
-    settling_most: float
-    settling_median: float
-    settling95: tuple[float, float]
-    swing: float
-    off: float
-    flown: float
+    size: Annotated[float, Key("Its size.", "step_rad")]
+    overshoot: Annotated[Number, Key("Overshoot by the estimate.", "overshoot_percent", times=100.0)]
+    overshoot_most: Annotated[Number, Key("Largest over 95 % of the draws.", "overshoot_most_percent", times=100.0)]
+    settling: Annotated[Number, Key("Time to stay within 5 % by the estimate; null if never.", "settling_s")]
+    settling_most: Annotated[Number, Key("Longest over 95 % of the draws.", "settling_most_s")]
+    settling_median: Annotated[Number, Key("The middle of the draws.", "settling_median_s")]
+    settling95: Annotated[
+        Interval, Key("The band that holds 95 % of the draws, with what a flight is off its model's.", "settling_interval95_s")
+    ]
+    swing: Annotated[
+        Number, Key("What still swings in the last quarter of the flight, peak to peak.", "swing_percent", times=100.0)
+    ]
+    off: Annotated[
+        Number,
+        Key(
+            "How far from what was asked it comes to rest, by 95 % of the draws: the error of the trim.", "steady_error_most_rad"
+        ),
+    ]
+    flown: Annotated[Number, Key("How long it was flown.", "flown_s")]
 
-    def record(self) -> dict[str, Any]:
-        """Return the step by its fields' names with units."""
-        return {
-            "step_rad": self.size, "said": not np.isnan(self.settling), "overshoot_percent": 100 * self.overshoot,
-            "overshoot_most_percent": 100 * self.overshoot_most, "settling_s": self.settling,
-            "settling_most_s": self.settling_most, "settling_median_s": self.settling_median,
-            "settling_interval95_s": list(self.settling95), "swing_percent": 100 * self.swing,
-            "steady_error_most_rad": self.off, "flown_s": self.flown,
-        }  # fmt: skip
+    @property
+    def said(self) -> Annotated[bool, Key()]:
+        """Whether overshoot and settling are said; not those of a large step of an unstable hull that no run turned as tight."""
+        return not np.isnan(self.settling)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -57,46 +62,46 @@ class Check(Displayed):
     `bent_error_unknown` one it does not; `leg_rms` and `leg_fin_rms` (rad) are of a straight leg in the models' disturbance.
     """
 
-    speed: float
-    knot: bool
-    supported: bool
-    constant: bool
-    phase_deg: float
-    gain_db: float
-    delay_s: float
-    phase_least_deg: float
-    gain_least_db: float
-    delay_least_s: float
-    unstable: int
-    steps: tuple[StepCheck, StepCheck, StepCheck]
-    speed_least: float
-    bent_error: float
-    bent_error_unknown: float
-    leg_rms: float
-    leg_fin_rms: float
-    depth_overshoot: float
-    depth_settling: float
-    depth_flown: float
-    outcome: Outcome
+    speed: Annotated[float, Key("The speed.", "speed_m_s")]
+    knot: Annotated[bool, Key("Whether it is a row's own; else it lies between two.")]
+    supported: Annotated[bool, Key("Whether the data were taken there.")]
+    constant: Annotated[bool, Key("Whether the gains are the constant ones.", "constant_gain")]
+    phase_deg: Annotated[Number, Key("Phase margin of the estimate.", "phase_margin_deg")]
+    gain_db: Annotated[Number, Key("Its gain margin.", "gain_margin_db")]
+    delay_s: Annotated[Number, Key("Its delay margin.", "delay_margin_s")]
+    phase_least_deg: Annotated[Number, Key("Smallest over the draws of the parameters.", "phase_margin_least_deg")]
+    gain_least_db: Annotated[Number, Key("Smallest over the draws.", "gain_margin_least_db")]
+    delay_least_s: Annotated[Number, Key("Smallest over the draws.", "delay_margin_least_s")]
+    unstable: Annotated[int, Key("How many of the draws are unstable.", "unstable_draws")]
+    steps: Annotated[tuple[StepCheck, StepCheck, StepCheck], Key("A small, the standard and a large step.")]
+    speed_least: Annotated[Number, Key("The least speed in the large step.", "speed_least_m_s")]
+    bent_error: Annotated[Number, Key("Steady error with a fin 3 deg off that the feed-forward knows.", "fin_offset_error_rad")]
+    bent_error_unknown: Annotated[Number, Key("The same with one it does not.", "fin_offset_error_unknown_rad")]
+    leg_rms: Annotated[Number, Key("Angle on a straight leg in the disturbance of the models' runs.", "leg_rms_rad")]
+    leg_fin_rms: Annotated[Number, Key("The fin there.", "leg_fin_rms_rad")]
+    depth_overshoot: Annotated[Number, Key("Overshoot of a step of depth.", "depth_overshoot_percent", times=100.0)]
+    depth_settling: Annotated[Number, Key("Its settling time.", "depth_settling_s")]
+    depth_flown: Annotated[Number, Key("How long it was flown.", "depth_flown_s")]
+    outcome: Annotated[Outcome, INLINE]
     """What the gains come to by the objective that rows are designed for."""
 
     @property
-    def overshoot(self) -> float:
+    def overshoot(self) -> Annotated[Number, Key(name="overshoot_percent", times=100.0)]:
         """Overshoot of the standard step by the estimate, as a share."""
         return self.steps[1].overshoot
 
     @property
-    def overshoot_most(self) -> float:
+    def overshoot_most(self) -> Annotated[Number, Key(name="overshoot_most_percent", times=100.0)]:
         """The most overshoot of the standard step by 95 % of the draws, as a share."""
         return self.steps[1].overshoot_most
 
     @property
-    def settling(self) -> float:
+    def settling(self) -> Annotated[Number, Key(name="settling_s")]:
         """Settling time of the standard step by the estimate, s."""
         return self.steps[1].settling
 
     @property
-    def settling_most(self) -> float:
+    def settling_most(self) -> Annotated[Number, Key(name="settling_most_s")]:
         """Settling time of the standard step by 95 % of the draws, s."""
         return self.steps[1].settling_most
 
@@ -104,22 +109,6 @@ class Check(Displayed):
     def hunts(self) -> StepCheck | None:
         """The first step after which the loop goes on swinging, a limit cycle; None where all come to rest."""
         return next((s for s in self.steps if s.swing > LIMIT_CYCLE_SHARE), None)
-
-    def record(self) -> dict[str, Any]:
-        """Return the check by its fields' names with units."""
-        return {
-            "speed_m_s": self.speed, "knot": self.knot, "supported": self.supported, "constant_gain": self.constant,
-            "phase_margin_deg": self.phase_deg, "gain_margin_db": self.gain_db, "delay_margin_s": self.delay_s,
-            "phase_margin_least_deg": self.phase_least_deg, "gain_margin_least_db": self.gain_least_db,
-            "delay_margin_least_s": self.delay_least_s, "unstable_draws": self.unstable,
-            "overshoot_percent": 100 * self.overshoot, "overshoot_most_percent": 100 * self.overshoot_most,
-            "settling_s": self.settling, "settling_most_s": self.settling_most,
-            "steps": [s.record() for s in self.steps], "speed_least_m_s": self.speed_least,
-            "fin_offset_error_rad": self.bent_error, "fin_offset_error_unknown_rad": self.bent_error_unknown,
-            "leg_rms_rad": self.leg_rms, "leg_fin_rms_rad": self.leg_fin_rms,
-            "depth_overshoot_percent": 100 * self.depth_overshoot, "depth_settling_s": self.depth_settling,
-            "depth_flown_s": self.depth_flown, "answer_s": self.outcome.settled, "fin_use": self.outcome.fin,
-        }  # fmt: skip
 
 
 READ_OFF: Mapping[str, tuple[float, Callable[[Check], float]]] = MappingProxyType(

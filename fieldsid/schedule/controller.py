@@ -8,10 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Annotated
 
 import numpy as np
 
 from fieldsid.numerics.arrays import ComplexArray, FloatArray
+from fieldsid.records.keys import Key
 from fieldsid.schedule.linear_plant import LinearPlant, products, roots_of
 
 
@@ -19,9 +21,9 @@ from fieldsid.schedule.linear_plant import LinearPlant, products, roots_of
 class Gains:
     """kp (rad/rad), ki (1/s), kd (s); signed like 1/authority, so that kp b > 0."""
 
-    kp: float
-    ki: float = 0.0
-    kd: float = 0.0
+    kp: Annotated[float, Key("rad of fin per rad of error.")]
+    ki: Annotated[float, Key("rad of fin per rad s.")] = 0.0
+    kd: Annotated[float, Key("rad of fin per rad/s.")] = 0.0
 
     def times(self, factor: float) -> Gains:
         """Return all gains multiplied."""

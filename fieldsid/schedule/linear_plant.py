@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +24,7 @@ from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import ComplexArray, FloatArray
 from fieldsid.plant.parameter_source import ParameterSource, draw_values
 from fieldsid.plant.yaw_plant import EXPONENT, follows_the_run, scaled_cores, straight_moment
+from fieldsid.records.keys import Key
 
 PARTS = ("damping", "stiffness", "authority", "offset", "core", "lag", "delay", "fin_rate", "powers", "speed_loss")
 WITHOUT_EFFECTS = np.array(Core(cross_damping=1.0))
@@ -165,10 +166,10 @@ class FinLimits:
     comes on top of the delay.
     """
 
-    lag: float | None = None
-    delay: float | None = None
-    rate: float | None = None
-    latency: float | None = None
+    lag: Annotated[float | None, Key("Time constant.", "lag_s")] = None
+    delay: Annotated[float | None, Key("Dead time.", "delay_s")] = None
+    rate: Annotated[float | None, Key("Fastest rate; null where it is not limited.", "fin_rate_rad_s")] = None
+    latency: Annotated[float | None, Key("The autopilot's own.", "latency_s")] = None
 
     def refuse_impossible(self) -> None:
         """Raise UsageError for times below zero or longer than any fin or autopilot takes, and for a fin that does not move."""
@@ -187,10 +188,6 @@ class FinLimits:
                 found=f"--fin-rate {self.rate:g} rad/s",
                 hint="write `--fin-rate 60deg`, or leave it out to take the models' own",
             )
-
-    def record(self) -> dict[str, float | None]:
-        """Return what is said, by the names a schedule's file has."""
-        return {"lag_s": self.lag, "delay_s": self.delay, "fin_rate_rad_s": self.rate, "latency_s": self.latency}
 
 
 def plants_at(source: ParameterSource, speed: float, limits: FinLimits, draws: int, seed: int) -> list[tuple[LinearPlant, float]]:

@@ -14,6 +14,7 @@ from fieldsid.models.allocation import PlaneFins
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.plant.remedies import in_radians, wider_fin
+from fieldsid.records.keys import body_of
 from fieldsid.records.named_inputs import sha256_of
 from fieldsid.schedule.linear_plant import FinLimits, not_counted, plants_at
 from fieldsid.schedule.plants import Plants, models_plants, plants_of
@@ -84,14 +85,14 @@ def design_schedule(
         rows=rows,
         actuator=plants.actuator,
         provenance=_provenance(plants, wish, knots) | {"belief_refused": refused, "length_m": length} | _told(fins),
-        stated=limits.record(),
+        stated=body_of(limits),
         notes=() if plants.note is None else (plants.note,),
         answer=Answer(answer, wish.step_of(source.axis), wish.settling, wish.bandwidth, wish.overshoot, wish.fin_use),
     )
 
 
 def _told(fins: PlaneFins | None) -> dict[str, Any]:
-    return {} if fins is None else {"fins": fins.record()}
+    return {} if fins is None else {"fins": body_of(fins)}
 
 
 def _took_no_gains(error: ModelError) -> Note:
@@ -103,7 +104,7 @@ def _took_no_gains(error: ModelError) -> Note:
 
 
 def _knots(source: ParameterSource, speeds: Sequence[float]) -> list[float]:
-    knots = sorted({round(float(s), 9) for s in (speeds or source.speeds)})
+    knots = sorted({round(float(s), 9) for s in (speeds or source.knots)})
     if not all(np.isfinite(s) and s > 0 for s in knots):
         raise UsageError("speeds must be above zero", found=f"{knots}", hint="write `--speeds 1.0,1.5,2.0`")
     return knots

@@ -12,6 +12,7 @@ from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.plant.parameter_source import ParameterSource
+from fieldsid.records.keys import body_of
 from fieldsid.schedule.believed_plant import LAG, RATE, believed_plant
 from fieldsid.schedule.flown.speed_kept import slowing, speed_kept_said
 from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, between, family_at, plants_at
@@ -67,7 +68,7 @@ class Plants:
             likeliest = coefficients(self.belief.fitted.vector)
             lag, rate = float(likeliest[LAG]), float(likeliest[RATE])
         own = {"lag_s": lag, "delay_s": delay, "fin_rate_rad_s": rate, "latency_s": 0.0}
-        return own | {name: value for name, value in self.limits.record().items() if value is not None}
+        return own | {name: value for name, value in body_of(self.limits).items() if value is not None}
 
     @property
     def tightest_flown(self) -> float:

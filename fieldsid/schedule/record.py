@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from math import nan
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
@@ -18,8 +19,10 @@ from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.allocation import PlaneFins, plane_fins_of
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.records.check import ShapeError
+from fieldsid.records.keys import INLINE, Key, Number, body_of
 from fieldsid.records.reading import load_record
 from fieldsid.schedule.controller import Gains
+from fieldsid.schedule.linear_plant import FinLimits
 from fieldsid.schedule.wish import PROPORTIONAL, QUICKEST, Wish
 
 KIND = "fieldsid/schedule"
@@ -36,43 +39,25 @@ class Row(Displayed):
     keeps the gains from more bandwidth, `fin_use` which share of the fin's limit the step asks for.
     """
 
-    speed: float
-    gains: Gains
-    feed_forward: float
-    reference_gain: float
-    fin_limit: float
-    depth_gain: float = 0.0
-    supported: bool = True
-    slowed: float = 1.0
-    phase_margin_deg: float = float("nan")
-    gain_margin_db: float = float("nan")
-    delay_margin_s: float = float("nan")
-    draws_held: float = float("nan")
-    settling: float = float("nan")
-    binds: str = ""
-    fin_use: float = float("nan")
-
-    def record(self) -> dict[str, Any]:
-        """Return the row by the names an export writes, with its margins."""
-        return {
-            "speed_m_s": self.speed,
-            "kp": self.gains.kp,
-            "ki": self.gains.ki,
-            "kd": self.gains.kd,
-            "feed_forward_rad": self.feed_forward,
-            "reference_gain": self.reference_gain,
-            "fin_limit_rad": self.fin_limit,
-            "depth_gain": self.depth_gain,
-            "supported": self.supported,
-            "slowed": self.slowed,
-            "phase_margin_deg": self.phase_margin_deg,
-            "gain_margin_db": self.gain_margin_db,
-            "delay_margin_s": self.delay_margin_s,
-            "draws_held": self.draws_held,
-            "settling_s": self.settling,
-            "binds": self.binds,
-            "fin_use": self.fin_use,
-        }
+    speed: Annotated[float, Key("Speed through the water.", "speed_m_s")]
+    gains: Annotated[Gains, INLINE]
+    feed_forward: Annotated[float, Key("Fin that cancels the trim.", "feed_forward_rad")]
+    reference_gain: Annotated[float, Key("rad of fin per rad of reference: cancels the stiffness of pitch.")]
+    fin_limit: Annotated[float, Key("Largest fin.", "fin_limit_rad")]
+    depth_gain: Annotated[float, Key("rad of pitch per m of depth; zero without `--depth`.")] = 0.0
+    supported: Annotated[bool, Key("Whether the data were taken at this speed.")] = True
+    slowed: Annotated[
+        float, Key("Share of the formula's speed that is left for the fin's lag, delay and the margin; 1 is not slowed.")
+    ] = 1.0
+    phase_margin_deg: Annotated[Number, Key("Phase margin.")] = nan
+    gain_margin_db: Annotated[Number, Key("Gain margin; null where the loop never crosses.")] = nan
+    delay_margin_s: Annotated[Number, Key("Delay margin; the three margins are the least over 95 % of the draws.")] = nan
+    draws_held: Annotated[Number, Key("Share of the draws with the wished margin that come to rest from the standard step.")] = (
+        nan
+    )
+    settling: Annotated[Number, Key("Time of 95 % of them to stay within 5 % of it.", "settling_s")] = nan
+    binds: Annotated[str, Key("What keeps the gains from more bandwidth.")] = ""
+    fin_use: Annotated[Number, Key("The share of the fin's limit that the step asks for.")] = nan
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -82,23 +67,12 @@ class Answer(Brief):
     The rest is what was asked: settling (s), bandwidth (rad/s), overshoot and fin as shares, None where it was not.
     """
 
-    settling: float = QUICKEST
-    step: float | None = None
-    asked_settling: float | None = None
-    bandwidth: float | None = None
-    overshoot: float | None = None
-    fin_use: float | None = None
-
-    def record(self) -> dict[str, float | None]:
-        """Return the answer by its fields' names with units."""
-        return {
-            "settling_s": self.settling,
-            "step_rad": self.step,
-            "asked_settling_s": self.asked_settling,
-            "asked_bandwidth_rad_s": self.bandwidth,
-            "asked_overshoot": self.overshoot,
-            "asked_fin_use": self.fin_use,
-        }
+    settling: Annotated[float, Key("The time in which all rows settle; zero where each has its own.", "settling_s")] = QUICKEST
+    step: Annotated[float | None, Key("The step, the error that may ask for the fin.", "step_rad")] = None
+    asked_settling: Annotated[float | None, Key("The time asked; zero for the quickest.", "asked_settling_s")] = None
+    bandwidth: Annotated[float | None, Key("The bandwidth asked.", "asked_bandwidth_rad_s")] = None
+    overshoot: Annotated[float | None, Key("The overshoot asked, as a share.", "asked_overshoot")] = None
+    fin_use: Annotated[float | None, Key("The share of the fin asked.", "asked_fin_use")] = None
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -109,17 +83,27 @@ class Schedule(InControl, Plotted):
     notes are what was said of the vehicle it was designed for.
     """
 
-    axis: Axis
-    kind: str
-    damping: float
-    phase_margin_deg: float
-    depth: bool
-    rows: tuple[Row, ...]
-    actuator: Mapping[str, float | None]
-    provenance: Mapping[str, Any] = field(default_factory=dict)
-    stated: Mapping[str, float | None] = field(default_factory=dict)
-    notes: tuple[Note, ...] = ()
-    answer: Answer = field(default_factory=Answer)
+    axis: Annotated[Axis, Key("The plane.")]
+    kind: Annotated[str, Key("The controller.", "controller", of=Literal["p", "pd", "pi", "pid", "lqr"])]
+    damping: Annotated[float, Key("Damping ratio asked for.", "damping_ratio")]
+    phase_margin_deg: Annotated[float, Key("Phase margin asked for.", "phase_margin_wanted_deg")]
+    depth: Annotated[bool, Key("Whether a depth loop is added.")]
+    rows: Annotated[tuple[Row, ...], Key("One for each speed.")]
+    actuator: Annotated[Mapping[str, float | None], Key("The fin.", of=FinLimits)]
+    provenance: Annotated[Mapping[str, Any], Key("Models, runs, sign convention, what holds between and outside the rows.")] = (
+        field(default_factory=dict)
+    )
+    stated: Annotated[Mapping[str, float | None], Key("What was said of the fin when it was designed.")] = field(
+        default_factory=dict
+    )
+    notes: Annotated[
+        tuple[Note, ...],
+        Key(
+            "Why the gains are for each speed's own model, and not for the vehicle that all runs together make believe in.",
+            "warnings",
+        ),
+    ] = ()
+    answer: Annotated[Answer, Key("The answer to a step.")] = field(default_factory=Answer)
 
     @property
     def wish(self) -> Wish:
@@ -151,7 +135,7 @@ class Schedule(InControl, Plotted):
 
     def column(self, name: str) -> list[Any]:
         """Return one column over the rows."""
-        return [row.record()[name] for row in self.rows]
+        return [body_of(row)[name] for row in self.rows]
 
     def at(self, speed: float) -> Row:
         """Return the row at a speed, linear in speed between knots and held beyond them."""
@@ -174,23 +158,6 @@ class Schedule(InControl, Plotted):
         )  # fmt: skip
 
 
-def body_of(schedule: Schedule) -> dict[str, Any]:
-    """Return a schedule as the plain record that `--json` prints and the file holds."""
-    return {
-        "axis": schedule.axis.value,
-        "controller": schedule.kind,
-        "damping_ratio": schedule.damping,
-        "phase_margin_wanted_deg": schedule.phase_margin_deg,
-        "depth": schedule.depth,
-        "actuator": dict(schedule.actuator),
-        "stated": dict(schedule.stated),
-        "answer": schedule.answer.record(),
-        "rows": [r.record() for r in schedule.rows],
-        "provenance": dict(schedule.provenance),
-        "warnings": [{"code": n.code, "message": n.message} for n in schedule.notes],
-    }
-
-
 def save_schedule(schedule: Schedule, path: Path, *, inputs: Sequence[Path] = (), force: bool = False) -> Path:
     """Write a schedule as YAML; raises ArtifactError."""
     return save_record(path, f"{KIND}/1", body_of(schedule), inputs=inputs, force=force)
@@ -203,7 +170,7 @@ def load_schedule(path: Path) -> Schedule:
     try:
         rows = tuple(_row(r) for r in body["rows"])
         _check_rows(rows)
-        fins = {name: plane_fins_of(value).record() for name, value in body["provenance"].items() if name == "fins"}
+        fins = {name: body_of(plane_fins_of(value)) for name, value in body["provenance"].items() if name == "fins"}
     except ValueError as error:  # a wrong shape too
         raise ArtifactError(
             f"`{path}` is not a complete schedule", found=str(error), hint="design it again, with `--force`"
@@ -247,4 +214,4 @@ def _row(r: Mapping[str, Any]) -> Row:
 
 def _answer(body: Mapping[str, Any]) -> Answer:
     """Return the answer of a file, of one from before there were any an empty one."""
-    return Answer(body.get("settling_s") or QUICKEST, *(body.get(name) for name in list(Answer().record())[1:]))
+    return Answer(body.get("settling_s") or QUICKEST, *(body.get(name) for name in list(body_of(Answer()))[1:]))

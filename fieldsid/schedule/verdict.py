@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import degrees, isfinite
-from typing import Any
+from typing import Annotated
 
 from fieldsid.plant.parameter_source import ParameterSource
+from fieldsid.records.keys import Key, Number
 from fieldsid.rounding import number
 from fieldsid.schedule.check import READ_OFF
 from fieldsid.schedule.linear_plant import not_counted
@@ -26,14 +27,14 @@ UNSTABLE = "the hull alone is unstable: it may take up to twice as long to settl
 class Gate:
     """One number that was asked for: its name with unit, the limit, what was found and at which speed (m/s)."""
 
-    name: str
-    wanted: float
-    found: float
-    speed: float
+    name: Annotated[str, Key("Its name.", "gate")]
+    wanted: Annotated[float, Key("The limit.")]
+    found: Annotated[Number, Key("What was found.")]
+    speed: Annotated[Number, Key("The speed it was found at.", "speed_m_s")]
     at_least: bool
 
     @property
-    def passed(self) -> bool:
+    def passed(self) -> Annotated[bool, Key()]:
         """Whether the number is on the right side of its limit."""
         return self.found >= self.wanted if self.at_least else self.found <= self.wanted
 
@@ -42,16 +43,6 @@ class Gate:
         """The gate in words."""
         side = "least" if self.at_least else "most"
         return f"{self.name} {number(self.found, 3)} at {number(self.speed, 3)} m/s, wanted at {side} {self.wanted:.3g}"
-
-    def record(self) -> dict[str, Any]:
-        """Return the gate as `--json` prints it."""
-        return {
-            "gate": self.name,
-            "wanted": self.wanted,
-            "found": self.found,
-            "speed_m_s": self.speed,
-            "passed": self.passed,
-        }
 
 
 def gates_of(checked: Verification, wanted: Mapping[str, float | None]) -> tuple[Gate, ...]:

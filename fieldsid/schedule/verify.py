@@ -137,11 +137,7 @@ def verify_schedule(
 
     runs are those the models came from: the vehicle in surge, sway and yaw is identified from them, unless that took no gains.
     """
-    limits = limits or stated_limits(schedule)
-    if schedule.provenance.get("belief_refused", False):
-        of = models_plants(source, limits, runs)
-    else:
-        of = plants_of(source, limits, runs, schedule.provenance.get("length_m"))
+    of = plants_behind(schedule, source, runs, limits)
     places = checked_speeds(schedule)
     plants = [of.family_at(speed, schedule.at(speed).fin_limit, draws, SEED + 10 * i) for i, (speed, _) in enumerate(places)]
     seen, size = of.tightest_flown, schedule.wish.step_of(schedule.axis)
@@ -181,6 +177,22 @@ def verify_schedule(
         of.actuator,
         worse,
     )
+
+
+def plants_behind(schedule: Schedule, source: ParameterSource, runs: Sequence[Run], limits: FinLimits | None = None) -> Plants:
+    """Return the plants that a schedule is tried on: as it was designed, the vehicle of the models' runs or the models alone."""
+    limits = limits or stated_limits(schedule)
+    if schedule.provenance.get("belief_refused", False):
+        return models_plants(source, limits, runs)
+    return plants_of(source, limits, runs, schedule.provenance.get("length_m"))
+
+
+def promised_step(schedule: Schedule, of: Plants, speed: float, size: float, *, draws: int = VERIFY_DRAWS) -> StepCheck:
+    """Return what a verification says of one step (rad) at one speed (m/s)."""
+    limit = schedule.at(speed).fin_limit
+    plant = of.family_at(speed, limit, draws, SEED)
+    flown = _flown_to_rest(plant, schedule.rows, size, pace_of(plant, limit, schedule.wish.step_of(schedule.axis)))
+    return _with_what_is_known(_step(flown, size), flown, plant, of.tightest_flown)
 
 
 def steps_of(schedule: Schedule) -> tuple[float, float, float]:

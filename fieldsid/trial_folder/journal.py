@@ -12,12 +12,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Annotated, Any, BinaryIO
 
 from fieldsid._version import __version__
 from fieldsid.display import Brief
 from fieldsid.errors import shortened
 from fieldsid.records.check import Shape, ShapeError, check, number, text, whole
+from fieldsid.records.keys import Key
 from fieldsid.records.named_inputs import sha256_of, sha256_of_named
 from fieldsid.records.reading import read_json
 
@@ -63,11 +64,11 @@ class Entry(Brief):
     `named` are the effects that a diagnosis named.
     """
 
-    time: str
-    command: tuple[str, ...]
-    exit: int
-    seconds: float
-    verdict: str
+    time: Annotated[str, Key("When it was run, ISO 8601 in UTC.")]
+    command: Annotated[tuple[str, ...], Key("Its words.")]
+    exit: Annotated[int, Key("Its exit code.")]
+    seconds: Annotated[float, Key("How long it took.")]
+    verdict: Annotated[str, Key("The first line of what it said.")]
     inputs: tuple[Stamp, ...] = ()
     outputs: tuple[Stamp, ...] = ()
     named: tuple[str, ...] = ()

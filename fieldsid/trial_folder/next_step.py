@@ -4,25 +4,30 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
-from importlib import import_module
+from contextlib import chdir
 from pathlib import Path
 from typing import Any
 
 from fieldsid.comparison.left_by import left_by_addition
 from fieldsid.comparison.sufficient import is_noise
+from fieldsid.errors import FieldsidError
+from fieldsid.logs.load import load_run, maps_anything, needs_mapping, to_map
+from fieldsid.logs.run import Run
+from fieldsid.logs.segments import may_show, plane_of
 from fieldsid.logs.several.run_names import stem_of
-from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.axis import Axis
 from fieldsid.records.named_inputs import sha256_of
 from fieldsid.rounding import MANY
 from fieldsid.trial_folder.journal import Entry, is_trial, made_by
-from fieldsid.trial_folder.make import LOGS, RUNS
+from fieldsid.trial_folder.make import LOGS, MAPPING, RUNS
 from fieldsid.trial_folder.patterns import shortened
-from fieldsid.trial_folder.state import LOG, MODEL, RUN, FolderState, Item
+from fieldsid.trial_folder.state import LOG, MODEL, RUN, FolderState, Item, state_of
 from fieldsid.vehicle import find_vehicle
 
 DONE = (0, 1)
 """Exit codes of a command that gave a result."""
 
+DONE_ALL = ("everything rests on what is there", "")
 REPORT = "sysid report"
 PORT = 14550
 """The UDP port that a ground station usually listens on."""
@@ -32,7 +37,7 @@ TAKES_ALL_RUNS = ("identify", "diagnose")
 
 def next_step(state: FolderState) -> tuple[str, str]:
     """Return why, and the command to run next, ready to paste in the folder; without one where nothing is left to do."""
-    return (_again(state) or _data(state) or _model(state) or _use(state)) or ("everything rests on what is there", "")
+    return (_again(state) or _sides(state) or _data(state) or _model(state) or _use(state)) or DONE_ALL
 
 
 def step_before(command: str, state: FolderState) -> tuple[str, str]:
@@ -40,7 +45,7 @@ def step_before(command: str, state: FolderState) -> tuple[str, str]:
     if command in ("schedule verify", "schedule export") and not state.of_kind("schedule") and (step := _use(state)) is not None:
         return step
     if command == "turn-radius" and state.models and not chosen_models(state, Axis.YAW.value):
-        runs = [i for i in state.of_kind(RUN) if Axis.YAW in _axes(state, i)]
+        runs = [i for i in state.of_kind(RUN) if any(may_show(run, Axis.YAW) for run in _loaded(state, i))]
         if not runs:
             return "there is no model of the yaw, and no run with a rudder", ""
         return "there is no model of the yaw yet", shlex.join(["sysid", "identify", "--axis", "yaw", *_joint(runs)])
@@ -87,12 +92,33 @@ def _remake(state: FolderState, item: Item) -> str:
     return shlex.join(["sysid", "history", item.path])
 
 
+def _sides(state: FolderState) -> tuple[str, str] | None:
+    """Return what comes next in the trials that a folder without data of its own holds: a model in each, then what differs."""
+    if not state.sides or any(i.kind in (LOG, RUN, MODEL) for i in state.items):
+        return None
+    for side in state.sides:
+        inner = state_of(state.folder / side)
+        why, line = next_step(inner)
+        if not inner.models and line:
+            return f"{side}: {why}", f"cd {shlex.quote(side)} && {line}"
+    if len(state.sides) == 2 and not any(e.name == "compare" and set(state.sides) <= set(e.command) for e in state.entries):
+        return f"{' and '.join(state.sides)} have models", shlex.join(["sysid", "compare", *state.sides])
+    return _use(state) or DONE_ALL
+
+
 def _data(state: FolderState) -> tuple[str, str] | None:
     runs, logs = state.of_kind(RUN), state.of_kind(LOG)
     if runs or state.of_kind(MODEL):
         return None
     if logs:
-        words = ["sysid", "import", *_left_out(state, *logs_to_import(state), "-o", RUNS)]
+        new = logs_to_import(state)
+        mappings = [i.path for i in state.of_kind("mapping") if maps_anything(state.place(i))]
+        foreign = next((log for log in new if needs_mapping(state.folder / log)), "") if not mappings else ""
+        if foreign:
+            with chdir(state.folder):
+                return f"{foreign} needs a mapping: its own names do not say what its numbers are", to_map(Path(foreign))
+        reading = ["--mapping", mappings[-1]] if mappings and MAPPING not in mappings else []
+        words = ["sysid", "import", *_left_out(state, *new, "-o", RUNS), *reading]
         return "there is no run of the logs yet", shortened(words, state.folder)
     if plans := state.of_kind("plan"):
         axis = str((plans[-1].body or {}).get("axis", Axis.YAW.value))
@@ -195,10 +221,11 @@ def _use(state: FolderState) -> tuple[str, str] | None:
     gains = schedules[-1]
     if models and (old := _extended_since(state, gains)):
         return f"{gains.path} rests on {old}, which was extended since", shlex.join([*design, gains.path, "--force"])
+    if not is_trial(state.folder):
+        return f"{gains.path} is there; no journal says whether it is verified", ""
     if verification_of(state, gains) is None:
-        known = "the gains are not verified" if is_trial(state.folder) else "no journal says that the gains are verified"
-        return known, shlex.join(["sysid", "schedule", "verify", *_left_out(state, gains.path)])
-    return _reported(state) if is_trial(state.folder) else None
+        return "the gains are not verified", "sysid schedule verify"
+    return _reported(state)
 
 
 def _extended_since(state: FolderState, gains: Item) -> str:
@@ -250,6 +277,16 @@ def single_models(state: FolderState, axis: str) -> list[str]:
     models = [i for i in state.models if (i.body or {}).get("axis") == axis and len((i.body or {}).get("runs", ())) == 1]
     most = max((len((i.body or {}).get("effects", ())) for i in models), default=0)
     return [i.path for i in models if len((i.body or {}).get("effects", ())) == most]
+
+
+def root_of(state: FolderState, model: str) -> str:
+    """Return the file that the line of a model begins with, as far as the folder has it."""
+    models = {state.place(i).resolve(): i for i in state.of_kind(MODEL)}
+    item, seen = next(i for i in models.values() if i.path == model), set[str]()
+    while item.path not in seen:
+        seen.add(item.path)
+        item = next((models[s.path] for s in state.parents(item) if s.path in models), item)
+    return item.path
 
 
 def unseen_runs(state: FolderState, model: Item) -> list[str]:
@@ -314,17 +351,15 @@ def _joint(runs: Sequence[Item]) -> list[str]:
 
 
 def _axis(state: FolderState) -> str:
-    """Return the plane of the models, else the one that the first run moved a fin in; yaw where both are there."""
+    """Return the plane of the models, else the one that most runs excite."""
     if state.models:
         return str((state.models[0].body or {}).get("axis", "yaw"))
-    tables = [i for i in state.of_kind(RUN) if i.path.endswith(".parquet")]
-    axes = _axes(state, tables[0]) if tables else []
-    return axes[0].value if axes else Axis.YAW.value
+    return plane_of([run for i in state.of_kind(RUN) for run in _loaded(state, i)])
 
 
-def _axes(state: FolderState, run: Item) -> list[Axis]:
-    """Return the planes that a run has a fin of, every one where it is no Parquet file."""
-    if not run.path.endswith(".parquet"):
-        return list(Axis)
-    names = set(import_module("pyarrow.parquet").read_schema(state.place(run)).names)
-    return [a for a in Axis if {NAMES[a].fin, NAMES[a].fin_measured} & names]
+def _loaded(state: FolderState, item: Item) -> list[Run]:
+    """Return a run; none where it cannot be read: who works with it says so."""
+    try:
+        return [load_run(state.place(item))]
+    except FieldsidError:
+        return []

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
+from itertools import takewhile
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from fieldsid.display import Brief
 from fieldsid.errors import ArtifactError, LogError
 from fieldsid.logs.reader import reader_of
 from fieldsid.logs.run import OF_LIMITS, SIMULATED
 from fieldsid.logs.unknown_file import own_kind
+from fieldsid.records.keys import Key, Words
 from fieldsid.records.named_inputs import beside
 from fieldsid.records.reading import check_kind, read_json, read_yaml
 from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, made_by, read, relative_to
-from fieldsid.trial_folder.make import RUNS
+from fieldsid.trial_folder.make import LOGS, MODELS, RUNS
 
 METADATA_KEY = b"fieldsid"
 LOG, RUN, MODEL, PLANNED = "log", "run", "model", "planned"
@@ -28,9 +31,9 @@ SETTINGS = ("vehicle", "mapping", "user-effect", "effect")
 class Source(Brief):
     """What a file was made from: its path as named then, where it is now (None: nowhere), and its SHA-256 then."""
 
-    named: str
+    named: Annotated[str, Key("The file as it was named then.", "path")]
     path: Path | None
-    sha256: str
+    sha256: Annotated[str, Key("Its hash then.")]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -41,11 +44,11 @@ class Item(Brief):
     `fins` is how far (rad) a run's fins went where its import found them beyond the vehicle's limits, by signal.
     """
 
-    path: str
-    kind: str
-    sources: tuple[Source, ...] = ()
-    stale: str = ""
-    missing: tuple[str, ...] = ()
+    path: Annotated[str, Key("Its path from the folder.")]
+    kind: Annotated[str, Key("What it is: log, run, model, fit, schedule, ...")]
+    sources: Annotated[tuple[Source, ...], Key("What it was made from, as it says itself.", "made_from")] = ()
+    stale: Annotated[Words, Key("Why it does not hold any more; null where it does.")] = ""
+    missing: Annotated[tuple[str, ...], Key("What it was made from and is not there any more.")] = ()
     body: Mapping[str, Any] | None = None
     fins: Mapping[str, float] | None = None
 
@@ -54,7 +57,8 @@ class Item(Brief):
 class FolderState(Brief):
     """A folder with its files in order, the journal's entries, and how many of its lines could not be read.
 
-    `unreadable` says of each file of this program that is not among the items why it cannot be read.
+    `unreadable` says of each file of this program that is not among the items why it cannot be read. `sides` are the folders in
+    it that are trials themselves, as before and after a swap: their files are none of this one's.
     """
 
     folder: Path
@@ -62,6 +66,7 @@ class FolderState(Brief):
     entries: tuple[Entry, ...]
     broken_lines: int
     unreadable: tuple[str, ...] = ()
+    sides: tuple[str, ...] = ()
 
     def of_kind(self, kind: str) -> tuple[Item, ...]:
         """Return the files of one kind."""
@@ -71,10 +76,14 @@ class FolderState(Brief):
         """Return where a file is."""
         return self.folder / item.path
 
+    def parents(self, item: Item) -> tuple[Source, ...]:
+        """Return the file that a model was extended from, none for others."""
+        return _parents(item, self.folder)
+
     @property
     def models(self) -> tuple[Item, ...]:
         """The models that nothing was extended from, joint ones before those of one run."""
-        parents = {str(s.path) for i in self.of_kind(MODEL) for s in _parents(i, self.folder)}
+        parents = {str(s.path) for i in self.of_kind(MODEL) for s in self.parents(i)}
         leaves = [i for i in self.of_kind(MODEL) if str(self.place(i).resolve()) not in parents]
         return tuple(sorted(leaves, key=lambda i: (len(_body(i).get("runs", ())) < 2, i.path)))
 
@@ -85,12 +94,21 @@ def state_of(folder: Path, files: Sequence[Path] | None = None) -> FolderState:
     hashes = Hashes(folder, entries)
     wanted = None if files is None else {p.resolve() for p in files}
     unreadable: list[str] = []
-    found = (i for i in _items(folder, unreadable) if wanted is None or (folder / i.path).resolve() in wanted)
+    sides = _sides(folder)
+    found = (i for i in _items(folder, sides, unreadable) if wanted is None or (folder / i.path).resolve() in wanted)
     items = {i.path: replace(i, kind=SIMULATED) if _is_simulated(i, entries) else i for i in found}
     done: dict[str, Item] = {}
     for path in items:
         _judge(path, items, done, hashes, folder)
-    return FolderState(folder, tuple(done[p] for p in items), entries, broken, tuple(unreadable))
+    return FolderState(folder, tuple(done[p] for p in items), entries, broken, tuple(unreadable), sides)
+
+
+def _sides(folder: Path) -> tuple[str, ...]:
+    """Return the folders in a folder that are trials themselves, the one with the oldest files first."""
+    names = (JOURNAL, LOGS, RUNS, MODELS)
+    # os.path says no where a folder is closed, and does not raise
+    found = [p for p in folder.iterdir() if not p.is_symlink() and any(os.path.exists(p / n) for n in names)]  # noqa: PTH110
+    return tuple(p.name for p in sorted(found, key=lambda p: (min(f.lstat().st_mtime_ns for f in p.iterdir()), p.name)))
 
 
 def _is_simulated(item: Item, entries: Sequence[Entry]) -> bool:
@@ -99,10 +117,10 @@ def _is_simulated(item: Item, entries: Sequence[Entry]) -> bool:
     return maker is not None and maker.command[1:2] == ("simulate",)
 
 
-def _items(folder: Path, unreadable: list[str]) -> Iterator[Item]:
+def _items(folder: Path, sides: Sequence[str], unreadable: list[str]) -> Iterator[Item]:
     for path in sorted(folder.rglob("*")):
         inside = path.relative_to(folder)
-        if not path.is_file() or path.name == JOURNAL or any(p.startswith(".") for p in inside.parts):
+        if inside.parts[0] in sides or not path.is_file() or path.name == JOURNAL or any(p.startswith(".") for p in inside.parts):
             continue
         try:
             item = _item(path, inside.as_posix(), folder)
@@ -114,7 +132,7 @@ def _items(folder: Path, unreadable: list[str]) -> Iterator[Item]:
 
 
 def _item(path: Path, name: str, folder: Path) -> Item | None:
-    if path.name.endswith(".parquet") and (head := _run_head(path)) is not None:
+    if path.name.endswith(".parquet") and (head := run_head(path)) is not None:
         made = any(note["code"] == SIMULATED for note in head["notes"])
         told = [n["data"] for n in head["notes"] if n["code"] in OF_LIMITS and "reach_rad" in n["data"]]
         fins = {str(d.get("signal")): float(d["reach_rad"]) for d in told}
@@ -124,7 +142,7 @@ def _item(path: Path, name: str, folder: Path) -> Item | None:
         return _own(path, name, kind, folder)
     if not _is_log(path):
         return None
-    if _is_planned(path):
+    if _is_planned(path, folder):
         return Item(name, PLANNED)
     return Item(name, RUN if name.startswith(f"{RUNS}/") else LOG)
 
@@ -142,7 +160,7 @@ def _parent(body: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return [] if body.get("parent") is None else [body["parent"]]
 
 
-def _run_head(path: Path) -> Mapping[str, Any] | None:
+def run_head(path: Path) -> Mapping[str, Any] | None:
     """Return what a run of ours keeps beside its columns, None for another table; raises ArtifactError where that is spoilt."""
     try:
         metadata = import_module("pyarrow.parquet").read_schema(path).metadata or {}
@@ -165,10 +183,11 @@ def _is_log(path: Path) -> bool:
     return True
 
 
-def _is_planned(path: Path) -> bool:
-    """Whether a table is a fin to fly, which `sysid plan` wrote beside its plan: nothing was measured."""
-    plan = path.with_name("plan.yaml")
-    return path.name.startswith("leg") and plan.is_file() and own_kind(plan) == "plan"
+def _is_planned(path: Path, folder: Path) -> bool:
+    """Whether a table or a bag is a fin to fly, which `sysid plan` wrote beside its plan: nothing was measured."""
+    inside = takewhile(lambda p: p != folder, (path, *path.parents))
+    plans = (p.with_name("plan.yaml") for p in inside if p.name.startswith("leg"))
+    return any(plan.is_file() and own_kind(plan) == "plan" for plan in plans)
 
 
 def _sources(named: Sequence[Mapping[str, Any]], folder: Path) -> tuple[Source, ...]:

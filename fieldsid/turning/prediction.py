@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import isnan
-from typing import Any
+from math import isnan, nan
+from typing import Annotated, Literal, get_args
 
 from fieldsid.display import Displayed, Plotted
 from fieldsid.logs.run import Note
+from fieldsid.records.keys import INLINE, Interval, Key, Number, Side
 from fieldsid.turning.known_radius import is_band_only
 from fieldsid.turning.measured.measured_turn import MeasuredTurn
 from fieldsid.turning.steady.speed_loss import SurgeModel
@@ -36,72 +37,47 @@ class TurnRow(Displayed):
     `radius` is the median of what is believed, `of_model` that of the identified yaw model alone.
     """
 
-    speed: float
-    side: str
-    radius: float
-    interval95: tuple[float, float]
-    steady_radius: float
-    u_turn_radius: float
-    u_turn_time: float
-    yaw_rate_max: float
-    method: str
-    trust: str
-    because: tuple[str, ...]
-    settle_with: str
-    turn_speed: float
-    u_turn_time95: tuple[float, float]
-    advance: float = float("nan")
-    transfer: float = float("nan")
-    tactical_diameter: float = float("nan")
-    predicted: float = float("nan")
-    predicted95: tuple[float, float] = (float("nan"), float("nan"))
-    of_model: float = float("nan")
+    speed: Annotated[float, Key("Entry speed.", "speed_m_s")]
+    side: Annotated[str, Key("The side.", of=Side)]
+    radius: Annotated[Number, Key("The radius, by `method`: the median of what is believed, or the formula's.", "radius_m")]
+    interval95: Annotated[Interval, Key("Its 95 % band, parameters and model form together.")]
+    steady_radius: Annotated[Number, Key("Radius of the settled circle.", "steady_radius_m")]
+    u_turn_radius: Annotated[Number, Key("Path of a half turn over pi.", "u_turn_radius_m")]
+    u_turn_time: Annotated[Number, Key("Time of a half turn.", "u_turn_time_s")]
+    yaw_rate_max: Annotated[Number, Key("Largest yaw rate, its size.", "yaw_rate_max_rad_s")]
+    method: Annotated[
+        str, Key("Where the radius comes from.", of=Literal["u_turn", "steady", "simulated", "maneuvering", "measured"])
+    ]
+    trust: Annotated[str, Key("What it rests on.", of=Literal["measured", "identified", "extrapolated"])]
+    because: Annotated[tuple[str, ...], Key("What was not reached.")]
+    settle_with: Annotated[str, Key("The maneuver that would settle it.")]
+    turn_speed: Annotated[Number, Key("Speed along the path in the settled turn.", "turn_speed_m_s")]
+    u_turn_time95: Annotated[Interval, Key("Its 95 % band.", "u_turn_time95_s")]
+    advance: Annotated[Number, Key("Distance along the approach at 90 deg; null for the formulas.", "advance_m")] = nan
+    transfer: Annotated[Number, Key("Distance across it at 90 deg.", "transfer_m")] = nan
+    tactical_diameter: Annotated[Number, Key("Distance across it at 180 deg.", "tactical_diameter_m")] = nan
+    predicted: Annotated[Number, Key("The prediction, where `radius_m` was measured.", "predicted_m")] = nan
+    predicted95: Annotated[Interval, Key("Its band.")] = (nan, nan)
+    of_model: Annotated[Number, Key("Radius of the identified yaw model by itself.", "model_radius_m")] = nan
 
     @property
-    def extrapolated(self) -> bool:
+    def extrapolated(self) -> Annotated[bool, Key()]:
         """Whether the turn lies beyond what the data reached."""
         return bool(self.because)
 
     @property
-    def band_only(self) -> bool:
-        """Whether the data tell the band of the radius, and no number in it."""
+    def band_only(self) -> Annotated[bool, Key()]:
+        """Whether `interval95` is wider than 35 % of `radius_m`: what is known is the band, and no number in it."""
         return is_band_only(self.radius, self.interval95)
-
-    def record(self) -> dict[str, Any]:
-        """Return the row as `--json` prints it."""
-        return {
-            "speed_m_s": self.speed,
-            "side": self.side,
-            "radius_m": self.radius,
-            "interval95": list(self.interval95),
-            "steady_radius_m": self.steady_radius,
-            "u_turn_radius_m": self.u_turn_radius,
-            "u_turn_time_s": self.u_turn_time,
-            "u_turn_time95_s": list(self.u_turn_time95),
-            "yaw_rate_max_rad_s": self.yaw_rate_max,
-            "turn_speed_m_s": self.turn_speed,
-            "advance_m": self.advance,
-            "transfer_m": self.transfer,
-            "tactical_diameter_m": self.tactical_diameter,
-            "predicted_m": self.predicted,
-            "predicted95": list(self.predicted95),
-            "model_radius_m": self.of_model,
-            "band_only": self.band_only,
-            "method": self.method,
-            "extrapolated": self.extrapolated,
-            "trust": self.trust,
-            "because": list(self.because),
-            "settle_with": self.settle_with,
-        }
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class MeasuredRow(Displayed):
     """A measured circle with the model's prediction for the fin and the speed it was flown with."""
 
-    turn: MeasuredTurn
-    predicted: float
-    predicted95: tuple[float, float]
+    turn: Annotated[MeasuredTurn, INLINE]
+    predicted: Annotated[Number, Key("The prediction.", "predicted_m")]
+    predicted95: Annotated[Interval, Key("Its band.")]
 
     def entered(self, speed: float, side: str) -> bool:
         """Whether the circle was turned to a side from about a speed in m/s."""
@@ -111,42 +87,37 @@ class MeasuredRow(Displayed):
         """Whether it was turned with about a rudder in rad."""
         return abs(abs(self.turn.fin) - rudder) <= EQUAL_TURN_SHARE * rudder
 
-    def record(self) -> dict[str, Any]:
-        """Return the row as `--json` prints it."""
-        circle = self.turn.circle
-        return {
-            "run": self.turn.run,
-            "side": self.turn.side,
-            "radius_m": circle.radius,
-            "interval95": list(circle.interval95),
-            "std_error_m": circle.radius_std_error,
-            "predicted_m": self.predicted,
-            "predicted95": list(self.predicted95),
-            "difference_percent": 100.0 * (self.predicted / circle.radius - 1.0),
-            "inside_band": self.predicted95[0] <= circle.radius <= self.predicted95[1],
-            "fin_rad": self.turn.fin,
-            "entry_speed_m_s": self.turn.entry_speed,
-            "path_speed_m_s": self.turn.path_speed,
-            "centre_m": list(circle.centre),
-            "current_m_s": list(circle.current),
-            "turned_rad": circle.turned,
-            "settled_from_s": self.turn.start_s,
-            "settled_to_s": self.turn.end_s,
-        }
+    @property
+    def difference_percent(self) -> Annotated[Number, Key()]:
+        """Predicted over measured, less one."""
+        return 100.0 * (self.predicted / self.turn.circle.radius - 1.0)
+
+    @property
+    def inside_band(self) -> Annotated[bool, Key()]:
+        """Whether the measured radius is inside the prediction's band."""
+        return self.predicted95[0] <= self.turn.circle.radius <= self.predicted95[1]
+
+
+@dataclass(frozen=True, slots=True)
+class Tightest:
+    """Where the radius is smallest over speed."""
+
+    speed: Annotated[float, Key("The speed.", "speed_m_s")]
+    radius: Annotated[float, Key("The radius.", "radius_m")]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class TurnPrediction(Plotted):
     """All rows, the measured circles, the surge model behind them, and remarks."""
 
-    rows: tuple[TurnRow, ...]
-    measured: tuple[MeasuredRow, ...]
-    rudder_max: float
-    surge: SurgeModel | None
-    notes: tuple[Note, ...]
+    rows: Annotated[tuple[TurnRow, ...], Key("One for each speed and side.")]
+    measured: Annotated[tuple[MeasuredRow, ...], Key("Measured circles.")]
+    rudder_max: Annotated[float, Key("Rudder held in the turn.", "rudder_max_rad")]
+    surge: Annotated[SurgeModel | None, Key("The loss of speed, where runs tell it.")]
+    notes: Annotated[tuple[Note, ...], Key("What to know before it is trusted.", "warnings")]
 
     @property
-    def settling(self) -> tuple[str, ...]:
+    def settling(self) -> Annotated[tuple[str, ...], Key()]:
         """What would settle the rows that are extrapolated: circles that were given, asked for otherwise, and a flight."""
         rows = [r for r in self.rows if r.extrapolated]
         if not rows:
@@ -174,29 +145,11 @@ class TurnPrediction(Plotted):
         ]
         return inner[-1] if inner else None
 
-    def record(self) -> dict[str, Any]:
-        """Return the plain record that `--json` prints."""
-        best = {side: self.best(side) for side in SIDES}
-        surge = self.surge
-        return {
-            "rudder_max_rad": self.rudder_max,
-            "rows": [r.record() for r in self.rows],
-            "measured": [m.record() for m in self.measured],
-            "settling": list(self.settling),
-            "minimum": {s: None if b is None else {"speed_m_s": b.speed, "radius_m": b.radius} for s, b in best.items()},
-            "surge": None
-            if surge is None
-            else {
-                "drag_per_m": surge.drag,
-                "turn_loss_m": surge.turn_loss,
-                "fin_loss_per_m": surge.fin_loss,
-                "drift_per_rate_m": surge.drift_per_rate,
-                "surge_measured": surge.surge_measured,
-                "sway_measured": surge.sway_measured,
-                "rms_m_s": surge.surge_rms,
-            },
-            "warnings": [{"code": n.code, "message": n.message} for n in self.notes],
-        }
+    @property
+    def minimum(self) -> Annotated[Mapping[Side, Tightest | None], Key()]:
+        """By side, the smallest radius where it has a minimum inside the speeds."""
+        best = {side: self.best(side) for side in get_args(Side)}
+        return {side: None if b is None else Tightest(b.speed, b.radius) for side, b in best.items()}
 
 
 def found_by(methods: Iterable[str]) -> str:

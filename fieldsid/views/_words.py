@@ -7,12 +7,12 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.page import Block, cut, facts
-from fieldsid.rounding import MANY, interval, number, with_error
+from fieldsid.records.keys import body_of
+from fieldsid.rounding import MANY, RADIANS, Angles, interval, number, with_error
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from fieldsid.diagnosis import Pair
     from fieldsid.fitting.estimates import Estimate
     from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit
     from fieldsid.logs import Note
@@ -91,22 +91,6 @@ def error_facts(m: GoodnessOfFit, floor: Noise) -> list[tuple[str, str]]:
     ]
 
 
-def merit_row(m: GoodnessOfFit) -> dict[str, float]:
-    """Return errors and fits of a free run by the names that JSON gives them."""
-    return {
-        "angle_rms_rad": m.angle_rms,
-        "rate_rms_rad_s": m.rate_rms,
-        "angle_fit_percent": m.angle_fit,
-        "rate_fit_percent": m.rate_fit,
-    }
-
-
-def pair_row(pair: Pair) -> dict[str, float]:
-    """Return errors on fitted and on unseen runs as columns of a row."""
-    sides = (("fitted", pair.train), ("unseen", pair.validation))
-    return {f"{side}_{name}": getattr(errors, name) for side, errors in sides for name in ("angle_rms_rad", "rate_rms_rad_s")}
-
-
 def times(ratio: float) -> str:
     """Return an error over the noise floor, `-` where there is none."""
     return f"{ratio:.2f}" if abs(ratio) < MANY else number(ratio, 3)
@@ -117,28 +101,24 @@ def percent(share: float) -> str:
     return f"{100 * share:.0f} %"
 
 
-def where_block(title: str, where: Iterable[Any], most: int = 6) -> Block:
-    """Return where a model fails: condition, share of the squared error, rms over the whole run's, the worst time."""
+def where_block(title: str, where: Iterable[Any], angles: Angles = RADIANS, most: int = 6) -> Block:
+    """Return where a model fails: condition, share of squared error and samples, rms over the whole run's, the worst time."""
     rows = [
-        (p.condition, percent(p.share_of_error), f"{p.rms_ratio:.2f}", f"{p.start_s:.1f} .. {p.end_s:.1f}")
+        (
+            angles.words(p.condition),
+            percent(p.share_of_error),
+            percent(p.share_of_samples),
+            f"{p.rms_ratio:.2f}",
+            f"{p.start_s:.1f} .. {p.end_s:.1f}",
+        )
         for p in list(where)[:most]
     ]
-    return Block(title, tuple(rows), ("", "of error", "rms ratio", "worst, s"))
+    return Block(title, tuple(rows), ("", "of error", "of time", "rms ratio", "worst, s"))
 
 
 def where_rows(where: Iterable[Any]) -> list[dict[str, Any]]:
     """Return where a model fails as rows of a table."""
-    return [
-        {
-            "condition": p.condition,
-            "share_of_error": p.share_of_error,
-            "share_of_samples": p.share_of_samples,
-            "rms_ratio": p.rms_ratio,
-            "start_s": p.start_s,
-            "end_s": p.end_s,
-        }
-        for p in where
-    ]
+    return [body_of(p) for p in where]
 
 
 def table(rows: Iterable[Mapping[str, Any]], index: str | None = None) -> DataFrame:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import View
 from fieldsid.page import Block, Page, facts, listed
+from fieldsid.records.keys import body_of
 from fieldsid.views._words import table, warned
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def page(found: Change) -> Page:
 
 def frames(found: Change) -> Mapping[str, Callable[[], DataFrame]]:
     """Return a row for each parameter, for each gain and for each turn."""
-    body = found.record()
+    body = body_of(found)
     parts = ("name", "what", "unit", "is_relative", "change", "std_error", "p_adjusted", "state")
     return {
         "parameters": lambda: table(({k: p[k] for k in parts} for p in body["parameters"]), "name"),

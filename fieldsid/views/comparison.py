@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import View
 from fieldsid.page import Block, Page, cut, facts
+from fieldsid.records.keys import body_of
 from fieldsid.rounding import number, p_value, times_noise
-from fieldsid.views._words import error_facts, merit_row, percent, speed_words, table, warned, where_block, where_rows
+from fieldsid.views._words import error_facts, percent, speed_words, table, warned, where_block, where_rows
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -49,7 +50,7 @@ def frames(found: Comparison) -> Mapping[str, Callable[[], DataFrame]]:
     row: dict[str, Any] = {
         "run": found.run,
         "speed_m_s": found.shown.record.speed,
-        **merit_row(found.merit),
+        **body_of(found.merit),
         "angle_noise_rad": found.floor.angle,
         "rate_noise_rad_s": found.floor.rate,
         "judged_by": found.leading.name,

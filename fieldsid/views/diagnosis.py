@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import View
-from fieldsid.page import Block, Page, cut, facts, listed
-from fieldsid.rounding import number, probability
-from fieldsid.views._words import (
-    counted,
-    joined,
-    pair_row,
-    parameter_rows,
-    percent,
-    table,
-    times,
-    warned,
-    where_block,
-    where_rows,
-)
+from fieldsid.page import Block, Page, cut, paragraph
+from fieldsid.records.keys import body_of
+from fieldsid.rounding import RADIANS, Angles
+from fieldsid.views._candidates import candidates
+from fieldsid.views._words import counted, joined, parameter_rows, table, warned, where_block, where_rows
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from fieldsid.diagnosis import Candidate, Diagnosis, Pair
+    from fieldsid.diagnosis import Candidate, Diagnosis
+
+MOST_PLACES, MOST_SPOKEN = 5, 3
 
 
 def line(found: Diagnosis) -> str:
@@ -32,29 +25,39 @@ def line(found: Diagnosis) -> str:
     return f"{found.axis.value}, {found.verdict}: {joined(cut(found.says, 280), counted(len(found.notes), 'note'))}"
 
 
-def page(found: Diagnosis) -> Page:
-    """Return the verdict, the candidates after the model as it is, where that fails, and what to fly next."""
-    floor = found.noise_floor
-    rows = [("model as it is", "", *_errors(found, found.base), "", ""), *(_row(c, found) for c in found.candidates)]
-    of = "in rad and rad/s, in logs with next to no noise" if found.noiseless else "over the noise floor"
-    heads = ("", "probability", "fitted", "unseen", "explained", "log evidence")
-    next_ = found.next_maneuver
-    known = facts(
-        "Statistics",
-        (
-            ("verdict", found.verdict),
-            ("effects", listed(found.effects) or "none"),
-            ("noise floor", f"{number(floor.angle, 3)} rad and {number(floor.rate, 3)} rad/s"),
-            ("not tried", "; ".join(f"{n}: {why}" for n, why in found.skipped.items())),
-            ("fly next", f"{next_['maneuver']}, {next_['why']}" if next_ else ""),
-        ),
-    )
-    blocks = (
-        known,
-        Block(f"Candidates (fitted, unseen: free-run error of those runs {of})", tuple(rows), heads),
-        where_block("Where the model as it is fails", found.where),
-    )
-    return Page(f"Diagnosis of the {found.axis.value} axis: {found.says}", warned(found.notes), blocks)
+def page(found: Diagnosis, angles: Angles = RADIANS) -> Page:
+    """Return the candidates after the model as it is, what is named, where the model as it is fails, and what to fly next."""
+    fly = found.next_maneuver
+    settle = f"\nwhat would settle it: {fly.maneuver}, {fly.why}{f'; {fly.note}' if fly.note else ''}" if fly else ""
+    where = where_block("where the model as it is fails", found.where, angles, MOST_PLACES)
+    blocks: tuple[Block | str, ...] = (*candidates(body_of(found), angles), *_words(found), where, *_not_tried(found), settle)
+    told = tuple(b if isinstance(b, Block) else angles.words(b) for b in blocks)
+    return Page(f"Diagnosis of the {found.axis.value} axis, {found.verdict}: {found.says}", warned(found.notes), told)
+
+
+def _words(found: Diagnosis) -> Iterator[str]:
+    """Yield what each named effect does, what it may be confused with, and the evidence for what is not in the verdict."""
+    from fieldsid.diagnosis import what_it_does
+    from fieldsid.diagnosis.thresholds import RIVAL_PROBABILITY_RATIO
+
+    if found.verdict in ("sufficient", "disturbed"):
+        return
+    lines = [f"{name}: {what_it_does(name, found.model.values)}" for name in found.effects]
+    for i, c in enumerate(found.candidates[:MOST_SPOKEN]):
+        if i and c.probability < RIVAL_PROBABILITY_RATIO:
+            continue
+        if found.verdict != "effect" or i:
+            lines.append(f"{c.effect}: {c.evidence}")
+        if c.confusable_with:
+            lines.append(f"on these data nearly as good as {c.effect}: {', '.join(c.confusable_with)}")
+    yield from paragraph(lines)
+
+
+def _not_tried(found: Diagnosis) -> Iterator[str]:
+    why: dict[str, list[str]] = {}
+    for name, reason in found.skipped.items():
+        why.setdefault(reason, []).append(name)
+    yield from paragraph([f"not tried: {', '.join(names)}: {reason}" for reason, names in why.items()])
 
 
 def frames(found: Diagnosis) -> Mapping[str, Callable[[], DataFrame]]:
@@ -78,22 +81,16 @@ def candidate_row(c: Candidate) -> dict[str, Any]:
     return {
         "effect": c.effect,
         "probability": c.probability,
-        **pair_row(c.errors),
+        **{
+            f"{side}_{n}": v
+            for side, e in (("fitted", c.errors.train), ("unseen", c.errors.validation))
+            for n, v in body_of(e).items()
+        },
         "explained": c.explained,
         "log_evidence": c.score,
         "evidence": c.evidence,
         "confusable_with": ", ".join(c.confusable_with),
     }
-
-
-def _row(c: Candidate, found: Diagnosis) -> tuple[str, ...]:
-    return (c.effect, probability(c.probability), *_errors(found, c.errors), percent(c.explained), f"{c.score:+z.0f}")
-
-
-def _errors(found: Diagnosis, pair: Pair) -> tuple[str, ...]:
-    """Return the errors on fitted and on unseen runs: over the noise floor, or in their units without noise."""
-    sides = (pair.train, pair.validation)
-    return tuple(e.sized() if found.noiseless else times(e.over(found.noise_floor)) for e in sides)
 
 
 VIEW = View("diagnosis", line, page, frames, lambda found: found.axis.value, figures)

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import View
 from fieldsid.page import Block, Page, facts, listed
-from fieldsid.rounding import noise_fall, number
+from fieldsid.rounding import RADIANS, Angles, noise_fall, number
 from fieldsid.views._words import parameter_block, parameter_rows, table, warned
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
     from fieldsid.extension import Extension
+    from fieldsid.extension.extend import Gain
 
 
 def line(found: Extension) -> str:
@@ -22,12 +23,9 @@ def line(found: Extension) -> str:
     return f"{'+'.join(found.gain.added)}: {_fall(found)}, {_verdict(found)}"
 
 
-def page(found: Extension) -> Page:
+def page(found: Extension, angles: Angles = RADIANS) -> Page:
     """Return the errors before and after, and the parameters of the extended model."""
     gain = found.gain
-    rows = [
-        (f"{r['channel']}, {r['runs']}", *(number(r[k], 3) for k in ("before", "after", "noise_floor"))) for r in _rows(found)
-    ]
     known = facts(
         "Statistics",
         (
@@ -37,7 +35,7 @@ def page(found: Extension) -> Page:
             ("judged on", listed(gain.judged_on) + ("" if gain.unseen else ", which were fitted")),
         ),
     )
-    blocks = (known, Block("Errors, rms", tuple(rows), ("", "before", "after", "noise floor")), parameter_block(found.model))
+    blocks = (known, errors(gain, angles), parameter_block(found.model))
     title = f"Extension by {' and '.join(gain.added)}: {_fall(found)}, {_verdict(found)}"
     return Page(title, warned(found.notes), blocks)
 
@@ -45,7 +43,7 @@ def page(found: Extension) -> Page:
 def frames(found: Extension) -> Mapping[str, Callable[[], DataFrame]]:
     """Return the errors before and after, and the parameters of the extended model."""
     return {
-        "errors": lambda: table(_rows(found)),
+        "errors": lambda: table(_rows(found.gain)),
         "parameters": lambda: table(parameter_rows(found.model), "parameter"),
     }
 
@@ -68,11 +66,20 @@ def _verdict(found: Extension) -> str:
     return "which pays" if found.pays else "which does not pay"
 
 
-def _rows(found: Extension) -> Iterator[dict[str, Any]]:
-    gain = found.gain
-    for channel, name, floor in (
-        ("angle, rad", "angle_rms_rad", gain.noise_floor.angle),
-        ("rate, rad/s", "rate_rms_rad_s", gain.noise_floor.rate),
+def errors(gain: Gain, angles: Angles) -> Block:
+    """Return the error before and after of each channel, on unseen and on fitted runs, beside the noise floor."""
+    rows = [
+        (f"{r['channel']}, {unit}, {r['runs']}", *(number(factor * r[k], 3) for k in ("before", "after", "noise_floor")))
+        for r in _rows(gain)
+        for factor, unit in [angles.of(r["unit"])]
+    ]
+    return Block("", tuple(rows), ("rms error", "before", "after", "noise floor"))
+
+
+def _rows(gain: Gain) -> Iterator[dict[str, Any]]:
+    for channel, unit, name, floor in (
+        ("angle", "rad", "angle_rms_rad", gain.noise_floor.angle),
+        ("rate", "rad/s", "rate_rms_rad_s", gain.noise_floor.rate),
     ):
         for runs, before, after in (
             ("unseen", gain.before.validation, gain.after.validation),
@@ -80,7 +87,7 @@ def _rows(found: Extension) -> Iterator[dict[str, Any]]:
         ):
             if isfinite(getattr(before, name)):
                 values = {"before": getattr(before, name), "after": getattr(after, name), "noise_floor": floor}
-                yield {"channel": channel, "runs": runs, **values}
+                yield {"channel": channel, "unit": unit, "runs": runs, **values}
 
 
 VIEW = View("extension", line, page, frames, lambda found: "+".join(found.gain.added), figures)

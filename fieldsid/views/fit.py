@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import View
 from fieldsid.page import Block, Page, facts, listed
+from fieldsid.records.keys import body_of
 from fieldsid.rounding import number, p_value
 from fieldsid.views._words import (
     base_words,
     counted,
     error_facts,
     joined,
-    merit_row,
     parameter_block,
     parameter_rows,
     table,
@@ -142,7 +142,7 @@ def _runs(fit: Fit) -> Block:
 def _run_row(p: Prediction) -> dict[str, Any]:
     from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
 
-    return {"run": p.record.name, "speed_m_s": p.record.speed, **merit_row(goodness_of_fit([p]))}
+    return {"run": p.record.name, "speed_m_s": p.record.speed, **body_of(goodness_of_fit([p]))}
 
 
 VIEW = View("fit", line, page, frames, lambda fit: "+".join(fit.model.runs), figures)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import View
 from fieldsid.page import Block, Page, facts, listed
+from fieldsid.records.keys import body_of
 from fieldsid.rounding import number
 from fieldsid.views._words import table
 
@@ -56,7 +57,7 @@ def page(schedule: Schedule) -> Page:
 
 def frames(schedule: Schedule) -> Mapping[str, Callable[[], DataFrame]]:
     """Return a row of gains for each speed."""
-    return {"rows": lambda: table((r.record() for r in schedule.rows), "speed_m_s")}
+    return {"rows": lambda: table((body_of(r) for r in schedule.rows), "speed_m_s")}
 
 
 def figures(schedule: Schedule) -> Mapping[str, Callable[[], Any]]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from math import degrees
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import View
 from fieldsid.page import Block, Page, cut
-from fieldsid.rounding import interval, number, with_error
+from fieldsid.records.keys import body_of
+from fieldsid.rounding import RADIANS, Angles, number, with_error
 from fieldsid.views._words import counted, joined, table, warned
 
 if TYPE_CHECKING:
@@ -28,44 +30,59 @@ def line(found: TurnPrediction) -> str:
     return f"rudder {found.rudder_max:.4g} rad, {_methods(found)}: radius {span}, {more}"
 
 
-def page(found: TurnPrediction) -> Page:
-    """Return a row for each speed and side, the measured circles, and why rows are extrapolated."""
+def page(found: TurnPrediction, angles: Angles = RADIANS) -> Page:
+    """Return a row for each speed and side, the measured circles, why rows are extrapolated, and what would settle it."""
     from fieldsid.turning.known_radius import BRACKETED, radius_cell
+    from fieldsid.turning.prediction import found_by
 
     rows = tuple(
         (
             r.side,
             number(r.speed, 3),
             radius_cell(r.radius, r.interval95),
-            *(number(v, 3) for v in (*r.interval95, r.yaw_rate_max, r.u_turn_time)),
+            f"{number(r.interval95[0], 3)} .. {number(r.interval95[1], 3)}",
+            number(r.of_model, 3),
+            number(degrees(r.yaw_rate_max), 3),
+            number(r.u_turn_time, 3),
             r.trust,
         )
         for r in found.rows
     )
-    heads = ("", "m/s", "radius m", "from", "to (95 %)", "rad/s", "180 deg s", "trust")
-    circles = tuple(
+    heads = ("side", "m/s", "radius m", "95 %", "model's", "deg/s", "u-turn s", "trust")
+    rudder = f"rudder {angles.factor * found.rudder_max:.4g} {angles.unit}, {found_by(r.method for r in found.rows)}"
+    because = [b for r in found.rows for b in r.because]
+    shares = {b: "" if because.count(b) == len(rows) else f" ({because.count(b)} of {len(rows)} turns)" for b in because}
+    blocks: tuple[Block | str, ...] = (
+        Block(rudder, rows, heads),
+        BRACKETED if any(r.band_only for r in found.rows) else "",
+        _circles(found, angles),
+        *(f"extrapolated{share}: {b}" for b, share in shares.items()),
+        *(f"what would settle it: {settling}" for settling in found.settling),
+        *(f"tightest at higher speed, {s}: {b.radius:.2f} m at {b.speed:.2f} m/s" for s, b in found.minimum.items() if b),
+    )
+    return Page(f"Turns with {rudder}", warned(found.notes), blocks)
+
+
+def _circles(found: TurnPrediction, angles: Angles) -> Block:
+    rows = tuple(
         (
             cut(m.turn.run, 60),
             number(m.turn.flown_at, 3),
-            number(m.turn.fin, 3),
+            number(angles.factor * m.turn.fin, 3),
             with_error(m.turn.circle.radius, m.turn.circle.radius_std_error),
-            number(m.predicted, 3),
-            interval(*m.predicted95),
+            number(m.predicted),
+            f"{number(m.predicted95[0], 3)} .. {number(m.predicted95[1], 3)}",
+            f"{m.difference_percent:+.1f}",
         )
         for m in found.measured
     )
-    because = dict.fromkeys(b for r in found.rows for b in r.because)
-    settle = next((r.settle_with for r in found.rows if r.because), "")
-    bracketed = (BRACKETED,) if any(r.band_only for r in found.rows) else ()
-    closing = (*bracketed, *(f"extrapolated: {b}" for b in because), *((f"what would settle it: {settle}",) if settle else ()))
-    measured = Block("Measured circles", circles, ("", "m/s", "fin rad", "radius m", "predicted", "95 %"))
-    title = f"Turns with {found.rudder_max:.4g} rad of rudder, {_methods(found)}"
-    return Page(title, warned(found.notes), (Block("Radius", rows, heads), measured), closing)
+    heads = ("run", "m/s", "fin", "radius m", "predicted", "95 %", "off %")
+    return Block("measured circles, and what the other runs alone predict", rows, heads)
 
 
 def frames(found: TurnPrediction) -> Mapping[str, Callable[[], DataFrame]]:
     """Return a row for each speed and side, and the measured circles."""
-    return {"rows": lambda: table(r.record() for r in found.rows), "measured": lambda: table(m.record() for m in found.measured)}
+    return {"rows": lambda: table(map(body_of, found.rows)), "measured": lambda: table(map(body_of, found.measured))}
 
 
 def figures(found: TurnPrediction) -> Mapping[str, Callable[[], Any]]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import View
 from fieldsid.page import Block, Page, facts
+from fieldsid.records.keys import body_of
 from fieldsid.rounding import number
 from fieldsid.views._words import table
 
@@ -58,8 +59,8 @@ def page(found: Verification) -> Page:
 def frames(found: Verification) -> Mapping[str, Callable[[], DataFrame]]:
     """Return the checks of the schedule and those of one constant gain."""
     return {
-        "scheduled": lambda: table((c.record() for c in found.scheduled), "speed_m_s"),
-        "constant": lambda: table((c.record() for c in found.constant), "speed_m_s"),
+        "scheduled": lambda: table((body_of(c) for c in found.scheduled), "speed_m_s"),
+        "constant": lambda: table((body_of(c) for c in found.constant), "speed_m_s"),
     }
 
 

@@ -27,7 +27,7 @@ WRONG = {
 def models(tmp_path):
     """Models with something wrong, by what it is."""
     paths = {wrong: tmp_path / f"{wrong.replace(' ', '_')}.yaml" for wrong in WRONG}
-    paths["is another file"].write_text("schema: fieldsid/schedule/1\n")
+    paths["is another file"].write_text("schema: fieldsid/plan/1\n")
     save_record(paths["is not whole"], f"{KIND}/1", {"axis": "yaw"})
     save_model(trial.vehicle(Axis.YAW, "stall", stall_angle=0.3, stall_drop=0.5), paths["holds an unknown effect"])
     text = paths["holds an unknown effect"].read_text()

@@ -8,7 +8,7 @@ import pytest
 
 from fieldsid.cli.headlines.missing import Searched, of_diagnosis, of_extension
 
-SEARCHED = Searched((Path("a.csv"), Path("b.csv")), (Path("c.csv"),), Path("m.yaml"), None, thorough=False)
+SEARCHED = Searched((Path("a.csv"), Path("b.csv")), (Path("c.csv"),), Path("m.yaml"), thorough=False)
 
 
 def body(verdict: str, *, file: str = "") -> dict[str, object]:

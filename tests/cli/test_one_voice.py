@@ -21,6 +21,7 @@ from fieldsid.cli.help.catalogue import entries
 from fieldsid.cli.trial.parsed import parse
 from fieldsid.cli.voice import shown_in, shown_words, take
 from fieldsid.logs.run import Note
+from fieldsid.records.keys import body_of
 
 NO_RESULT = {"guide"}
 """Commands that show a page, which is no result."""
@@ -170,7 +171,7 @@ def test_json_has_the_same_headline(capsys):
     for as_json in (True, False):
         body = emit({"schema": "x"}, as_json=as_json, render=lambda to: to.print("table"), headline=headline)
         shown = capsys.readouterr().out
-        assert body["headline"] == headline.record()
+        assert body["headline"] == body_of(headline)
         if as_json:
             assert json.loads(shown)["headline"] == {"says": "one is 1.5", "rests_on": "two runs", "next": "sysid status"}
         else:

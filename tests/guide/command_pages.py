@@ -10,7 +10,7 @@ from unittest.mock import patch
 from guide.blocks import console
 from guide.effect_pages import sentence, table
 from guide.examples import EXAMPLES, Example
-from guide.schema_pages import SHAPES, file_of
+from guide.schema_pages import RESULTS, file_of
 from guide.session import Session, tidied
 
 from fieldsid.cli.app import main
@@ -50,7 +50,7 @@ def page(name: str, session: Session) -> str:
         [
             f"# sysid {name}\n\n{sentence(entries()[name].summary)}\n",
             *(f"{_example(e, session)}" for e in EXAMPLES[name]),
-            *([_schemas(name)] if any(c.split()[0] == name for c in SHAPES) else []),
+            *([_schemas(name)] if any(c.split()[0] == name for c in RESULTS) else []),
             "## Help\n",
             *(f"```text\n{help_of(*words.split())}\n```\n" for words in helps),
         ]
@@ -76,5 +76,5 @@ def _example(example: Example, session: Session) -> str:
 
 
 def _schemas(name: str) -> str:
-    links = [f"[{file_of(c)}](../schemas/{file_of(c)})" for c in SHAPES if c.split()[0] == name]
+    links = [f"[{file_of(c)}](../schemas/{file_of(c)})" for c in RESULTS if c.split()[0] == name]
     return f"What `--json` prints: {', '.join(links)}.\n"

@@ -96,8 +96,8 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
             f'sysid compare {JOINT} {CHECK[1]} --min-fit 95 --top 2; echo "exit code $?"',
         ),
         Example(
-            "Two models over the same runs: which follows them best.",
-            f"sysid compare {JOINT} {LAGGED} demo/runs/check_*.parquet",
+            "Two models over the same runs, one extended from the other: how the error fell, and the loop in one picture.",
+            f"sysid compare {JOINT} {LAGGED} demo/runs/check_*.parquet -o demo/figures",
         ),
         Example("Before and after a swap, here of a payload that costs the rudder 18 % of its authority.", SWAPPED),
     ),

@@ -1,4 +1,4 @@
-"""The JSON schemas of every command, made from the declared shapes, and the page that lists them."""
+"""The JSON schemas of every command, made from the records that they return, and the page that lists them."""
 
 from __future__ import annotations
 
@@ -6,36 +6,39 @@ import json
 from functools import cache
 from typing import Any
 
-from guide.shapes import batch, change, diagnosis, fits, gains, live, logs, planning, rest, turning
+from guide.schema_of import schema_of_results
 from jsonschema import Draft202012Validator
-from pydantic import TypeAdapter
+
+from fieldsid.online.look import Look
+from fieldsid.records.keys import Result
+from fieldsid.results import comparisons, diagnoses, effects, extensions, fits, gains, logs, plans, trial, turning
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-SHAPES: dict[str, Any] = {
-    "init": logs.Init,
-    "status": logs.Status,
-    "report": logs.Report,
-    "plan": planning.Plan,
-    "inspect": logs.Inspection,
-    "import": logs.Import,
-    "identify": fits.Identify,
-    "live": live.Live,
-    "compare": fits.Compare | change.CompareModels | change.CompareSeveral,
-    "simulate": logs.Simulation,
-    "diagnose": diagnosis.Diagnose,
-    "extend": fits.Extension | fits.Undone,
-    "history": fits.History,
-    "effects list": rest.Effects,
-    "effects show": rest.ShownEffect,
-    "effects new": rest.NewEffect,
-    "fit": turning.Laws,
-    "turn-radius": turning.TurnRadius,
-    "schedule design": gains.Schedule,
-    "schedule verify": gains.Verification,
-    "schedule export": gains.Export | gains.Patch,
-    "batch": batch.Batch,
-    "demo": rest.Demo,
-    "guide": rest.Contents | rest.Topic,
+RESULTS: dict[str, tuple[type[Result], ...]] = {
+    "init": (trial.Init,),
+    "status": (trial.Status,),
+    "report": (trial.Report,),
+    "plan": (plans.Planned,),
+    "inspect": (logs.Inspected,),
+    "import": (logs.Import,),
+    "identify": (fits.Identified,),
+    "live": (Look,),
+    "compare": (comparisons.Compared, comparisons.BeforeAfter, comparisons.ComparedSeveral, comparisons.AsPromised),
+    "simulate": (logs.Simulation,),
+    "diagnose": (diagnoses.Diagnosed,),
+    "extend": (extensions.Extended, extensions.Undone),
+    "history": (extensions.History,),
+    "effects list": (effects.Catalogue,),
+    "effects show": (effects.ShownEffect,),
+    "effects new": (effects.NewEffect,),
+    "fit": (turning.FittedLaws,),
+    "turn-radius": (turning.TurnRadius,),
+    "schedule design": (gains.Design,),
+    "schedule verify": (gains.Verified,),
+    "schedule export": (gains.Exported, gains.Patched),
+    "batch": (trial.Batch,),
+    "demo": (trial.Demo,),
+    "guide": (trial.Contents, trial.Topic),
 }
 """By command, what it prints with `--json`."""
 INDEX = """# JSON schemas
@@ -57,8 +60,7 @@ def file_of(command: str) -> str:
 @cache
 def schema_of(command: str) -> dict[str, Any]:
     """Return the JSON schema of what a command prints."""
-    made = TypeAdapter(SHAPES[command]).json_schema()
-    return {"$schema": DIALECT, "title": f"sysid {command} --json", **_tidied(made)}
+    return {"$schema": DIALECT, "title": f"sysid {command} --json", **schema_of_results(RESULTS[command])}
 
 
 def ids_of(command: str) -> set[str]:
@@ -68,7 +70,7 @@ def ids_of(command: str) -> set[str]:
 
 def command_of(body: dict[str, Any]) -> str:
     """Return the command that a JSON object is of."""
-    (command,) = (c for c in SHAPES if body["schema"] in ids_of(c))
+    (command,) = (c for c in RESULTS if body["schema"] in ids_of(c))
     return command
 
 
@@ -91,9 +93,9 @@ def pages() -> dict[str, str]:
     """Return the schemas and the page that lists them, by path below `schemas/`."""
     rows = [
         f"| [{c}](../commands/{c.split()[0]}.md) | {', '.join(sorted(ids_of(c)))} | [{file_of(c)}]({file_of(c)}) |"
-        for c in SHAPES
+        for c in RESULTS
     ]
-    schemas = {file_of(c): json.dumps(schema_of(c), indent=1) + "\n" for c in SHAPES}
+    schemas = {file_of(c): json.dumps(schema_of(c), indent=1) + "\n" for c in RESULTS}
     return {"index.md": INDEX + "\n".join(rows) + "\n", **schemas}
 
 
@@ -108,17 +110,6 @@ def _followed(schema: dict[str, Any], root: dict[str, Any]) -> dict[str, Any]:
 
 def _objects(schema: dict[str, Any]) -> list[dict[str, Any]]:
     return [schema, *schema.get("$defs", {}).values()]
-
-
-def _tidied(made: Any) -> Any:
-    """Return a schema without the titles that repeat the keys, and plain alternatives as a list of types."""
-    if isinstance(made, dict):
-        kept = {k: _tidied(v) for k, v in made.items() if not (k == "title" and isinstance(v, str))}
-        alternatives = kept.get("anyOf", [])
-        if alternatives and all(set(a) == {"type"} for a in alternatives):
-            return {"type": [a["type"] for a in alternatives], **{k: v for k, v in kept.items() if k != "anyOf"}}
-        return kept
-    return [_tidied(v) for v in made] if isinstance(made, list) else made
 
 
 def _closed(schema: Any) -> Any:

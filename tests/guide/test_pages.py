@@ -12,7 +12,7 @@ from guide.blocks import commands_of, filled
 from guide.make import GUIDE, WRITTEN
 from guide.pictures import LARGEST, alike
 from guide.sameness import difference, same
-from guide.schema_pages import SHAPES
+from guide.schema_pages import RESULTS
 from guide.session import TOUR
 from ruamel.yaml import YAML
 
@@ -44,13 +44,13 @@ def anchors(path):
 def test_every_effect_and_every_command_has_its_page():
     topics = set(all_pages())
     assert {f"effects/{n}" for n in all_effects()} | {f"commands/{n}" for n in entries()} <= topics
-    assert {f"schemas/{schema_pages.file_of(c).removesuffix('.json')}" for c in SHAPES} <= topics
+    assert {f"schemas/{schema_pages.file_of(c).removesuffix('.json')}" for c in RESULTS} <= topics
 
 
 def test_every_command_that_prints_json_has_its_schema():
     words = [[n, s] if s else [n] for n in entries() for s in command_pages.subcommands(n) or [""]]
     printing = {" ".join(w) for w in words if "--json" in command_pages.help_of(*w)}
-    assert printing == set(SHAPES)
+    assert printing == set(RESULTS)
 
 
 @each_page
@@ -116,7 +116,7 @@ def test_the_list_of_effects_is_what_the_registry_says(run_cli):
 
 
 @pytest.mark.parametrize("name", sorted(schema_pages.pages()))
-def test_a_schema_is_what_the_shapes_declare(name):
+def test_a_schema_is_what_the_records_declare(name):
     was, now = (GUIDE / "schemas" / name).read_text(), schema_pages.pages()[name]
     assert (json.loads(was) == json.loads(now)) if name.endswith(".json") else (was == now), STALE
 

@@ -15,12 +15,12 @@ from truth.physics import Physics
 
 from fieldsid.diagnosis import Diagnosis, diagnose
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
-from fieldsid.diagnosis.diagnose import body_of
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.effects import all_effects
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
+from fieldsid.records.keys import body_of
 from fieldsid.runtime import worker_pool
 
 SEED = 2026

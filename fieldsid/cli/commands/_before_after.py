@@ -16,6 +16,7 @@ from fieldsid.cli.headlines.typed import typed_with
 from fieldsid.errors import UsageError
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import own_kind
+from fieldsid.records.keys import body_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -53,11 +54,14 @@ def before_after(old: Path, new: Path, output: Path | None, *, figures: bool, fo
     twice = _in_both(sides)
     found = [_compared(sides, axis) for axis in axes]
     drawn = [_drawn(c, (old, new), output if figures else None, alone=len(found) == 1, force=force) for c in found]
-    changes = [
-        {**c.record(), "models": [[str(p) for p in s.files[c.axis.value]] for s in sides], "figure": f, "next": _next(c, sides)}
+    from fieldsid.results.comparisons import AxisChange, BeforeAfter
+
+    told = tuple(
+        AxisChange(c, tuple(tuple(map(str, s.files[c.axis.value])) for s in sides), f, _next(c, sides))
         for c, f in zip(found, drawn, strict=True)
-    ]
-    body = {"schema": "fieldsid/compare-models/1", "before": str(old), "after": str(new), "changes": changes}
+    )
+    body = body_of(BeforeAfter(str(old), str(new), told))
+    changes = body["changes"]
     notes = [Note(n.code, f"{c.axis.value}: {n.message}", n.data) for c in found for n in c.notes]
     if twice:
         said = f"both sides were fitted to {', '.join(twice)}: a difference is one of the models alone"

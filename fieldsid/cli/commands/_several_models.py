@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,9 @@ if TYPE_CHECKING:
 
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.comparison.compare import Comparison
+    from fieldsid.extension import Loop
 
+MOST_PLACES = 3
 CLOSE = 1.05
 """A ratio of two models' errors up to which neither is called the better."""
 
@@ -28,7 +31,6 @@ def several_models(
     runs: Sequence[Path],
     skips: Skips,
     *,
-    entry: Callable[[Comparison, str | None, Collection[str]], dict[str, Any]],
     reading: Mapping[str, Any],
     output: Path | None,
     force: bool,
@@ -36,7 +38,7 @@ def several_models(
 ) -> Mapping[str, Any]:
     """Compare several models with the same runs and print which follows them best; return the body.
 
-    entry makes a comparison's part of the body; reading is what `read_runs` takes: mapping, start and end.
+    reading is what `read_runs` takes: mapping, start and end.
     """
     from fieldsid.cli.inputs import read_runs
     from fieldsid.cli.user_effects import check_effects
@@ -51,36 +53,71 @@ def several_models(
     ready = partial(get_ready, "fieldsid.comparison.compare")
     logs = read_runs(runs, check=effects, meanwhile=ready, refused=skips.skip, **reading)
     from fieldsid.comparison.compare import compare
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.comparisons import ComparedSeveral, OneOfSeveral, compared_run
 
     found_of = [compare(m, logs, unfit=skips.skip if i == 0 else None) for i, m in enumerate(models)]
     names = _names(paths)
     fitted_of = [fitted_to(p, m, logs) for p, m in zip(paths, models, strict=True)]
-    figures = _drawn(found_of, names, output, force=force)
-    body = {
-        "schema": "fieldsid/compare-several/1",
-        "axis": models[0].axis,
-        "models": [
-            {
-                "model": str(p),
-                "over_floor": pooled(c.over_noise for c in found),
-                "fitted_to": [c.run for c in found if c.run in fitted],
-                "runs": [entry(c, None, fitted) for c in found],
-            }
-            for p, found, fitted in zip(paths, found_of, fitted_of, strict=True)
-        ],
-        "best": str(paths[min(range(len(paths)), key=lambda i: pooled(c.over_noise for c in found_of[i]))]),
-        "figures": figures,
-        "skipped_runs": skips.records,
-    }
+    loop = _loop(paths, found_of)
+    figures = tuple(_drawn(found_of, names, loop, output, force=force))
+    least = min(range(len(paths)), key=lambda i: pooled(c.over_noise for c in found_of[i]))
+    several = tuple(
+        OneOfSeveral(
+            str(p),
+            pooled(c.over_noise for c in found),
+            tuple(c.run for c in found if c.run in fitted),
+            tuple(compared_run(c, None, fitted) for c in found),
+        )
+        for p, found, fitted in zip(paths, found_of, fitted_of, strict=True)
+    )
+    told = ComparedSeveral(
+        axis=models[0].axis,
+        models=several,
+        best=str(paths[least]),
+        loop=loop,
+        figures=figures,
+        skipped_runs=tuple(skips.records),
+    )
+    body = body_of(told)
     from fieldsid.cli.headlines.models import of_several
     from fieldsid.cli.inputs import files_of
     from fieldsid.records.named_inputs import inputs_of
 
     headline = of_several(body, names, files_of(logs), inputs_of(Path(str(body["best"]))), close=CLOSE)
     notes = left_out(logs, models[0].axis)
-    result = emit(body, as_json=as_json, render=lambda to: _render(to, body, found_of, names), headline=headline, notes=notes)
+    result = emit(
+        body, as_json=as_json, render=lambda to: _render(to, body, found_of, names, loop), headline=headline, notes=notes
+    )
     skips.end(len(found_of[0]))
     return result
+
+
+def _loop(paths: Sequence[Path], found_of: Sequence[Sequence[Comparison]]) -> Loop | None:
+    """Return the loop from one of the models to another that was extended from it, over the longest line of any."""
+    from fieldsid.extension import history_of, loop_of
+
+    lines = {i: history_of(path) for i, path in enumerate(paths)}
+    last = max(lines, key=lambda i: len(lines[i]))
+    places = [path.resolve() for path in paths]
+    first = next((i for i, g in enumerate(lines[last]) if g.path.resolve() in places and i < len(lines[last]) - 1), None)
+    if first is None:
+        return None
+    line = lines[last][first:]
+    return loop_of((replace(line[0], step=None), *line[1:]), found_of[places.index(line[0].path.resolve())], found_of[last])
+
+
+def _render_loop(to: Console, loop: Loop) -> None:
+    """Say where the first model fails and print the error on fitted and unseen runs after each addition."""
+    from fieldsid.cli.voice import shown_words
+
+    places = [f"{shown_words(p.condition)} (rms {p.rms_ratio:.2f} x)" for p in loop.where[:MOST_PLACES]]
+    if places:
+        to.print(f"{loop.before.run}: the {loop.start} fails most at {', '.join(places)}", soft_wrap=True)
+    of = "" if loop.is_noiseless else ", over the noise floor"
+    rows = [(s.added, *s.says) for s in loop.steps]
+    to.print()
+    to.print(table(f"the error step by step{of}", ("", "fitted", "unseen"), rows))
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
@@ -88,17 +125,21 @@ def _names(paths: Sequence[Path]) -> list[str]:
     return [s if stems.count(s) == 1 else str(p) for s, p in zip(stems, paths, strict=True)]
 
 
-def _drawn(found_of: Sequence[Sequence[Comparison]], names: Sequence[str], folder: Path | None, *, force: bool) -> list[str]:
+def _drawn(
+    found_of: Sequence[Sequence[Comparison]], names: Sequence[str], loop: Loop | None, folder: Path | None, *, force: bool
+) -> list[str]:
     if folder is None:
         return []
     from fieldsid.figures.canvas import save
     from fieldsid.figures.kinds import figure_at
+    from fieldsid.figures.loop import figure as loop_figure
     from fieldsid.figures.several import figure
     from fieldsid.runtime.background_tasks import BackgroundTasks
 
-    alone = len(found_of[0]) == 1
+    alone = len(found_of[0]) == 1 and loop is None
     with BackgroundTasks() as own:
-        return [
+        whole = [] if loop is None else [save(loop_figure(loop), figure_at(folder, "loop", is_one=False), force=force, tasks=own)]
+        return [str(path) for path in whole] + [
             str(
                 save(figure(of_run, names), figure_at(folder, f"models_on_{of_run[0].run}", is_one=alone), force=force, tasks=own)
             )
@@ -106,7 +147,12 @@ def _drawn(found_of: Sequence[Sequence[Comparison]], names: Sequence[str], folde
         ]
 
 
-def _render(to: Console, body: Mapping[str, Any], found_of: Sequence[Sequence[Comparison]], names: Sequence[str]) -> None:
+def _render(
+    to: Console, body: Mapping[str, Any], found_of: Sequence[Sequence[Comparison]], names: Sequence[str], loop: Loop | None
+) -> None:
+    if loop is not None:
+        _render_loop(to, loop)
+        to.print()
     runs = [c.run for c in found_of[0]]
     rows = [(run, *(f"{found[i].over_noise:.2f}" for found in found_of)) for i, run in enumerate(runs)]
     to.print(table("error over the noise", ("run", *names), rows))

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from fieldsid.batch.archive import Work
     from fieldsid.batch.trend import Trend
     from fieldsid.models.axis import Axis
+    from fieldsid.results.trial import NotUsed
 
 Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Logs, and folders of logs; runs that were imported, too.")]
 Folder = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder of the table and of each log's answer.")]
@@ -71,6 +72,8 @@ def command(
     from fieldsid.batch.task import Settings, Task, logs_in
     from fieldsid.cli.inputs import mapping_of
     from fieldsid.cli.progress import refuse_closed, refuse_figure
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.trial import Batch
 
     refuse_closed(output)
     drawn = figure or (output / f"trend_{axis.value}.png" if trend else None)
@@ -97,30 +100,23 @@ def command(
 
         save(trend_figure(trends, axis.value), drawn, force=force or figure is None)
     unusable = [row for row in rows if row["status"] != "done"]
-    body = {
-        "schema": "fieldsid/batch/1",
-        "axis": axis.value,
-        "logs": len(tasks),
-        "known_logs": known,
-        "runs": len(rows) - len(unusable),
-        "table": str(parquet),
-        "csv": str(table),
-        "where": where,
-        "seconds": time.monotonic() - begin,
-        "verdicts": dict(Counter(r["verdict"] for r in rows if r.get("verdict")).most_common()),
-        "effects": dict(Counter(r["effects"] for r in rows if r.get("effects")).most_common()),
-        "skipped_runs": [
-            {
-                "run": r["run"],
-                "file": r["log"],
-                "status": r["status"],
-                **{k: str(r.get(k) or "") for k in ("what", "found", "hint")},
-            }
-            for r in unusable
-        ],
-        "trend": [_of_trend(t) for t in trends],
-        "figure": str(drawn) if drawn is not None and trends else None,
-    }
+    body = body_of(
+        Batch(
+            axis=axis,
+            logs=len(tasks),
+            known_logs=known,
+            runs=len(rows) - len(unusable),
+            table=str(parquet),
+            csv=str(table),
+            where=where,
+            seconds=time.monotonic() - begin,
+            verdicts=dict(Counter(r["verdict"] for r in rows if r.get("verdict")).most_common()),
+            effects=dict(Counter(r["effects"] for r in rows if r.get("effects")).most_common()),
+            skipped_runs=tuple(_not_used(r) for r in unusable),
+            trend=trends,
+            figure=str(drawn) if drawn is not None and trends else None,
+        )
+    )
     from fieldsid.cli.headlines.trial import of_batch
 
     result = emit(body, as_json=as_json, render=lambda to: _render(to, body), headline=of_batch(body, trend=trend))
@@ -169,24 +165,11 @@ def _trends(rows: Sequence[Mapping[str, Any]], axis: Axis) -> tuple[Trend, ...]:
     return trends_of([dict(r) for r in rows], axis)
 
 
-def _of_trend(trend: Trend) -> dict[str, Any]:
-    return {
-        "parameter": trend.name,
-        "runs": trend.values.size,
-        "speed_m_s": trend.speed,
-        "scatter": trend.scatter,
-        "changes": [
-            {
-                "run": c.run,
-                "start_utc": c.start_utc,
-                "before": c.before,
-                "after": c.after,
-                "std_error": c.std_error,
-                "share": c.share,
-            }
-            for c in trend.changes
-        ],
-    }
+def _not_used(row: Mapping[str, Any]) -> NotUsed:
+    from fieldsid.results.trial import NotUsed
+
+    what, found, hint = (str(row.get(k) or "") for k in ("what", "found", "hint"))
+    return NotUsed(row["run"], row["log"], what, found, hint, row["status"])
 
 
 def _render(to: Console, body: Mapping[str, Any]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,12 +21,14 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from fieldsid.comparison.compare import Channel, Comparison
+    from fieldsid.comparison.compare import Comparison
     from fieldsid.models.model import Model
 
 MOST_SHOWN = 6
 
-First = Annotated[Path, typer.Argument(metavar="MODEL", help="A model file, or the folder of the models before a swap.")]
+First = Annotated[
+    Path, typer.Argument(metavar="MODEL", help="A model file, the folder of the models before a swap, or gains that were flown.")
+]
 Others = Annotated[
     list[Path],
     typer.Argument(metavar="RUN...", help="Runs or log files, more models before them; or the model or folder after a swap."),
@@ -62,6 +64,8 @@ def command(
     made. The error of angle and rate is divided by phase, fin angle, rate, speed, heading, side, depth and time, that of the
     one further above its noise first. With `-o` one figure per run is drawn.
 
+    Gains and the runs flown with them: whether each step of the goal went as `schedule verify` said.
+
     Two models, or two folders of models, and no run: what a swap has changed beyond the models' errors at the speeds that both
     were flown at, and what that does to the gains and the turning radius. Several models and runs: which follows them best.
 
@@ -72,11 +76,17 @@ def command(
     from fieldsid.cli.commands._before_after import before_after, is_side
 
     refuse_place(output, force=force)
+    from fieldsid.logs.unknown_file import own_kind
+
+    if own_kind(model) == "schedule":
+        from fieldsid.cli.commands._as_promised import as_promised
+
+        return as_promised(model, runs, {"mapping": mapping, "start": start, "end": end}, as_json=as_json)
     sides = [p for p in (model, *runs) if is_side(p)]
     if len(sides) == len(runs) + 1 == 2:
         _refuse_part(start, end, mapping, min_fit)
         return before_after(sides[0], sides[1], output, figures=figures, force=force, as_json=as_json)
-    from fieldsid.cli.inputs import read_runs, refuse_swapped
+    from fieldsid.cli.inputs import model_first, read_runs
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.models.model import load_model
@@ -94,26 +104,22 @@ def command(
             force=force,
             as_json=as_json,
         )
-    refuse_swapped("compare", model, runs)
+    model, runs = model_first(model, runs)
     known = load_model(model)
     skips, ready = Skips(), partial(get_ready, "fieldsid.comparison.compare")
     effects = partial(check_effects, [(model, known)])
     logs = read_runs(runs, mapping=mapping, start=start, end=end, check=effects, meanwhile=ready, refused=skips.skip)
     from fieldsid.comparison.compare import compare
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.comparisons import Compared, compared_run
 
     found = compare(known, logs, unfit=skips.skip)
     drawn = _drawn(known, model, found, output if figures else None, context, force=force)
     fitted = fitted_to(model, known, logs)
-    entries = [_entry(c, figure, fitted) for c, figure in zip(found, drawn, strict=True)]
+    compared = tuple(compared_run(c, figure, fitted) for c, figure in zip(found, drawn, strict=True))
     notes = left_out(logs, known.axis)
-    body = {
-        "schema": "fieldsid/compare/1",
-        "model": str(model),
-        "axis": known.axis,
-        "runs": entries,
-        "skipped_runs": skips.records,
-        "warnings": [{"code": n.code, "message": n.message} for n in notes],
-    }
+    body = body_of(Compared(model=str(model), axis=known.axis, runs=compared, warnings=notes, skipped_runs=tuple(skips.records)))
+    entries = body["runs"]
     from fieldsid.cli.headlines.models import of_compare
     from fieldsid.cli.inputs import files_of
     from fieldsid.records.named_inputs import inputs_of
@@ -152,7 +158,7 @@ def _several(
         found = ", ".join(str(p) for p in (*models, *runs))
         raise UsageError("several models are compared over runs", found=found, hint="sysid compare M1.yaml M2.yaml RUN")
     reading = {"mapping": mapping, "start": start, "end": end}
-    body = several_models(models, runs, Skips(), entry=_entry, reading=reading, output=output, force=force, as_json=as_json)
+    body = several_models(models, runs, Skips(), reading=reading, output=output, force=force, as_json=as_json)
     for m in body["models"]:
         _gate(m["runs"], min_fit)
     return body
@@ -189,59 +195,6 @@ def _drawn(
             )
             for c in found
         ]
-
-
-def _entry(c: Comparison, figure: str | None, fitted: Collection[str]) -> dict[str, Any]:
-    return {
-        "run": c.run,
-        "fitted_to": c.run in fitted,
-        "speed_m_s": c.shown.record.speed,
-        "angle_rms_rad": c.merit.angle_rms,
-        "rate_rms_rad_s": c.merit.rate_rms,
-        "angle_fit_percent": c.merit.angle_fit,
-        "rate_fit_percent": c.merit.rate_fit,
-        "noise_floor": {"angle_rad": c.floor.angle, "rate_rad_s": c.floor.rate},
-        "command_times": _as_flown(c, "command_between_samples"),
-        "own_speed": _as_flown(c, "own_speed"),
-        "over_noise": c.over_noise,
-        "over_floor": {channel.name: channel.over_floor for channel in c.channels},
-        "judged_by": c.leading.name,
-        **_fault(c.leading, c),
-        "failing": [{"channel": channel.name} | _fault(channel, c) for channel in c.failing],
-        "moves_with": [{"signal": m.signal, "explained": m.explained} for m in c.moves_with if c.failing],
-        "figure": figure,
-    }
-
-
-def _fault(c: Channel, of: Comparison) -> dict[str, Any]:
-    """Return how well a channel is followed and, where it fails, where; one that is down to its noise fails nowhere."""
-    where, worst = (c.where, c.worst) if c in of.failing else ((), ())
-    return {
-        "theil": c.metrics.theil,
-        "r2": c.metrics.r2,
-        "whiteness_p": c.metrics.whiteness_p,
-        "where": [
-            {
-                "condition": p.condition,
-                "share_of_error": p.share_of_error,
-                "share_of_samples": p.share_of_samples,
-                "rms_ratio": p.rms_ratio,
-                "t_start_s": p.start_s,
-                "t_end_s": p.end_s,
-            }
-            for p in where
-        ],
-        "worst": [{"t_start_s": s.start_s, "t_end_s": s.end_s, "share_of_error": s.share_of_error} for s in worst],
-    }
-
-
-def _as_flown(c: Comparison, code: str) -> dict[str, Any] | None:
-    """Return what a run was taken to have done otherwise than its log has it, and the errors with all of that as logged."""
-    note = next((n for n in c.shown.notes if n.code == code), None)
-    if note is None or c.shown.as_logged is None:
-        return None
-    angle, rate = c.shown.as_logged
-    return {**note.data, "says": note.message, "as_logged": {"angle_rms_rad": angle, "rate_rms_rad_s": rate}}
 
 
 def _render(to: Console, entries: Sequence[Mapping[str, Any]], top: int) -> None:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from fieldsid.demo.trial import Trial
     from fieldsid.fitting.jit_warmup import Warmup
     from fieldsid.planning.design.leg import Leg
+    from fieldsid.results.trial import Step as Taken
 
 HIDDEN = "servo_lag"
 FOLDER = "sysid-demo"
@@ -79,6 +80,8 @@ def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, for
     from fieldsid.demo.trial import make_trial
     from fieldsid.demo.vehicle import hidden_vehicle
     from fieldsid.planning.output.plan_file import load_plan
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.trial import Demo, Hidden
 
     folder = _folder(output, force=force)
     vehicle = hidden_vehicle(effect)
@@ -94,16 +97,17 @@ def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, for
         for step in (s for s in STEPS if vehicle.axis in s.axes):
             if step.possible(known):
                 done.append(_taken(len(done) + 1, step, known, session, force=force, told=told))
-                known |= step.learns(done[-1]["result"])
-    return {
-        "schema": "fieldsid/demo/1",
-        "folder": str(folder),
-        "hidden": {"effect": effect, "axis": vehicle.axis, "values": dict(vehicle.values)},
-        "named": known["effects"].split(",") if "effects" in known else [],
-        "steps": done,
-        "files": sorted(str(p) for p in folder.rglob("*") if p.is_file()),
-        "seconds": perf_counter() - began,
-    }
+                known |= step.learns(done[-1].result or {})
+    return body_of(
+        Demo(
+            folder=str(folder),
+            hidden=Hidden(effect, vehicle.axis, vehicle.values),
+            named=tuple(known["effects"].split(",")) if "effects" in known else (),
+            steps=tuple(done),
+            files=tuple(sorted(str(p) for p in folder.rglob("*") if p.is_file())),
+            seconds=perf_counter() - began,
+        )
+    )
 
 
 def _compile_loops() -> None:
@@ -126,8 +130,9 @@ def _folder(asked: Path | None, *, force: bool) -> Path:
     return asked
 
 
-def _taken(place: int, step: Step, known: Mapping[str, str], session: Session, *, force: bool, told: str) -> dict[str, Any]:
+def _taken(place: int, step: Step, known: Mapping[str, str], session: Session, *, force: bool, told: str) -> Taken:
     from fieldsid.demo.steps import expanded, words_of
+    from fieldsid.results.trial import Step as Taken
 
     words = words_of(step.line, known)
     if told == VERBOSE:
@@ -143,7 +148,7 @@ def _taken(place: int, step: Step, known: Mapping[str, str], session: Session, *
     if told == VERBOSE:
         sys.stdout.write(f"\n{fill(meaning, WIDTH, initial_indent='=> ', subsequent_indent='   ', break_on_hyphens=False)}\n")
         sys.stdout.flush()
-    return {"command": "sysid " + " ".join(words), "seconds": perf_counter() - began, "means": meaning, "result": result}
+    return Taken("sysid " + " ".join(words), perf_counter() - began, meaning, result)
 
 
 @contextmanager

@@ -3,29 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, table
+from fieldsid.cli.console import emit, print_page, table
 from fieldsid.cli.options import ExcitedAxis, FigureFile, Force, JsonFlag, MappingFile, OutputFile, RunFiles, ValidateRuns
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, refuse_figure, trying
 from fieldsid.cli.session import tasks_of
-from fieldsid.cli.voice import shown_in, shown_words
+from fieldsid.cli.voice import angles
+from fieldsid.display import page_of
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fieldsid.diagnosis import Diagnosis, Errors, Pair
+    from fieldsid.diagnosis import Diagnosis
     from fieldsid.logs.run import Run
     from fieldsid.models.axis import Axis
     from fieldsid.models.model import Model
-
-MOST_PLACES, MOST_SPOKEN = 5, 3
+    from fieldsid.results.diagnoses import Applied, Diagnosed
 
 KnownModel = Annotated[
     Path | None, typer.Option("--model", metavar="MODEL", help="A model whose effects are known already.", show_default=False)
@@ -74,6 +74,8 @@ def command(
     axis = known.axis if known else axis or axis_excited(training)
     from fieldsid.diagnosis import diagnose
     from fieldsid.models.definition import NONE
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.diagnoses import Diagnosed
 
     effects = known.effects if known else ()
     with compiling_first(context), trying("diagnosing") as report:
@@ -81,12 +83,21 @@ def command(
         found = diagnose(training, axis, unseen, known=effects, own=own, report=report, thorough=thorough, unfit=skips.skip)
     training, unseen = skips.left_of(training), skips.left_of(unseen)
     inputs = [*files_of([*training, *unseen]), *([model] if model else [])]
-    body = _body(found, [r.name for r in training], [r.name for r in unseen], known, model) | {"skipped_runs": skips.records}
-    body |= {"file": _saved(body, output, inputs, force=force), "figure": _drawn(found, figure, context, force=force)}
-    body |= {"applied": _applied(context, found, (known, model), training, unseen, force=force) if apply else []}
+    told = Diagnosed(
+        found=found,
+        runs=tuple(r.name for r in training),
+        validation_runs=tuple(r.name for r in unseen),
+        model=None if model is None else str(model),
+        known=() if known is None else known.effects,
+        skipped_runs=tuple(skips.records),
+    )
+    told = replace(told, file=_saved(told, output, inputs, force=force), figure=_drawn(found, figure, context, force=force))
+    if apply:
+        told = replace(told, applied=_applied(context, found, (known, model), training, unseen, force=force))
+    body = body_of(told)
     from fieldsid.cli.headlines.missing import Searched, of_diagnosis
 
-    headline = of_diagnosis(body, Searched(files_of(training), files_of(unseen), model, mapping, thorough))
+    headline = of_diagnosis(body, Searched(files_of(training), files_of(unseen), model, thorough))
     result = emit(body, as_json=as_json, render=lambda to: _render(to, found, body), headline=headline, notes=found.notes)
     skips.end(len(training) + len(unseen))
     return result
@@ -105,25 +116,13 @@ def _known(path: Path | None, axis: Axis | None) -> Model | None:
     return model
 
 
-def _body(found: Diagnosis, runs: Sequence[str], unseen: Sequence[str], known: Model | None, path: Path | None) -> dict[str, Any]:
-    from fieldsid.diagnosis import body_of
-
-    return {
-        "schema": "fieldsid/diagnose/1",
-        **body_of(found),
-        "runs": list(runs),
-        "validation_runs": list(unseen),
-        "model": None if path is None else str(path),
-        "known": [] if known is None else list(known.effects),
-    }
-
-
-def _saved(body: Mapping[str, Any], path: Path | None, inputs: Sequence[Path], *, force: bool) -> str | None:
+def _saved(told: Diagnosed, path: Path | None, inputs: Sequence[Path], *, force: bool) -> str | None:
     if path is None:
         return None
     from fieldsid.artifacts import save_record
+    from fieldsid.records.keys import body_of
 
-    kept = {k: v for k, v in body.items() if k != "schema"}
+    kept = {k: v for k, v in body_of(told).items() if k not in ("schema", "applied", "file", "figure")}
     return str(save_record(path, "fieldsid/diagnosis/1", kept, inputs=inputs, force=force))
 
 
@@ -139,36 +138,30 @@ def _drawn(found: Diagnosis, path: Path | None, context: typer.Context, *, force
 def _applied(
     context: typer.Context, found: Diagnosis, model: tuple[Model | None, Path | None], training: Sequence[Run],
     unseen: Sequence[Run], *, force: bool,
-) -> list[dict[str, Any]]:  # fmt: skip
+) -> tuple[Applied, ...]:  # fmt: skip
     """Extend the model diagnosed by each named effect in turn, write each model, and return what each step has changed."""
-    from fieldsid.artifacts import check_output
+    from fieldsid.cli.commands.extend import step_files
     from fieldsid.cli.headlines.missing import MODELS
     from fieldsid.cli.inputs import files_of
-    from fieldsid.extension import extend_in_steps, gain_body, save_extension
+    from fieldsid.extension import extend_in_steps, save_steps
     from fieldsid.models.model import save_model
+    from fieldsid.results.diagnoses import Applied
 
     known, path = model
     if not found.effects:
-        return []
+        return ()
     if known is None or path is None:
         stem = "joint" if len(training) > 1 else training[0].name
         known, path = found.base_model, Path(MODELS) / f"{stem}_{found.axis.value}.yaml"
         if not path.exists() or force:
             save_model(known, path, inputs=files_of(training), force=force)
-    targets, last = list[Path](), path
-    for name in found.effects:
-        last = last.with_name(f"{last.stem}+{name}.yaml")
-        check_output(last, force=force)
-        targets.append(last)
+    targets = step_files(path, found.effects, force=force)
     with compiling_first(context), trying("adding what was found") as report:
         steps = extend_in_steps(known, found.effects, training, unseen, report=report)
-    parents = [path, *targets]
-    for step, target, parent in zip(steps, targets, parents, strict=False):
-        save_extension(step, target, parent=parent, training=training, validation=unseen, force=force)
-    return [
-        {"effect": name, "model": str(target), "pays": step.pays, **gain_body(step.gain)}
-        for name, step, target in zip(found.effects, steps, targets, strict=True)
-    ]
+    save_steps(steps, targets, path, (training, unseen), force=force)
+    return tuple(
+        Applied(step.gain, name, str(target), step.pays) for name, step, target in zip(found.effects, steps, targets, strict=True)
+    )
 
 
 def _render_applied(to: Console, applied: Sequence[Mapping[str, Any]]) -> None:
@@ -190,97 +183,8 @@ def _render_applied(to: Console, applied: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
-    from fieldsid.rounding import number
-
-    to.print(_candidates(found))
-    floor = found.noise_floor
-    factor, angle = shown_in("rad")
-    noise = f"{number(factor * floor.angle, 2)} {angle} and {number(factor * floor.rate, 2)} {angle}/s"
-    of = f"in {angle} and {angle}/s, in logs with next to no noise" if found.noiseless else f"over the noise floor, {noise}"
-    to.print(f"fitted, unseen: free-run error of those runs {of}; evidence: log, over the first row")
-    _render_words(to, found)
-    _render_where(to, found)
-    _render_skipped(to, found.skipped)
-    _render_maneuver(to, found)
+    print_page(to, page_of(found, angles()))
     _render_applied(to, body["applied"])
     for key in ("file", "figure"):
         if body[key]:
             to.print(f"{key}: {body[key]}", soft_wrap=True)
-
-
-def _candidates(found: Diagnosis) -> Any:
-    from fieldsid.rounding import probability
-
-    rows = [("as it is", "", *_errors(found, found.base), "", "")]
-    rows += [
-        (
-            c.effect.replace("+", " +"),
-            probability(c.probability),
-            *_errors(found, c.errors),
-            "worse" if c.worse else f"{100 * c.explained:.0f} %",
-            f"{c.score:+z.0f}",
-        )
-        for c in found.candidates
-    ]
-    return table("", ("effect", "prob.", "fitted", "unseen", "explained", "evidence"), rows)
-
-
-def _errors(found: Diagnosis, errors: Pair) -> tuple[str, str]:
-    """Return the errors on fitted and on unseen runs: over the noise floor, or in their units without noise."""
-    from fieldsid.cli.headlines.words import times
-    from fieldsid.rounding import number
-
-    def said(e: Errors) -> str:
-        if not found.noiseless:
-            return times(e.over(found.noise_floor))
-        factor = shown_in("rad")[0]
-        return ", ".join(number(factor * rms, 2) for rms in (e.angle_rms_rad, e.rate_rms_rad_s) if isfinite(rms))
-
-    return said(errors.train), said(errors.validation)
-
-
-def _render_words(to: Console, found: Diagnosis) -> None:
-    """Say what each named effect does, what it may be confused with, and the evidence for what is not in the first line."""
-    from fieldsid.diagnosis import what_it_does
-    from fieldsid.diagnosis.thresholds import RIVAL_PROBABILITY_RATIO
-
-    if found.verdict in ("sufficient", "disturbed"):
-        return
-    to.print()
-    for name in found.effects:
-        to.print(shown_words(f"{name}: {what_it_does(name, found.model.values)}"))
-    for i, c in enumerate(found.candidates[:MOST_SPOKEN]):
-        if i and c.probability < RIVAL_PROBABILITY_RATIO:
-            continue
-        if found.verdict != "effect" or i:
-            to.print(shown_words(f"{c.effect}: {c.evidence}"))
-        if c.confusable_with:
-            to.print(shown_words(f"on these data nearly as good as {c.effect}: {', '.join(c.confusable_with)}"))
-
-
-def _render_where(to: Console, found: Diagnosis) -> None:
-    rows = [
-        (shown_words(p.condition), f"{100 * p.share_of_error:.0f} %", f"{p.rms_ratio:.2f}", f"{p.start_s:.1f} .. {p.end_s:.1f}")
-        for p in found.where[:MOST_PLACES]
-    ]
-    to.print()
-    to.print(table("where the model as it is fails", ("", "of error", "rms ratio", "worst, s"), rows))
-
-
-def _render_skipped(to: Console, skipped: Mapping[str, str]) -> None:
-    if not skipped:
-        return
-    why: dict[str, list[str]] = {}
-    for name, reason in skipped.items():
-        why.setdefault(reason, []).append(name)
-    to.print()
-    for reason, names in why.items():
-        to.print(f"not tried: {', '.join(names)}: {reason}")
-
-
-def _render_maneuver(to: Console, found: Diagnosis) -> None:
-    fly = found.next_maneuver
-    if fly:
-        to.print()
-        note = f"; {fly['note']}" if "note" in fly else ""
-        to.print(shown_words(f"what would settle it: {fly['maneuver']}, {fly['why']}{note}"))

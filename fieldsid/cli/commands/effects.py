@@ -21,7 +21,8 @@ from fieldsid.models.axis import Axis
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fieldsid.models.effect import Coefficient, Effect, Variant
+    from fieldsid.models.effect import Effect, Variant
+    from fieldsid.results.effects import Form
 
 command = typer.Typer(help="List the physical effects, show one, start one of your own.\n\nExample: sysid effects show servo_lag")
 
@@ -46,9 +47,11 @@ def list_(axis: OneAxis = None, as_json: JsonFlag = False) -> Mapping[str, Any]:
     Example: sysid effects list --axis yaw
     """
     from fieldsid.effects import all_effects
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.effects import Catalogue, Described
 
     known = all_effects(axis).values()
-    body = {"schema": "fieldsid/effects/1", "axis": axis, "effects": [_described(e) for e in known]}
+    body = body_of(Catalogue(axis, tuple(map(Described, known))))
     return emit(body, as_json=as_json, render=lambda to: _render_list(to, known), headline=of_catalogue(body))
 
 
@@ -59,9 +62,11 @@ def show(name: EffectName, as_json: JsonFlag = False) -> Mapping[str, Any]:
     Example: sysid effects show servo_lag
     """
     from fieldsid.effects import pick_effect
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.effects import Described, ShownEffect
 
     effect = pick_effect(name)
-    body = {"schema": "fieldsid/effect/1", **_described(effect)}
+    body = body_of(ShownEffect(Described(effect)))
     return emit(body, as_json=as_json, render=lambda to: _render_one(to, effect), headline=of_effect(body))
 
 
@@ -76,13 +81,15 @@ def new(
     Example: sysid effects new tether_drag --axis yaw
     """
     from fieldsid.artifacts import write_text
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.effects import NewEffect
 
     path = output or Path(OWN_EFFECTS) / f"{name}.yaml"
     _refuse_name(name, path)
     refuse_existing(path, force=force)
     write_text(path, _started(name, axis, path), force=force)
     load_own_effects()  # what was broken in a file that is replaced is so no more
-    body = {"schema": "fieldsid/new-effect/1", "name": name, "axis": axis, "file": str(path)}
+    body = body_of(NewEffect(name, axis, str(path)))
     headline = of_new_effect(body, _look_at(path, name))
     return emit(body, as_json=as_json, render=lambda to: to.print(f"effect: {path}", soft_wrap=True), headline=headline)
 
@@ -140,44 +147,6 @@ def _changes(name: str, axis: Axis) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _described(effect: Effect) -> dict[str, Any]:
-    return {
-        "name": effect.name,
-        "says": effect.says,
-        "stage": effect.stage,
-        "axes": effect.axes,
-        "equation": effect.equation,
-        "coefficients": [_coefficient(c) for c in effect.coefficients],
-        "forms": [_form(effect, f) for f in effect.variants],
-        "needs": effect.needs,
-        "extra_states": effect.extra_states,
-        "telltale": effect.telltale,
-        "excited_by": effect.excited_by,
-        "mistaken_for": effect.mistaken_for,
-        "source": effect.source,
-        "origin": effect.origin,
-    }
-
-
-def _axes(effect: Effect, form: Variant) -> list[Axis]:
-    return [a for a in effect.axes if a in form.axes]
-
-
-def _form(effect: Effect, form: Variant) -> dict[str, Any]:
-    from fieldsid.models.effect import with_variant
-
-    return {
-        "says": form.says,
-        "axes": _axes(effect, form),
-        "needs": with_variant(effect, form).needs,
-        "coefficients": [_coefficient(c) for c in form.coefficients],
-    }
-
-
-def _coefficient(c: Coefficient) -> dict[str, Any]:
-    return {"name": c.name, "unit": c.unit, "low": c.low, "high": c.high, "start": c.start, "per_run": c.per_run, "says": c.says}
-
-
 def _render_list(to: Console, known: Iterable[Effect]) -> None:
     from fieldsid.models.effect import Stage
 
@@ -191,21 +160,24 @@ def _render_list(to: Console, known: Iterable[Effect]) -> None:
             to.print(f"{effect.name} is not built in: {effect.origin}", soft_wrap=True)
 
 
-def _form_in_words(effect: Effect, form: Variant) -> str:
+def _form_in_words(effect: Effect, form: Form, asked: Variant) -> str:
     """Return what a form says, with its axes and signals where they are not the effect's."""
-    axes = _axes(effect, form)
-    own = [*([] if len(axes) == len(effect.axes) else axes), *(f"needs {role}" for role in form.needs)]
+    own = [*([] if len(form.axes) == len(effect.axes) else form.axes), *(f"needs {role}" for role in asked.needs)]
     return form.says + (f" ({', '.join(own)})" if own else "")
 
 
 def _render_one(to: Console, effect: Effect) -> None:
+    from fieldsid.results.effects import Described
     from fieldsid.rounding import in_unit
 
     facts = [
         ("stage", f"{effect.stage}, {' and '.join(effect.axes)}"),
         ("equation", effect.equation),
         ("telltale", effect.telltale),
-        *(("or in the form", _form_in_words(effect, f)) for f in effect.variants),
+        *(
+            ("or in the form", _form_in_words(effect, *both))
+            for both in zip(Described(effect).forms, effect.variants, strict=True)
+        ),
         ("excited by", ", ".join(effect.excited_by)),
         ("mistaken for", ", ".join(effect.mistaken_for) or "-"),
         ("log must have", ", ".join(effect.needs) or "nothing more"),

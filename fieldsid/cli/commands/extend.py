@@ -6,31 +6,31 @@ import re
 import shutil
 from collections.abc import Mapping, Sequence
 from functools import partial
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, table
+from fieldsid.cli.console import emit, print_page, table
 from fieldsid.cli.headlines.missing import left_says, of_extension, of_undoing
 from fieldsid.cli.headlines.typed import pasted, repeated
 from fieldsid.cli.headlines.words import used
 from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, ValidateRuns
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, trying
 from fieldsid.cli.skipped_logs import Skips
-from fieldsid.cli.voice import shown_in
+from fieldsid.cli.voice import angles, shown_in
 from fieldsid.comparison.sufficient import is_noise
 from fieldsid.errors import ArtifactError, UsageError
+from fieldsid.page import Page
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from fieldsid.extension import Extension
-    from fieldsid.models.effect import Coefficient
+    from fieldsid.extension.extend import Gain
     from fieldsid.models.model import Model
+    from fieldsid.results.extensions import AddedCoefficient, Extended, LeftOver
 
-SCHEMA = "fieldsid/extend/1"
 MUCH, SMALL = 100.0, 1e-3
 """A standard error so many times the value, or the smallest value that counts, is no knowledge."""
 
@@ -62,7 +62,8 @@ def command(
 
     Before and after are both refitted to the runs and judged by their free run on the `--validate` runs; without them a part of
     the runs is held back. The extended model is written to its parent's folder, or to `-o FILE`, where the error on unseen runs
-    falls, or with `--keep`. `--undo` gives the parent back; `sysid history MODEL` shows the whole line.
+    falls, or with `--keep`; of several effects each is a step, with a model of its own. `--undo` gives the parent back;
+    `sysid history MODEL` shows the whole line.
 
     Example: sysid extend model.yaml runs/pulses_*.parquet --add servo_lag --validate runs/zigzag.parquet
     """
@@ -72,11 +73,16 @@ def command(
                 "`--undo` takes the model alone", found="runs or options beside it", hint=f"sysid extend {model} --undo"
             )
         return _undone(model, output, force=force, as_json=as_json)
+    from fieldsid.records.keys import body_of
+
     skips = Skips()
-    body, notes = _extended(
+    told = _extended(
         context, model, runs or [], _names(add), validate or [], skips, keep=keep, mapping=mapping, output=output, force=force
     )
-    result = emit(body, as_json=as_json, render=lambda to: _render(to, body), headline=of_extension(body), notes=notes)
+    body = body_of(told)
+    result = emit(
+        body, as_json=as_json, render=lambda to: _render(to, told.gain, body), headline=of_extension(body), notes=told.notes
+    )
     skips.end(len(runs or []) + len(validate or []) - len(skips.records))
     return result
 
@@ -98,30 +104,59 @@ def _extended(
     mapping: Path | None,
     output: Path | None,
     force: bool,
-) -> tuple[dict[str, Any], Sequence[Any]]:
-    from fieldsid.cli.inputs import read_groups, refuse_swapped
+) -> Extended:
+    from fieldsid.cli.inputs import model_first, read_groups
     from fieldsid.models.model import load_model
 
-    refuse_swapped("extend", path, runs)
+    path, runs = model_first(path, runs)
     if not runs:
         raise UsageError(
             "there is no run to fit to", found=f"sysid extend {path}", hint=f"sysid extend {path} RUN... --add EFFECT"
         )
-    target = output or path.with_name(f"{path.stem}+{'+'.join(dict.fromkeys(names))}.yaml")
-    known = load_model(path)
-    refuse_existing(target, force=force)
+    known, names = load_model(path), list(dict.fromkeys(names))
+    targets = step_files(path, names, output, force=force) if names else []
     check, ready = partial(_check, path, known, names), partial(get_ready, "fieldsid.extension")
     training, unseen = read_groups([runs, validate], mapping=mapping, check=check, meanwhile=ready, refused=skips.skip)
-    from fieldsid.extension import extend, save_extension
+    from fieldsid.extension import extend_in_steps, save_steps, whole_of
+    from fieldsid.extension.lineage import kept_by
+    from fieldsid.records.named_inputs import sha256_of
+    from fieldsid.results.extensions import Extended, MadeFrom
 
     with compiling_first(context), trying("extending") as report:
-        found = extend(known, names, training, unseen, report=report, unfit=skips.skip)
+        steps = extend_in_steps(known, names, training, unseen, report=report, unfit=skips.skip)
+    found = whole_of(steps)
     training, unseen = skips.left_of(training), skips.left_of(unseen)
     kept = found.pays or keep
     if kept:
-        save_extension(found, target, parent=path, training=training, validation=unseen, force=force)
-    body = _body(found, known, path, target if kept else None) | {"skipped_runs": skips.records}
-    return body | _left(found, body, runs, validate, mapping), found.notes
+        save_steps(steps, targets, path, (training, unseen), force=force)
+    model = targets[-1] if kept else path
+    left, next_ = _left(found, model, known, runs, validate, kept=kept)
+    return Extended(
+        gain=found.gain,
+        axis=known.axis,
+        log_evidence=found.evidence,
+        pays=found.pays,
+        kept=kept,
+        kept_by=kept_by(found) if kept else None,
+        model=str(model),
+        effects=found.model.effects if kept else known.effects,
+        parent=MadeFrom(str(path), sha256_of(path)),
+        coefficients=_coefficients(found),
+        notes=found.notes,
+        left=left,
+        next=next_,
+        skipped_runs=tuple(skips.records),
+    )
+
+
+def step_files(parent: Path, effects: Sequence[str], last: Path | None = None, *, force: bool = False) -> list[Path]:
+    """Return the file of the model after each of some effects, beside the last or the parent; refuses those that exist."""
+    stems = [f"{parent.stem}+{'+'.join(effects[: i + 1])}" for i in range(len(effects))]
+    files = [(last or parent).with_name(f"{stem}.yaml") for stem in stems]
+    files[-1] = last or files[-1]
+    for file in files:
+        refuse_existing(file, force=force)
+    return files
 
 
 def _check(path: Path, model: Model, names: Sequence[str]) -> None:
@@ -132,52 +167,40 @@ def _check(path: Path, model: Model, names: Sequence[str]) -> None:
     new_effects(model, names)
 
 
-def _left(found: Extension, body: Mapping[str, Any], runs: Sequence[Path], validate: Sequence[Path], mapping: Path | None) -> Any:
+def _left(
+    found: Extension, model: Path, parent: Model, runs: Sequence[Path], validate: Sequence[Path], *, kept: bool
+) -> tuple[LeftOver, str]:
     """Return what the model as it now is leaves, over the noise floor, and the command that goes on from there."""
-    fitted, unseen = found.gain.left(kept=body["kept"])
-    more = not all(is_noise(error) for error in (fitted, unseen))
-    if more:
-        reading = ("--mapping", mapping) if mapping is not None else ()
-        judged = repeated("--validate", validate)
-        longer = () if body["kept"] else ("--thorough",)  # what was named by the usual search has not paid
-        command = pasted("diagnose", runs, "--axis", body["axis"], "--model", body["model"], *judged, *reading, *longer)
-    else:
-        command = used(body["axis"], body["model"])
-    return {"left": {"fitted": fitted, "unseen": unseen, "more_than_noise": more}, "next": command}
+    from fieldsid.results.extensions import LeftOver
+
+    fitted, unseen = found.gain.left(kept=kept)
+    left = LeftOver(fitted, unseen, not all(is_noise(error) for error in (fitted, unseen)))
+    if not left.more_than_noise:
+        return left, used(parent.axis.value, str(model))
+    judged = repeated("--validate", validate)
+    longer = () if kept else ("--thorough",)  # what was named by the usual search has not paid
+    return left, pasted("diagnose", runs, "--axis", parent.axis.value, "--model", str(model), *judged, *longer)
 
 
-def _body(found: Extension, parent: Model, path: Path, written: Path | None) -> dict[str, Any]:
+def _coefficients(found: Extension) -> dict[str, AddedCoefficient]:
     from fieldsid.effects import pick_effect
-    from fieldsid.extension import gain_body, kept_by
     from fieldsid.models.effect import as_fitted
-    from fieldsid.records.named_inputs import sha256_of
+    from fieldsid.results.extensions import AddedCoefficient
 
-    new = [c for n in found.gain.added for c in as_fitted(pick_effect(n), found.model.values).shared]
+    model = found.model
     return {
-        "schema": SCHEMA,
-        "axis": parent.axis.value,
-        **gain_body(found.gain),
-        "log_evidence": found.evidence,
-        "pays": found.pays,
-        "kept": written is not None,
-        "kept_by": None if written is None else kept_by(found),
-        "model": str(path if written is None else written),
-        "effects": list(parent.effects if written is None else found.model.effects),
-        "parent": {"path": str(path), "sha256": sha256_of(path)},
-        "coefficients": {c.name: _coefficient(found, c) for c in new},
-        "notes": [{"code": n.code, "message": n.message} for n in found.notes],
+        c.name: AddedCoefficient(model.values[c.name], model.std_error(c.name), c.unit, c.name in found.on_bound)
+        for n in found.gain.added
+        for c in as_fitted(pick_effect(n), model.values).shared
     }
-
-
-def _coefficient(found: Extension, c: Coefficient) -> dict[str, Any]:
-    value, error = found.model.values[c.name], found.model.std_error(c.name)
-    return {"value": value, "std_error": error, "unit": c.unit, "at_bound": c.name in found.on_bound}
 
 
 def _undone(path: Path, output: Path | None, *, force: bool, as_json: bool) -> Mapping[str, Any]:
     from fieldsid.artifacts import replacing
-    from fieldsid.extension import CHANGED, MISSING, gain_body, history_of, parent_of
+    from fieldsid.extension import CHANGED, MISSING, history_of, parent_of
     from fieldsid.models.model import load_model
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.extensions import Undone
 
     parent = parent_of(path)
     if parent is None:
@@ -194,15 +217,10 @@ def _undone(path: Path, output: Path | None, *, force: bool, as_json: bool) -> M
             shutil.copyfile(parent.path, temporary)
         back = output
     step = history_of(path)[-1].step
-    body = {
-        "schema": SCHEMA,
-        **(gain_body(step.gain) if step else {"before": {}, "after": {}, "noise_floor": {}}),
-        "kept": False,
-        "undone": str(path),
-        "model": str(back),
-        "effects": list(load_model(back).effects),
-        "parent": {"path": str(parent.path), "sha256": parent.sha256, "state": parent.state},
-    }
+    undone = Undone(
+        gain=step.gain if step else None, undone=str(path), model=str(back), effects=load_model(back).effects, parent=parent
+    )
+    body = body_of(undone)
     return emit(body, as_json=as_json, render=lambda to: _render_undone(to, body), headline=of_undoing(body))
 
 
@@ -210,24 +228,10 @@ def _render_undone(to: Console, body: Mapping[str, Any]) -> None:
     to.print(f"model: {body['model']}; {body['undone']} stays where it is", soft_wrap=True)
 
 
-def _render(to: Console, body: Mapping[str, Any]) -> None:
-    from fieldsid.rounding import number
+def _render(to: Console, gain: Gain, body: Mapping[str, Any]) -> None:
+    from fieldsid.views.extension import errors
 
-    times, angle = shown_in("rad")
-    floor = body["noise_floor"]
-    rows = [
-        (f"{unit}, {side}", *(number(times * v, 3) for v in (b[key], a[key], floor[noise])))
-        for key, noise, unit in (
-            ("angle_rms_rad", "angle_rad", f"angle, {angle}"),
-            ("rate_rms_rad_s", "rate_rad_s", f"rate, {angle}/s"),
-        )
-        for side, b, a in (
-            ("unseen", body["before"]["validation"], body["after"]["validation"]),
-            ("fitted", body["before"]["train"], body["after"]["train"]),
-        )
-        if isfinite(b[key])
-    ]
-    to.print(table("", ("rms error", "before", "after", "noise floor"), rows))
+    print_page(to, Page("", blocks=(errors(gain, angles()),)))
     to.print()
     found = [
         (n, _value(factor * c["value"], factor * c["std_error"], at_bound=c["at_bound"]), unit)

@@ -42,21 +42,25 @@ def command(
     Example: sysid fit models/*.yaml -o law.yaml
     """
     from fieldsid.cli.headlines.gains import of_fit
+    from fieldsid.cli.inputs import models_among
     from fieldsid.errors import UsageError
-    from fieldsid.plant.laws.axis_laws import law_notes, report, save_laws
+    from fieldsid.plant.laws.axis_laws import law_notes, save_laws
     from fieldsid.plant.parameter_source import load_parameter_source
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.turning import FittedLaws
 
     refuse_existing(output, output.with_suffix(".png") if output is not None and figures else None, force=force)
+    models = models_among(models)
     source = load_parameter_source(models)
     if source.is_fit_file:
         raise UsageError("this is a fit file already", found=str(models[0]), hint="give models or a table")
     laws = source.fitted(weighted=not unweighted)
-    body: dict[str, Any] = {"schema": "fieldsid/fit/1", **report(laws), "file": None, "figure": None}
+    written = drawn = None
     if output is not None:
         there = [p for p in source.paths if p.is_file()]
-        body["file"] = str(save_laws(laws, output, models=there if source.models else (), inputs=there, force=force))
-        if figures:
-            body["figure"] = str(_draw(laws, output.with_suffix(".png"), context, force=force))
+        written = str(save_laws(laws, output, models=there if source.models else (), inputs=there, force=force))
+        drawn = str(_draw(laws, output.with_suffix(".png"), context, force=force)) if figures else None
+    body = body_of(FittedLaws(laws=laws, file=written, figure=drawn))
     notes = (*source.notes, *law_notes(laws))
     return emit(body, as_json=as_json, render=lambda to: _render(to, laws, body), headline=of_fit(body), notes=notes)
 

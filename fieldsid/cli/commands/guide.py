@@ -36,13 +36,12 @@ def command(topic: Topic = None, as_json: JsonFlag = False) -> Mapping[str, Any]
     Example: sysid guide effects/servo_lag
     """
     from fieldsid.guide import all_pages, pick_page
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.trial import Contents, Title, Topic
 
     page = pick_page(topic or "index")
-    body: dict[str, Any] = {"schema": "fieldsid/guide/1"}
-    if topic is None:
-        body |= {"topics": [{"topic": p.topic, "title": p.title} for p in all_pages().values()]}
-    else:
-        body |= {"topic": page.topic, "title": page.title, "file": str(page.path), "text": page.text}
+    contents = Contents(tuple(Title(p.topic, p.title) for p in all_pages().values()))
+    body = body_of(contents if topic is None else Topic(page.topic, page.title, str(page.path), page.text))
     return emit(body, as_json=as_json, render=lambda to: _show(to, page))
 
 

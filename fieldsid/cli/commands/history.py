@@ -38,30 +38,24 @@ def command(
     refuse_figure(figure, force=force)
     known = read_model(model)
     from fieldsid.extension import history_of
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.extensions import History
 
     line = history_of(model)
-    body = {
-        "schema": "fieldsid/history/1",
-        "model": str(model),
-        "axis": known.axis.value,
-        "generations": [_entry(g) for g in line],
-        "intact": all(g.state == "intact" and not (g.step and g.step.changed_data) for g in line),
-        "figure": _drawn(line, model, figure, context, force=force),
-    }
+    body = body_of(
+        History(
+            model=str(model),
+            axis=known.axis,
+            generations=line,
+            intact=all(g.state == "intact" and not (g.step and g.step.changed_data) for g in line),
+            figure=_drawn(line, model, figure, context, force=force),
+        )
+    )
     from fieldsid.cli.headlines.models import of_history
     from fieldsid.records.named_inputs import inputs_of
 
     headline = of_history(body, inputs_of(model))
     return emit(body, as_json=as_json, render=lambda to: _render(to, line, body), headline=headline, notes=_notes(line))
-
-
-def _entry(g: Generation) -> dict[str, Any]:
-    from fieldsid.extension import gain_body
-
-    body: dict[str, Any] = {"model": str(g.path), "effects": list(g.effects), "state": g.state}
-    if g.step is None:
-        return body | {"added": []}
-    return body | gain_body(g.step.gain) | {"kept_by": g.step.kept_by, "changed_data": list(g.step.changed_data)}
 
 
 def _drawn(line: Sequence[Generation], model: Path, path: Path | None, context: typer.Context, *, force: bool) -> str | None:

@@ -29,14 +29,13 @@ from fieldsid.cli.progress import compiling_first, get_ready, refuse_closed
 from fieldsid.cli.session import drawing
 from fieldsid.cli.voice import shown_estimate, shown_in
 from fieldsid.logs.run import Note
+from fieldsid.records.keys import body_of
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from fieldsid.fitting.fit import Fit
-    from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit
-    from fieldsid.fitting.predict.predict import Prediction
-    from fieldsid.logs import Run
+    from fieldsid.results.fits import FittedModel
     from fieldsid.runtime.background_tasks import BackgroundTasks
 
 Method = Annotated[str, typer.Option("--method", metavar="NAME", help="auto, output_error, pem, svf_ls, svf_rls or srivc.")]
@@ -85,6 +84,8 @@ def command(
     axis = axis or axis_excited(known)
     from fieldsid.fitting.identify import check_joint, identify
     from fieldsid.fitting.problem.estimator import Options
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.fits import Identified, fitted_model
     from fieldsid.vehicle import find_vehicle, load_vehicle
 
     if joint:
@@ -105,15 +106,15 @@ def command(
     used = skips.left_of(known)
     groups = [used] if joint else [[run] for run in used]
     models = _written(fits, [files_of(group) for group in groups], output, context, figures=figures, force=force)
-    entries = [_entry(fit, model, of) for fit, model, of in zip(fits, models, groups, strict=True)]
-    body = {"schema": "fieldsid/identify/1", "axis": axis, "fits": entries, "skipped_runs": skips.records}
+    entries = tuple(fitted_model(fit, model, of) for fit, model, of in zip(fits, models, groups, strict=True))
+    body = body_of(Identified(axis=axis, fits=entries, skipped_runs=tuple(skips.records)))
     from fieldsid.cli.headlines.models import of_identify
 
     headline = of_identify(body, [files_of(group) for group in groups])
     result = emit(
         body,
         as_json=as_json,
-        render=lambda to: _render(to, entries, figures=figures),
+        render=lambda to: _render(to, body["fits"], figures=figures),
         headline=headline,
         notes=_warnings(entries),
     )
@@ -159,15 +160,12 @@ def _draw(fit: Fit, folder: Path, stem: str, tasks: BackgroundTasks, *, force: b
 def _drawn(fit: Fit) -> list[int]:
     """Return the places of the runs that are drawn: all of a few, of many those that the model follows least."""
     from fieldsid.comparison.sufficient import over_noise
+    from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
+    from fieldsid.records.keys import body_of
 
-    floor = _noise_floor(fit)
-    over = [over_noise(_of_run(p), floor) for p in fit.predictions]
+    over = [over_noise(body_of(goodness_of_fit([p])), body_of(fit.floor)) for p in fit.predictions]
     least = sorted(range(len(over)), key=lambda i: (isnan(over[i]), -over[i]))
     return sorted(least[:MOST_DRAWN])
-
-
-def _noise_floor(fit: Fit) -> dict[str, float]:
-    return {"angle_rad": fit.floor.angle, "rate_rad_s": fit.floor.rate}
 
 
 def _stem(fit: Fit) -> str:
@@ -175,64 +173,9 @@ def _stem(fit: Fit) -> str:
     return f"{run}_{fit.model.axis.value}"
 
 
-def _entry(fit: Fit, path: Path | None, logs: Sequence[Run]) -> dict[str, Any]:
-    from fieldsid.fitting.checks.warnings import METHOD_CHOSEN, is_warning
-    from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
-
-    m, model = goodness_of_fit(fit.predictions), fit.model
-    notes = [n for n in (*fit.notes, *(n for run in logs for n in run.notes)) if is_warning(n, model.axis)]
-    return {
-        "run": "+".join(model.runs),
-        "model": None if path is None else str(path),
-        "speed_m_s": model.law.reference,
-        "method": model.method,
-        "method_reason": next((n.message for n in fit.notes if n.code == METHOD_CHOSEN), None),
-        "effects": list(model.effects),
-        "parameters": _parameters(fit),
-        **_merit(m),
-        "noise_floor": _noise_floor(fit),
-        "warnings": [{"code": n.code, "message": n.message, "data": dict(n.data)} for n in notes],
-        "whiteness_p": model.info.get("whiteness_p"),
-        "runs": [_of_run(p) for p in fit.predictions],
-        "settled_s": None if fit.history is None else dict(fit.history.settled_s),
-    }
-
-
-def _of_run(p: Prediction) -> dict[str, Any]:
-    from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
-
-    time = p.record.time
-    return {"run": p.record.name, "speed_m_s": p.record.speed, "segment_s": [time[0], time[-1]], **_merit(goodness_of_fit([p]))}
-
-
-def _merit(m: GoodnessOfFit) -> dict[str, float]:
-    return {
-        "angle_rms_rad": m.angle_rms,
-        "rate_rms_rad_s": m.rate_rms,
-        "angle_fit_percent": m.angle_fit,
-        "rate_fit_percent": m.rate_fit,
-    }
-
-
-def _parameters(fit: Fit) -> dict[str, dict[str, Any]]:
-    from fieldsid.fitting.estimates import estimates
-
-    law = fit.model.info.get("law_parameters", {})
-    return {
-        e.name: {
-            "value": e.value,
-            "std_error": e.std_error,
-            "interval95": list(e.interval95),
-            "unit": e.unit,
-            "shown": e.name if e.name in law else fit.model.shown(e.name),
-        }
-        for e in estimates(fit.model)
-    }
-
-
-def _warnings(entries: Sequence[Mapping[str, Any]]) -> list[Note]:
+def _warnings(entries: Sequence[FittedModel]) -> list[Note]:
     """Return each kind of warning once, with the numbers of the first run that has it."""
-    return alike((w["code"], _label(e), Note(w["code"], w["message"], {})) for e in entries for w in e["warnings"])
+    return alike((w.code, _label(body_of(e)), w) for e in entries for w in e.warnings)
 
 
 def _render_reasons(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:

@@ -13,7 +13,7 @@ from fieldsid.cli.options import Force, FromS, Join, JsonFlag, MappingFile, ToS,
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fieldsid.logs.importing import Imported
+    from fieldsid.logs.importing import Imported, Importer
 
 
 def command(
@@ -64,6 +64,8 @@ def command(
     from fieldsid.logs.importing import Importer
     from fieldsid.logs.several.run_names import refuse_twice
     from fieldsid.logs.several.sifting import attempt, sifted
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.logs import Import
 
     joined: list[Path] = []
     if join:
@@ -72,25 +74,54 @@ def command(
         mapping_of(mapping), tuple(channel or ()), msg_path, between(from_s, to_s), max_gap, salvage, whole, tuple(joined)
     )
     limits = _fin_limits(vehicle)
+    there = [] if force or importer != Importer(importer.mapping) else _already(importer, logs, output, format_, mapping)
+    logs = [log for log in logs if log not in there]
     targets = dict(zip(logs, importer.targets(logs, output, format_, force=force), strict=True))
     skips = Skips()
     shown = tracked(logs, "reading")
     outcomes = (attempt(lambda log_and_bar: importer.read(log_and_bar[0], limits, log_and_bar[1]), pair) for pair in shown)
-    read = sifted(logs, outcomes, skips.skip)
+    read = sifted(logs, outcomes, skips.skip) if logs else []
     refuse_twice([run for _, runs in read for run in runs], [log for log, runs in read for _ in runs])
     placed = [pair for log, runs in read for pair in zip(runs, importer.places(targets[log], len(runs)), strict=True)]
     for _, place in placed:
         check_output(place, force=force)
     done = [importer.write(run, place, force=force) for run, place in placed]
-    body: dict[str, Any] = {"schema": "fieldsid/import/1", "runs": [d.record() for d in done], "skipped_runs": skips.records}
+    body = body_of(Import(runs=tuple(done), already_imported=tuple(map(str, there)), skipped_runs=tuple(skips.records)))
     from fieldsid.cli.headlines.logs import of_import
+    from fieldsid.logs.segments import plane_of
 
     notes = alike(((n.code, n.data.get("signal")), item.run.name, n) for item in done for n in item.warnings)
-    result = emit(body, as_json=as_json, render=lambda c: _render(done, c), headline=of_import(body), notes=notes)
+    result = emit(
+        body,
+        as_json=as_json,
+        render=lambda c: _render(done, c),
+        headline=of_import(body, plane_of([d.run for d in done])),
+        notes=notes,
+    )
     if as_json:  # a run is used for long: what is odd about it is said however it is asked for
         warn(notes)
     skips.end(len(done))
     return result
+
+
+def _already(importer: Importer, logs: list[Path], output: Path, form: str, mapping: Path | None) -> list[Path]:
+    """Return the logs whose runs are there, made of the same bytes of the log and of its mapping."""
+    from fieldsid.cli.console import say
+    from fieldsid.records.named_inputs import sha256_of_named
+    from fieldsid.trial_folder.state import run_head
+
+    def is_there(log: Path, target: Path) -> bool:
+        place = target if target.exists() else importer.places(target, 2)[0]
+        head = run_head(place) if place.name.endswith(".parquet") and place.is_file() else None
+        made_of = {e["path"]: e["sha256"] for e in (head or {}).get("inputs") or ()}
+        given = {str(log), *([str(mapping)] if mapping is not None else [])}
+        return given <= made_of.keys() and all(sha256_of_named(Path(p)) == known for p, known in made_of.items())
+
+    pairs = zip(logs, importer.targets(logs, output, form, force=True), strict=True)
+    found = [log for log, target in pairs if is_there(log, target)]
+    if found:
+        say(f"already imported: {', '.join(map(str, found))}")
+    return found
 
 
 def _fin_limits(vehicle: Path | None) -> dict[str, float]:
@@ -102,16 +133,7 @@ def _fin_limits(vehicle: Path | None) -> dict[str, float]:
 def _render(done: list[Imported], console: Console) -> None:
     from fieldsid.cli.console import table
 
-    rows: list[Any] = []
-    for item in done:
-        record = item.record()
-        rows.append(
-            (
-                record["file"],
-                str(record["samples"]),
-                f"{record['duration_s']:.2f}",
-                f"{record['rate_hz']:.4g}",
-                str(len(record["signals"])),
-            )
-        )
+    if not done:
+        return
+    rows = [(d.file, str(d.samples), f"{d.duration_s:.2f}", f"{d.rate_hz:.4g}", str(len(d.signals))) for d in done]
     console.print(table("", ("run", "samples", "s", "Hz", "signals"), rows))

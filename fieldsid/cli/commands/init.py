@@ -28,6 +28,8 @@ def command(
     """
     from fieldsid.cli.console import emit
     from fieldsid.cli.headlines.trial import of_trial
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.trial import Init
     from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, append
     from fieldsid.trial_folder.make import new_trial
 
@@ -43,5 +45,5 @@ def command(
         for file in files:
             console.print(str(file), soft_wrap=True)
 
-    body = {"schema": "fieldsid/init/1", "folder": name, "template": template, "files": [str(f) for f in files]}
+    body = body_of(Init(name, template, tuple(map(str, files))))
     emit(body, as_json=as_json, render=render, headline=of_trial(body))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from fieldsid.logs.inspection import Inspection
+    from fieldsid.results.logs import Inspected
 
 
 def command(
@@ -36,23 +37,25 @@ def command(
     from fieldsid.cli.headlines.logs import of_inspection
     from fieldsid.cli.inputs import one_run
     from fieldsid.logs.inspection import inspect_log, write_proposal
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.logs import inspected
 
     log, *joined = one_run("inspect", logs, join=join)
     for path, on_share in tracked([log], "reading"):
         found = inspect_log(path, mapping=mapping, msg_path=msg_path, joined=joined, progress=on_share)
     written = write_proposal(found, write_mapping, force=force) if write_mapping is not None else None
-    body = found.record(written)
-    emit(body, as_json=as_json, render=lambda console: _render(found, console), headline=of_inspection(body, mapping))
+    result = inspected(found, written)
+    body = body_of(result)
+    emit(body, as_json=as_json, render=lambda console: _render(found, result, console), headline=of_inspection(body, mapping))
 
 
-def _render(found: Inspection, console: Console) -> None:
+def _render(found: Inspection, result: Inspected, console: Console) -> None:
     from fieldsid.cli.console import table, words
 
-    record: dict[str, Any] = found.record(None)
-    rows = [(c["name"], c["type"], str(c["count"]), c["rate"], c["holds"]) for c in record["shown"]]
+    rows = [(c.name, c.type, str(c.count), c.rate, c.holds) for c in result.shown]
     console.print(table("", ("channel", "type", "samples", "Hz", "holds"), rows, left=2))
-    if record["more_channels"]:
-        console.print(f"and {record['more_channels']} more channels")
+    if result.more_channels:
+        console.print(f"and {result.more_channels} more channels")
     console.print()
     console.print(words("mapping" + (" (canonical names, none is needed)" if found.needs_none else " (proposed)"), "bold"))
     for line in found.yaml().rstrip().split("\n"):

@@ -126,6 +126,8 @@ def command(
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.planning.jit_warmup import SHARED_KERNELS, compile_planning
     from fieldsid.planning.request import EnvelopeLimits, PlanRequest, planned
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.plans import Planned
 
     _check_write(write, output)
     refuse_existing(output / "plan.yaml" if output is not None else None, force=force)
@@ -144,7 +146,11 @@ def command(
     if model is not None:
         check_effects([(model, made.model)])
     files = [] if output is None else _written(made.plan, made.model, asked, output, write, context, figures=figures, force=force)
-    body = {"schema": "fieldsid/plan/1", **made.body, "files": [str(f) for f in files]}
+    told: dict[str, Any] = {}
+    if made.found:
+        best = max(made.found, key=lambda s: s.expected_log_odds)
+        told = {"separation": best, "separations": made.found, "says": tuple(line for s in made.found for line in s.says())}
+    body = body_of(Planned(made.plan, tuple(map(str, files)), **told))
     from fieldsid.cli.headlines.trial import of_plan
 
     return emit(body, as_json=as_json, render=lambda to: _render(to, made.plan, body), headline=of_plan(body, model))

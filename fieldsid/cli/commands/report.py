@@ -43,21 +43,24 @@ def command(files: Files = None, output: Page = None, force: Force = False, as_j
     given = files or [Path()]
     state = _state(given)
     path = output or state.folder / "report.html"
+    from fieldsid.records.keys import body_of
     from fieldsid.reporting.write import check_report, written
+    from fieldsid.results.trial import Report, ReportVerdict
 
     check_report(path, force=force)
     get_ready()
     context, text = written(state, path, force=force)
-    body = {
-        "schema": "fieldsid/report/1",
-        "file": str(path),
-        "bytes": path.stat().st_size,
-        "verdicts": [{"what": v["what"], "says": v["says"]} for v in context["verdicts"]],
-        "runs": [r["name"] for r in context["runs"]],
-        "models": [m["path"] for a in context["axes"] for m in a["models"]],
-        "figures": text.count('<svg class="chart"') + text.count('<svg class="bars"'),
-        "skipped": context["skipped"],
-    }
+    body = body_of(
+        Report(
+            file=str(path),
+            bytes=path.stat().st_size,
+            verdicts=tuple(ReportVerdict(v["what"], v["says"]) for v in context["verdicts"]),
+            runs=tuple(r["name"] for r in context["runs"]),
+            models=tuple(m["path"] for a in context["axes"] for m in a["models"]),
+            figures=text.count('<svg class="chart"') + text.count('<svg class="bars"'),
+            skipped=tuple(context["skipped"]),
+        )
+    )
     from fieldsid.cli.headlines.trial import of_report
 
     notes = [Note("not_in_report", line, {}) for line in context["skipped"]]

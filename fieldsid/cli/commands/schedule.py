@@ -168,20 +168,24 @@ def design(
     Example: sysid schedule design law.yaml --fin-max 15deg -o gains.yaml
     """
     from fieldsid.angles import FASTEST_FIN, FIN, FIN_RATE, HEADING, TILT, parse_angle, parse_margin
+    from fieldsid.cli.inputs import models_among
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.face.arguments import fins_of, length_of, runs_behind
     from fieldsid.face.quantities import BANDWIDTH, parse_quantity, parse_share
     from fieldsid.face.speeds import speeds_of
     from fieldsid.plant.parameter_source import load_parameter_source
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.gains import Design
     from fieldsid.schedule.linear_plant import FinLimits
     from fieldsid.schedule.make import design_schedule, usual_controller
-    from fieldsid.schedule.record import body_of, save_schedule
+    from fieldsid.schedule.record import save_schedule
     from fieldsid.schedule.wish import QUICKEST, Wish
 
     refuse_existing(output, force=force)
     given = None if fin_limit is None else parse_angle(fin_limit, "--fin-max", FIN)
     fastest = None if fin_rate is None else parse_angle(fin_rate, "--fin-rate", FIN_RATE, FASTEST_FIN)
     margin = parse_margin(phase_margin, "--phase-margin")
+    models = models_among(models)
     source = load_parameter_source(models, laws=law or ())
     check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
     limit, rate = _limits(given, fastest, vehicle, source)
@@ -205,10 +209,9 @@ def design(
         length=length_of(vehicle),
         fins=fins_of(vehicle, source.axis),
     )
-    body: dict[str, Any] = {"schema": "fieldsid/schedule/1", **body_of(schedule), "file": None}
-    if output is not None:
-        inputs = [p for p in source.paths if p.is_file()]
-        body["file"] = str(save_schedule(schedule, output, inputs=inputs, force=force))
+    inputs = [p for p in source.paths if p.is_file()]
+    written = None if output is None else str(save_schedule(schedule, output, inputs=inputs, force=force))
+    body = body_of(Design(schedule, written))
     headline = of_design(body, models, caveat(source.models, models))
     return emit(
         body,
@@ -246,6 +249,8 @@ def verify(
     from fieldsid.face.arguments import designed_from, runs_behind
     from fieldsid.face.quantities import DECIBEL, parse_quantity, parse_share, parse_time
     from fieldsid.plant.parameter_source import load_parameter_source
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.gains import Verified
     from fieldsid.schedule.record import load_schedule
     from fieldsid.schedule.verdict import against_constant, gates_of, rests_on, verdict_of
     from fieldsid.schedule.verify import verify_schedule
@@ -262,22 +267,22 @@ def verify(
     wanted = (least, gain, delay, most)
     gates = gates_of(checked, dict(zip(checked.worst, wanted, strict=True)))
     verdict, says = verdict_of(checked, known, gates)
-    body = {
-        "schema": "fieldsid/verification/1",
-        "verdict": verdict,
-        "says": says,
-        "rests_on": rests_on(checked, known, source),
-        "against_constant": against_constant(checked),
-        "constant_gains": {n: getattr(checked.constant_row.gains, n) for n in ("kp", "ki", "kd")},
-        "axis": known.axis.value,
-        "controller": known.kind,
-        "worst": checked.worst,
-        "scheduled": [c.record() for c in checked.scheduled],
-        "constant": [c.record() for c in checked.constant],
-        "gates": [g.record() for g in gates],
-        "passed": all(g.passed for g in gates),
-        "figure": None if output is None else _draw(known, checked, output, context, force=force),
-    }
+    body = body_of(
+        Verified(
+            verdict=verdict,
+            says=says,
+            rests_on=rests_on(checked, known, source),
+            against_constant=against_constant(checked),
+            constant_gains=checked.constant_row.gains,
+            axis=known.axis,
+            controller=known.kind,
+            worst=checked.worst,
+            scheduled=checked.scheduled,
+            constant=checked.constant,
+            gates=gates,
+            figure=None if output is None else _draw(known, checked, output, context, force=force),
+        )
+    )
     headline = of_verification(body, schedule, models or source.paths)
     result = emit(body, as_json=as_json, render=lambda to: render_verify(to, checked, body), headline=headline)
     if not body["passed"]:
@@ -307,6 +312,8 @@ def export(
     """
     from fieldsid.errors import UsageError
     from fieldsid.exports import pick_target
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.gains import Exported
     from fieldsid.schedule.record import load_schedule
 
     known = load_schedule(schedule)
@@ -318,33 +325,32 @@ def export(
         return _export_into(known, schedule, into, key, write=write, as_json=as_json)
     target = pick_target(to)
     text = target.render(known, node or target.node, template)
-    body: dict[str, Any] = {"schema": "fieldsid/export/1", "target": target.name, "text": text, "file": None}
-    body |= {"difference": "", "backup": None}
-    if output is not None:
-        body |= _written(output, text, force=force)
+    body = body_of(Exported(target.name, text, *(() if output is None else _written(output, text, force=force))))
     headline, is_file = of_export(body, schedule), body["file"] is None
     return emit(body, as_json=as_json, render=lambda out: render_export(out, body), headline=headline, is_file=is_file)
 
 
-def _written(output: Path, text: str, *, force: bool) -> dict[str, Any]:
-    """Write an export; of a file that it replaces the difference is shown and a backup kept."""
+def _written(output: Path, text: str, *, force: bool) -> tuple[str, str, str | None]:
+    """Write an export and return its file; of one that it replaces the difference is shown and a backup kept."""
     from fieldsid.artifacts import write_text
     from fieldsid.exports._patch import patch_text, write_patch
 
     if not (force and output.is_file()):
-        return {"file": str(write_text(output, text, force=force))}
+        return str(write_text(output, text, force=force)), "", None
     patch = patch_text(output, text)
     backup = str(write_patch(patch)) if patch.difference else None
-    return {"file": str(output), "difference": patch.difference, "backup": backup}
+    return str(output), patch.difference, backup
 
 
 def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write: bool, as_json: bool) -> Mapping[str, Any]:
     from fieldsid.exports._patch import patch_yaml, write_patch
     from fieldsid.exports._target import columns_of
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.gains import Patched
 
     patch = patch_yaml(into, key, columns_of(known))
     backup = str(write_patch(patch)) if write else None
-    body = {"schema": "fieldsid/export/1", "target": "into", "difference": patch.difference, "file": str(into), "backup": backup}
+    body = body_of(Patched(patch.difference, str(into), backup))
     headline = of_patch(body, schedule, key)
     return emit(body, as_json=as_json, render=lambda out: print_file(out, patch.difference), headline=headline, is_file=not write)
 

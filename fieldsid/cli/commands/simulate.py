@@ -56,6 +56,8 @@ def command(
     """
     from fieldsid.cli.headlines.models import of_simulation
     from fieldsid.cli.user_effects import read_model
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.logs import SignalRange, Simulation
 
     if (maneuver is None) == (run is None):
         raise UsageError(
@@ -78,15 +80,17 @@ def command(
         note = Note(SIMULATED, f"made by the model {model}, not measured", {"model": str(model)})
         made = replace(made, name=Path(output.name.removesuffix(".gz")).stem, notes=(*made.notes, note))
         save_run(made, output, force=force)
-    body = {
-        "schema": "fieldsid/simulation/1",
-        "model": str(model),
-        "run": made.name,
-        "file": None if output is None else str(output),
-        "samples": len(made),
-        "seconds": float(made.time[-1] - made.time[0]),
-        "signals": {n: {"low": float(v.min()), "high": float(v.max()), "end": float(v[-1])} for n, v in made.signals.items()},
-    }
+    signals = {n: SignalRange(float(v.min()), float(v.max()), float(v[-1])) for n, v in made.signals.items()}
+    body = body_of(
+        Simulation(
+            model=str(model),
+            run=made.name,
+            file=None if output is None else str(output),
+            samples=len(made),
+            seconds=float(made.time[-1] - made.time[0]),
+            signals=signals,
+        )
+    )
     headline = of_simulation(body, known.axis.value, maneuver, run)
     return emit(body, as_json=as_json, render=lambda to: _render(to, body), headline=headline)
 

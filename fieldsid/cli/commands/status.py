@@ -48,6 +48,8 @@ def command(folder: Folder = Path(), as_json: JsonFlag = False) -> Mapping[str, 
     Example: sysid status
     """
     from fieldsid.errors import UsageError
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.trial import NextStep, Status
     from fieldsid.trial_folder.fin_limits import contradicted_limits
     from fieldsid.trial_folder.next_step import next_step
     from fieldsid.trial_folder.state import state_of
@@ -63,20 +65,18 @@ def command(folder: Folder = Path(), as_json: JsonFlag = False) -> Mapping[str, 
     why, line = next_step(state)
     if line and folder.resolve() != Path.cwd():
         line = f"cd {shlex.quote(str(folder))} && {line}"
-    body = {
-        "schema": "fieldsid/status/1",
-        "folder": str(folder),
-        "verdict": _verdict(state),
-        "files": [_entry(i) for i in state.items],
-        "stale": [i.path for i in state.items if i.stale],
-        "journal": [
-            {"time": e.time, "command": list(e.command), "exit": e.exit, "seconds": e.seconds, "verdict": e.verdict}
-            for e in state.entries
-        ],
-        "unreadable_journal_lines": state.broken_lines,
-        "warnings": [{"code": n.code, "message": n.message} for n in notes],
-        "next": {"why": why, "command": line},
-    }
+    body = body_of(
+        Status(
+            folder=str(folder),
+            verdict=_verdict(state),
+            files=state.items,
+            stale=tuple(i.path for i in state.items if i.stale),
+            journal=state.entries,
+            unreadable_journal_lines=state.broken_lines,
+            warnings=tuple(notes),
+            next=NextStep(why, line),
+        )
+    )
     return emit(body, as_json=as_json, render=lambda to: _render(to, state, body), headline=of_status(body), notes=notes)
 
 
@@ -92,11 +92,6 @@ def _many(count: int, name: str) -> str:
     if name in MANY_IN_ONE:
         return name if count == 1 else f"{count} files of {name}"
     return f"1 {name}" if count == 1 else f"{count} {SEVERAL.get(name, name + 's')}"
-
-
-def _entry(item: Item) -> dict[str, Any]:
-    inputs = [{"path": s.named, "sha256": s.sha256} for s in item.sources]
-    return {"path": item.path, "kind": item.kind, "made_from": inputs, "stale": item.stale or None, "missing": list(item.missing)}
 
 
 def _render(to: Console, state: FolderState, body: Mapping[str, Any]) -> None:

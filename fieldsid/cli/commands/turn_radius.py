@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, say, table
+from fieldsid.cli.console import emit, print_page, say
 from fieldsid.cli.options import Figures, Force, JsonFlag, MappingFile, ModelFiles, OutputDir, VehicleFile
 from fieldsid.cli.progress import refuse_closed
 from fieldsid.cli.session import tasks_of
 from fieldsid.cli.skipped_logs import Skips
-from fieldsid.cli.voice import shown_in
+from fieldsid.cli.voice import angles
+from fieldsid.display import page_of
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from fieldsid.logs.run import Run
     from fieldsid.plant.parameter_source import ParameterSource
+    from fieldsid.results.turning import TurnRadius
     from fieldsid.turning.prediction import TurnPrediction
 
 Speeds = Annotated[
@@ -78,20 +81,23 @@ def command(
     """
     from fieldsid.angles import FIN, parse_angle
     from fieldsid.cli.headlines.gains import caveat, of_turn
-    from fieldsid.cli.inputs import read_runs
+    from fieldsid.cli.inputs import models_among, read_runs
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.face.arguments import length_of
     from fieldsid.face.speeds import speeds_of
     from fieldsid.plant.parameter_source import load_parameter_source
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.turning import TurnRadius
     from fieldsid.turning.radius import turn_radius
 
     refuse_closed(output)
     given = None if rudder_max is None else parse_angle(rudder_max, "--fin-max", FIN)
+    models = models_among(models)
     source, skips = load_parameter_source(models, laws=law or ()), Skips()
     check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
     prediction = turn_radius(
         source,
-        speeds_of(speeds) or [float(s) for s in dict.fromkeys(source.speeds)],
+        speeds_of(speeds) or source.knots,
         _rudder(given, vehicle, source),
         runs=_runs(runs, source, mapping, skips),
         measured=read_runs(measured, mapping=mapping, refused=skips.skip) if measured else (),
@@ -100,10 +106,11 @@ def command(
         unfit=skips.skip,
         length=length_of(vehicle),
     )
-    body: dict[str, Any] = {"schema": "fieldsid/turn-radius/1", **prediction.record(), "figures": []}
-    body["skipped_runs"] = skips.records
+    found = TurnRadius(prediction=prediction, skipped_runs=tuple(skips.records))
     if output is not None:
-        body["figures"] = _written(prediction, body, output, source, context, figures=figures, force=force)
+        drawn = _written(found, output, source, context, figures=figures, force=force)
+        found = replace(found, figures=drawn)
+    body = body_of(found)
     headline, notes = of_turn(body, models, caveat(source.models, models)), prediction.notes
     result = emit(body, as_json=as_json, render=lambda to: _render(to, prediction, body), headline=headline, notes=notes)
     skips.end(len(runs or []) + len(measured or []) - len(skips.records))
@@ -148,89 +155,30 @@ def _runs(given: Sequence[Path] | None, source: ParameterSource, mapping: Path |
 
 
 def _written(
-    prediction: TurnPrediction,
-    body: Mapping[str, Any],
+    found: TurnRadius,
     folder: Path,
     source: ParameterSource,
     context: typer.Context,
     *,
     figures: bool,
     force: bool,
-) -> list[str]:
+) -> tuple[str, ...]:
     from fieldsid.artifacts import save_record
     from fieldsid.figures.canvas import save
     from fieldsid.figures.turn import figure, track_figure
+    from fieldsid.records.keys import body_of
 
     inputs = [p for p in source.paths if p.is_file()]
-    rest = {k: v for k, v in body.items() if k not in ("schema", "figures")}
-    save_record(folder / "turn_radius.yaml", "fieldsid/turn-radius/1", rest, inputs=inputs, force=force)
+    rest = {k: v for k, v in body_of(found).items() if k not in ("schema", "figures")}
+    save_record(folder / "turn_radius.yaml", found.SCHEMA, rest, inputs=inputs, force=force)
     if not figures:
-        return []
+        return ()
+    prediction = found.prediction
     drawn = {"turn_radius": figure(prediction)} | {f"circle_{m.turn.run}": track_figure(m.turn) for m in prediction.measured}
-    return [str(save(f, folder / f"{name}.png", force=force, tasks=tasks_of(context))) for name, f in drawn.items()]
+    return tuple(str(save(f, folder / f"{name}.png", force=force, tasks=tasks_of(context))) for name, f in drawn.items())
 
 
 def _render(to: Console, prediction: TurnPrediction, body: Mapping[str, Any]) -> None:
-    from fieldsid.rounding import number
-    from fieldsid.turning.known_radius import BRACKETED, radius_cell
-    from fieldsid.turning.prediction import found_by
-
-    times, angle = shown_in("rad")
-    columns = ("side", "m/s", "radius m", "95 %", "model's", "deg/s", "u-turn s", "trust")
-    rows = [
-        (
-            r.side,
-            number(r.speed, 3),
-            radius_cell(r.radius, r.interval95),
-            f"{number(r.interval95[0], 3)} .. {number(r.interval95[1], 3)}",
-            number(r.of_model, 3),
-            number(r.yaw_rate_max * 57.29577951308232, 3),
-            number(r.u_turn_time, 3),
-            r.trust,
-        )
-        for r in prediction.rows
-    ]
-    to.print(
-        table(
-            f"rudder {times * prediction.rudder_max:.4g} {angle}, {found_by(r.method for r in prediction.rows)}",
-            columns,
-            rows,
-        )
-    )
-    if any(r.band_only for r in prediction.rows):
-        to.print(BRACKETED)
-    _render_measured(to, prediction)
-    for reason in dict.fromkeys(b for r in prediction.rows for b in r.because):
-        of = sum(reason in r.because for r in prediction.rows)
-        share = "" if of == len(prediction.rows) else f" ({of} of {len(prediction.rows)} turns)"
-        to.print(f"extrapolated{share}: {reason}")
-    for settling in prediction.settling:
-        to.print(f"what would settle it: {settling}")
-    for side, best in body["minimum"].items():
-        if best:
-            to.print(f"tightest at higher speed, {side}: {best['radius_m']:.2f} m at {best['speed_m_s']:.2f} m/s")
+    print_page(to, page_of(prediction, angles()))
     for path in body["figures"]:
         to.print(f"figure: {path}", soft_wrap=True)
-
-
-def _render_measured(to: Console, prediction: TurnPrediction) -> None:
-    from fieldsid.rounding import number, with_error
-
-    if not prediction.measured:
-        return
-    rows, times = [], shown_in("rad")[0]
-    for m in prediction.measured:
-        circle = m.turn.circle
-        off = 100.0 * (m.predicted / circle.radius - 1.0)
-        band = f"{number(m.predicted95[0], 3)} .. {number(m.predicted95[1], 3)}"
-        radius = with_error(circle.radius, circle.radius_std_error)
-        fin, speed = number(times * m.turn.fin, 3), number(m.turn.flown_at, 3)
-        rows.append((m.turn.run, speed, fin, radius, number(m.predicted), band, f"{off:+.1f}"))
-    to.print()
-    to.print(
-        table(
-            "measured circles, and what the other runs alone predict",
-            ("run", "m/s", "fin", "radius m", "predicted", "95 %", "off %"),
-            rows,
-        )
-    )

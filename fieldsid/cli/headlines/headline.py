@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
+
+from fieldsid.records.keys import Key
 
 LONGEST = 200
 """Characters of a line that is read at a glance; what a verdict has beyond them is told below it."""
@@ -10,11 +13,11 @@ LONGEST = 200
 
 @dataclass(frozen=True, slots=True)
 class Headline:
-    """The first lines of a result; next is empty only where nothing is left to do."""
+    """The first lines that a reader gets."""
 
-    says: str
-    rests_on: str
-    next: str = ""
+    says: Annotated[str, Key("The verdict with its number.")]
+    rests_on: Annotated[str, Key("What it rests on.")]
+    next: Annotated[str, Key("The command that comes next, ready to paste; empty where nothing is left to do.")] = ""
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -26,10 +29,6 @@ class Headline:
     def rest(self) -> tuple[str, ...]:
         """What the first two lines have no room for."""
         return tuple(rest for text in (self.says, f"rests on {self.rests_on}") if (rest := begun(text)[1]))
-
-    def record(self) -> dict[str, str]:
-        """Return the lines as `--json` has them, each whole."""
-        return {"says": self.says, "rests_on": self.rests_on, "next": self.next}
 
 
 def begun(text: str) -> tuple[str, str]:

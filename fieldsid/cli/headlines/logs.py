@@ -9,7 +9,6 @@ from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, typed_with
 from fieldsid.cli.headlines.words import Body, counted, named
 from fieldsid.logs.run import EXPLAINING
-from fieldsid.models.axis import NAMES, Axis
 from fieldsid.trial_folder.journal import is_trial
 from fieldsid.trial_folder.make import LOGS, MAPPING
 
@@ -59,11 +58,12 @@ def _is_taken(log: Path, mapping: str | Path | None) -> bool:
     return is_here and (mapping is None or Path(mapping).resolve() == Path(MAPPING).resolve())
 
 
-def of_import(body: Body) -> Headline:
-    """Return how many runs there are now, and the first fit of them."""
-    runs = body["runs"]
+def of_import(body: Body, axis: str) -> Headline:
+    """Return how many runs there are now, and the first fit of them, in the plane that they excite."""
+    runs, there = body["runs"], body["already_imported"]
+    if not runs and there:
+        return Headline(f"already imported: {counted(len(there), 'log')}, as they are", named(there), pasted("status"))
     seconds = sum(float(r["duration_s"]) for r in runs)
-    axes = [a.value for a in Axis if any({NAMES[a].fin, NAMES[a].fin_measured} & set(r["signals"]) for r in runs)] or ["yaw"]
     files = [r["file"] for r in runs]
     joint = ("--joint",) if len(files) > 1 else ()
     noted = sum(n["code"] not in EXPLAINING for r in runs for n in r["notes"])
@@ -71,7 +71,7 @@ def of_import(body: Body) -> Headline:
     return Headline(
         says,
         f"{named(_logs(runs))}: SI and radians, one clock, gaps left as gaps",
-        pasted("identify", files, "--axis", axes[0], *joint, "-o", "models/") if files else "",
+        pasted("identify", files, "--axis", axis, *joint, "-o", "models/") if files else "",
     )
 
 

@@ -21,18 +21,12 @@ LEAST_TO_SPARE_ONE = 3
 
 @dataclass(frozen=True, slots=True)
 class Searched:
-    """What was searched: the training files, those that judged, the known model, the mapping, how long."""
+    """What was searched: the training files, those that judged, the known model, how long."""
 
     runs: Sequence[Path]
     unseen: Sequence[Path]
     model: Path | None
-    mapping: Path | None
     thorough: bool
-
-    @property
-    def reading(self) -> tuple[str, ...]:
-        """The option that reads the logs."""
-        return ("--mapping", str(self.mapping)) if self.mapping is not None else ()
 
 
 def of_diagnosis(body: Body, searched: Searched) -> Headline:
@@ -73,14 +67,14 @@ def _after(body: Body, of: Searched) -> str:
         return used(axis, body["applied"][-1]["model"])
     if body["effects"]:
         adds = repeated("--add", body["effects"])
-        return _on_model(of, axis, lambda model: pasted("extend", model, of.runs, *adds, *judged, *of.reading))
+        return _on_model(of, axis, lambda model: pasted("extend", model, of.runs, *adds, *judged))
     if body["verdict"] == "unexplained":
         longer = ("--thorough", *(("--force",) if body["file"] or body["figure"] else ()))
         return pasted("effects", "new", "unexplained", "--axis", axis) if of.thorough else typed_with(*longer)
     if body["verdict"] == "disturbed":
         known = ("--effects", ",".join(body["known"])) if body["known"] else ()
         joint = ("--joint",) if len(of.runs) > 1 else ()
-        return pasted("identify", of.runs, "--axis", axis, *joint, *known, "--method", "pem", *of.reading, "-o", "models_pem/")
+        return pasted("identify", of.runs, "--axis", axis, *joint, *known, "--method", "pem", "-o", "models_pem/")
     return _on_model(of, axis, lambda model: used(axis, model))
 
 
@@ -98,7 +92,7 @@ def _on_model(of: Searched, axis: str, then: Callable[[str], str]) -> str:
         return then(str(model))
     joint = ("--joint",) if len(of.runs) > 1 else ()
     stem = "joint" if joint else _stem(of.runs[0])
-    made = pasted("identify", of.runs, "--axis", axis, *joint, *of.reading, "-o", f"{MODELS}/")
+    made = pasted("identify", of.runs, "--axis", axis, *joint, "-o", f"{MODELS}/")
     return f"{made} && {then(f'{MODELS}/{stem}_{axis}.yaml')}"
 
 

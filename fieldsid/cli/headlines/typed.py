@@ -8,6 +8,7 @@ from contextvars import ContextVar
 from itertools import groupby
 from pathlib import Path
 
+from fieldsid.cli.trial.parsed import parse
 from fieldsid.cli.trial.spared import without_the_filled
 from fieldsid.trial_folder.patterns import FEW, pattern_of
 
@@ -34,11 +35,24 @@ def pasted(*words: str | Path | Sequence[str | Path]) -> str:
     """
     parts: list[str] = ["sysid"]
     flat = [_near(w) for word in words for w in ([word] if isinstance(word, (str, Path)) else word)]
+    reading = _reading(flat)
+    words, flat = (*words, *reading), [*flat, *reading]
     if (short := without_the_filled(flat)) != flat:
         return shlex.join(["sysid", *short])
     for word in words:
         parts += [shlex.quote(_near(word))] if isinstance(word, (str, Path)) else pattern_of([Path(_near(p)) for p in word])
     return " ".join(parts)
+
+
+def _reading(words: Sequence[str]) -> list[str]:
+    """Return the mapping of the command under way, for a line of files that are read as that command has read them."""
+    typed = _WORDS.get()
+    under_way = parse(typed) if {"--mapping", "-m"} & {w.partition("=")[0] for w in typed} else None
+    next_ = parse(words) if under_way is not None else None
+    if under_way is None or next_ is None or next_.values.get("mapping", "") is not None:
+        return []
+    read = {p for p in under_way.paths() if p.suffix not in (".yaml", ".yml")}
+    return ["--mapping", str(under_way.values["mapping"])] if read & set(next_.paths()) else []
 
 
 def is_there(path: Path) -> bool:

@@ -12,9 +12,10 @@ from types import MappingProxyType
 
 from fieldsid.cli.trial.parsed import Parsed
 from fieldsid.errors import FieldsidError
+from fieldsid.logs.unknown_file import own_kind
 from fieldsid.models.axis import Axis
 from fieldsid.trial_folder.make import LOGS, MODELS, RUNS
-from fieldsid.trial_folder.next_step import chosen_models, diagnosed_runs, logs_to_import, run_words, unseen_runs
+from fieldsid.trial_folder.next_step import chosen_models, diagnosed_runs, logs_to_import, root_of, run_words, unseen_runs
 from fieldsid.trial_folder.state import LOG, MODEL, RUN, FolderState, Item
 
 FEW = 3
@@ -71,8 +72,13 @@ def _output(parsed: Parsed, folder: str) -> list[str]:
 
 
 def _diagnose(parsed: Parsed, state: FolderState) -> list[str]:
-    """Return the runs, and a file that is free for the diagnosis: the report shows it, and `plan --from` takes it."""
-    name = f"{MODELS}/diagnosis_{parsed.values.get('axis')}"
+    """Return the runs, the plane of the models, and a file that is free: the report shows it, and `plan --from` takes it."""
+    axis, planes = parsed.values.get("axis"), {str((i.body or {}).get("axis")) for i in state.models}
+    if axis is None and len(planes) == 1 and not parsed.paths("runs", "model"):
+        axis = Axis(planes.pop())
+        whole = Parsed(parsed.name, {**parsed.values, "axis": axis})
+        return [*_diagnose(whole, state), "--axis", axis.value]
+    name = f"{MODELS}/diagnosis{f'_{axis}' if axis else ''}"
     return [*_runs(parsed, state), *_output(parsed, _free(state, name, ".yaml"))]
 
 
@@ -102,11 +108,25 @@ def _of_model(fitted: Callable[[FolderState, Item], list[str]]) -> Fill:
 
     def fill(parsed: Parsed, state: FolderState) -> list[str]:
         typed = [str(p) for p in parsed.paths("model", "runs")]
+        if typed and not any(p.endswith((".yaml", ".yml")) or (state.folder / p).is_dir() for p in typed):
+            return chosen_models(state)[:1]  # runs alone
         words = typed or chosen_models(state)[:1]
         model = next((i for i in state.of_kind(MODEL) if [i.path] == words), None)
         return [] if model is None else [*(() if typed else words), *fitted(state, model)]
 
     return fill
+
+
+def _compare(parsed: Parsed, state: FolderState) -> list[str]:
+    """Return the model and runs; where nothing is typed and the model was extended, what its line began with before it."""
+    typed = parsed.paths("model", "runs")
+    if any(own_kind(state.folder / p) == "schedule" for p in typed):
+        return run_words(state) if len(typed) == 1 else []
+    words = _of_model(unseen_runs)(parsed, state)
+    if typed or not words:
+        return words
+    first = root_of(state, words[0])
+    return words if first == words[0] else [first, *words, *_output(parsed, _free(state, "figures"))]
 
 
 def _extend(parsed: Parsed, state: FolderState) -> list[str]:
@@ -183,7 +203,7 @@ FILLS: Mapping[str, Fill] = MappingProxyType(
         "plan": _plan,
         "import": _import,
         "identify": _identify,
-        "compare": _of_model(unseen_runs),
+        "compare": _compare,
         "diagnose": _diagnose,
         "extend": _extend,
         "history": _model,

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
+from fieldsid.diagnosis.records import NextManeuver
 from fieldsid.diagnosis.report.report_text import sized
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import RIVAL_LOG_ODDS, SUFFICIENT_ERROR_RATIO
@@ -15,13 +16,14 @@ from fieldsid.diagnosis.verdict import Verdict, names_added
 from fieldsid.errors import FieldsidError
 from fieldsid.models.effect import effect_named
 from fieldsid.models.model import Noise
+from fieldsid.records.keys import body_of
 
 MOST_RIVALS = 3
 
 
 def next_maneuver(
     search: Search, verdict: Verdict, found: ScoredModel, skipped: Mapping[str, str], floor: Noise
-) -> dict[str, Any] | None:
+) -> NextManeuver | None:
     """Return the next maneuver; None where no question is open.
 
     For rivals it is the maneuver, within the fin angles already flown, whose refitted predictions differ most. A signal that the
@@ -30,24 +32,26 @@ def next_maneuver(
     if verdict.word == "undecided":
         return _deciding(search, [found, *verdict.rivals][:MOST_RIVALS])
     if verdict.word == "unexplained":
-        return {
-            "maneuver": "repeat the run",
-            "why": "what comes back at the same fin is the vehicle, what does not is the sea or a fault",
-        }
+        return NextManeuver(
+            "repeat the run", "what comes back at the same fin is the vehicle, what does not is the sea or a fault"
+        )
     left = found.selection_errors.over(floor)
     if skipped and verdict.word == "effect" and left > SUFFICIENT_ERROR_RATIO:
         name = min(skipped)
         why = f"an error of {sized(search, found, floor)} is left, and {name} could not be tried: {skipped[name]}"
-        return {"maneuver": "log the missing signal", "why": why}
+        return NextManeuver("log the missing signal", why)
     return None
 
 
-def _deciding(search: Search, rivals: list[ScoredModel]) -> dict[str, Any]:
+def _deciding(search: Search, rivals: list[ScoredModel]) -> NextManeuver:
     from fieldsid.planning.discriminate.discriminate import separate
     from fieldsid.planning.safety.envelope import LARGEST_FIN, Envelope
 
     names = list(dict.fromkeys(n for h in rivals for n in names_added(search, h)))
-    command = {"separates": names, "command": f"sysid plan --separate {','.join('+'.join(h.names) for h in rivals)}"}
+    command: dict[str, Any] = {
+        "separates": tuple(names),
+        "command": f"sysid plan --separate {','.join('+'.join(h.names) for h in rivals)}",
+    }
     fin = min(max(float(np.max(np.abs(r.fin - np.median(r.fin)))) for r in search.records), LARGEST_FIN)
     speeds = [r.speed for r in search.records if np.isfinite(r.speed)]
     try:
@@ -56,19 +60,19 @@ def _deciding(search: Search, rivals: list[ScoredModel]) -> dict[str, Any]:
         found = separate(models, Envelope(fin), speeds=(speed,), fast=True, mapped=search.parallel.map)
     except FieldsidError as error:
         # nothing inside the limits separates them: what the effects themselves declare is still worth flying
-        return {**_declared(names), **command, "note": error.what}
+        return NextManeuver(*_declared(names), **command, note=error.what)
     odds = found.expected_log_odds
     if odds < RIVAL_LOG_ODDS:
         tried = f"no maneuver inside the fin angles flown is expected to give log odds of more than {odds:.1f} for the right one"
-        return {**_declared(names), **command, "expected_log_odds": odds, "note": tried}
-    return {**found.plain(), **command, "why": f"expected log odds {odds:.0f} for the right one"}
+        return NextManeuver(*_declared(names), **command, expected_log_odds=odds, note=tried)
+    return NextManeuver(why=f"expected log odds {odds:.0f} for the right one", **body_of(found), **command)
 
 
-def _declared(names: list[str]) -> dict[str, Any]:
-    """Return the maneuver that most of some effects declare to be excited by."""
+def _declared(names: list[str]) -> tuple[str, str]:
+    """Return the maneuver, and why, that most of some effects declare to be excited by."""
     votes: dict[str, int] = {}
     for name in names:
         for rank, maneuver in enumerate(effect_named(name).excited_by):
             votes[maneuver] = votes.get(maneuver, 0) + 10 - rank
     best = max(votes, key=lambda m: votes[m])
-    return {"maneuver": best, "why": f"it excites {', '.join(n for n in names if best in effect_named(n).excited_by)}"}
+    return best, f"it excites {', '.join(n for n in names if best in effect_named(n).excited_by)}"

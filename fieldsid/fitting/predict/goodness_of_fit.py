@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
 from fieldsid.fitting.predict.predict import Prediction
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.records.keys import Key, Number
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,10 +21,10 @@ class GoodnessOfFit:
     fit = 100 (1 - |y - s| / |y - mean(y)|), y measured and s simulated; 100 is perfect, 0 no better than the mean.
     """
 
-    angle_rms: float
-    rate_rms: float
-    angle_fit: float
-    rate_fit: float
+    angle_rms: Annotated[Number, Key("Of the angle, in rad.", "angle_rms_rad")]
+    rate_rms: Annotated[Number, Key("Of the rate, in rad/s.", "rate_rms_rad_s")]
+    angle_fit: Annotated[Number, Key("100 (1 - |y - s| / |y - mean y|) of the angle.", "angle_fit_percent")]
+    rate_fit: Annotated[Number, Key("The same of the rate.", "rate_fit_percent")]
 
 
 def goodness_of_fit(predictions: Sequence[Prediction]) -> GoodnessOfFit:

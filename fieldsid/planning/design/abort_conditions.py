@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 from fieldsid.planning.design.leg import Leg
 from fieldsid.planning.safety.envelope import Envelope
+from fieldsid.records.keys import Key
 
 GRACE_S = 5.0
 SLOWEST_SHARE = 0.6
@@ -15,11 +17,11 @@ SLOWEST_SHARE = 0.6
 class Abort:
     """End the maneuver when a signal leaves `limit`: `kind` is deviation (from its value at the start), below, above or time."""
 
-    signal: str
-    kind: str
-    limit: float
-    unit: str
-    says: str
+    signal: Annotated[str, Key("The signal, or `time_s`.")]
+    kind: Annotated[str, Key("How it is compared.", of=Literal["deviation", "below", "above", "time"])]
+    limit: Annotated[float, Key("The limit.")]
+    unit: Annotated[str, Key("Its unit.")]
+    says: Annotated[str, Key("In words.")]
 
 
 def aborts_of(leg: Leg, envelope: Envelope) -> tuple[Abort, ...]:

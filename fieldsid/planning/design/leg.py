@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Annotated
 
 import numpy as np
 
@@ -12,7 +13,8 @@ from fieldsid.display import Brief
 from fieldsid.maneuvers import Autopilot, within
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.flight.excitation import Excitation, Window, asked_of
-from fieldsid.planning.safety.envelope import Envelope
+from fieldsid.planning.safety.envelope import Envelope, Excursion
+from fieldsid.records.keys import INLINE, Key, Number
 from fieldsid.rounding import number
 
 CIRCLE = "turn radius"
@@ -32,11 +34,11 @@ class Expected:
     `relative` is the error over what it is measured against: the value or, where that may be zero, another scale (prior.py).
     """
 
-    value: float
-    std_error: float
-    std_error_high: float
-    relative: float
-    baseline: float = float("nan")
+    value: Annotated[float, Key("The value that is believed, at the leg's speed.")]
+    std_error: Annotated[Number, Key("Expected standard error.")]
+    std_error_high: Annotated[Number, Key("The error that five of six draws of what is believed stay below.")]
+    relative: Annotated[Number, Key("Standard error over the value; of a trim over a typical one.")]
+    baseline: Annotated[Number, Key("Standard error that the usual pulses of the same length give.")] = float("nan")
 
     def over(self, passes: int) -> Expected:
         """Return the expectation after several passes."""
@@ -59,21 +61,38 @@ class Leg(Brief):
     these commands, flown open loop, leave the envelope. `heading` (rad) is a limit of its own, in place of the plan's.
     """
 
-    speed: float
-    candidate: Excitation
-    window: Window
-    run_up_s: float
-    turn_s: float
-    autopilot: Autopilot
-    expected: Mapping[str, Expected]
-    excursions: Mapping[str, float]
-    break_probability: float
-    passes: int = 1
-    purpose: str = "parameters"
-    heading: float | None = None
+    speed: Annotated[float, Key("Speed through the water.", "speed_m_s")]
+    candidate: Annotated[Excitation, INLINE]
+    window: Annotated[Window, Key("The part that is identified on.")]
+    run_up_s: Annotated[float, Key("Straight run before the window.")]
+    turn_s: Annotated[float, Key("Time to turn at the end.")]
+    autopilot: Annotated[Autopilot, Key("Who steers where the maneuver does not.")]
+    expected: Annotated[Mapping[str, Expected], Key("By parameter, what it will be known to.")]
+    excursions: Annotated[Mapping[str, float], Key("What the flight reaches.", of=Excursion)]
+    break_probability: Annotated[float, Key("Probability of leaving the envelope.")]
+    passes: Annotated[int, Key("How many times it is flown.")] = 1
+    purpose: Annotated[str, Key("`parameters`, `turn radius`, or the effects it separates.")] = "parameters"
+    heading: Annotated[
+        float | None, Key("Largest deviation of heading on this leg; null where it is not limited.", "heading_limit_rad")
+    ] = None
     replay_risk: float = float("nan")
     nominal: FloatArray = field(default_factory=lambda: np.zeros(0))
     alternatives: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+
+    @property
+    def rate_hz(self) -> Annotated[float, Key()]:
+        """The vehicle's command rate."""
+        return self.window.rate_hz
+
+    @property
+    def replay_break_probability(self) -> Annotated[float | None, Key(is_optional=True)]:
+        """The same where the fin of a maneuver that follows the motion is flown from a list."""
+        return None if self.open_loop else self.replay_risk
+
+    @property
+    def expected_fin(self) -> Annotated[tuple[Number, ...] | None, Key(name="expected_fin_rad", is_optional=True)]:
+        """The fin expected at each sample of a maneuver that follows the motion; null where the autopilot steers."""
+        return None if self.open_loop else tuple(round(float(v), 5) for v in self.nominal)
 
     @property
     def pass_s(self) -> float:
@@ -81,12 +100,12 @@ class Leg(Brief):
         return self.run_up_s + self.window.length + self.turn_s
 
     @property
-    def duration_s(self) -> float:
+    def duration_s(self) -> Annotated[float, Key()]:
         """Seconds of all passes."""
         return self.passes * self.pass_s
 
     @property
-    def distance_m(self) -> float:
+    def distance_m(self) -> Annotated[float, Key()]:
         """Metres through the water of all passes."""
         return self.duration_s * self.speed
 

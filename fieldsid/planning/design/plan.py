@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -14,12 +15,14 @@ from fieldsid.models.allocation import PlaneFins
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
 from fieldsid.planning.belief.prior_model import checked_prior
+from fieldsid.planning.design.abort_conditions import Abort, aborts_of
 from fieldsid.planning.design.best_leg import RUN_UP_S, Setting, best_leg
 from fieldsid.planning.design.circle_legs import circle_legs
 from fieldsid.planning.design.leg import Leg
 from fieldsid.planning.flight.excitation import Excitation, Window
-from fieldsid.planning.safety.envelope import Envelope, check_room, check_speeds
+from fieldsid.planning.safety.envelope import Envelope, check_room, check_speeds, limits_said
 from fieldsid.planning.specify.accuracy_goals import accuracy_goals_text
+from fieldsid.records.keys import INLINE, Key
 from fieldsid.runtime.parallel_map import parallel_map
 
 SHORTEST_WINDOW_S = 15.0
@@ -48,34 +51,52 @@ class Request:
     course: float | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class PlannedLeg:
+    """One leg of the plan."""
+
+    leg: Annotated[Leg, INLINE]
+    abort: Annotated[tuple[Abort, ...], Key("When to give up.")]
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Plan(Brief):
     """Legs in the order they are flown, and all that is needed to fly them within the limits again."""
 
-    axis: Axis
-    vehicle: str
-    prior: str
-    envelope: Envelope
+    axis: Annotated[Axis, Key("The plane.")]
+    vehicle: Annotated[str, Key("The vehicle's name.")]
+    prior: Annotated[str, Key("What is believed before the dive.")]
+    envelope: Annotated[Envelope, Key("The limits it keeps.")]
     legs: tuple[Leg, ...]
-    want: Mapping[str, float]
-    seed: int = 1
-    course: float | None = None
+    want: Annotated[Mapping[str, float], Key("Relative standard errors asked for.")]
+    seed: Annotated[int, Key("Seed of the search and the draws.")] = 1
+    course: Annotated[float | None, Key("Course of the legs; null where none was given.", "course_rad")] = None
     """Compass course of the first pass of every leg in rad, None where nobody has said."""
-    fins: PlaneFins | None = None
+    fins: Annotated[PlaneFins | None, Key("The fins that the command is made of; null where it is one.")] = None
     """The fins that the axis' command is made of; None where it is one."""
 
     @property
-    def minutes(self) -> float:
+    def planned(self) -> Annotated[tuple[PlannedLeg, ...], Key(name="legs")]:
+        """The legs."""
+        return tuple(PlannedLeg(leg, aborts_of(leg, self.envelope)) for leg in self.legs)
+
+    @property
+    def limits(self) -> Annotated[Mapping[str, str], Key()]:
+        """The same in words, `NOT LIMITED` where there is none."""
+        return limits_said(self.envelope)
+
+    @property
+    def minutes(self) -> Annotated[float, Key()]:
         """Minutes of all legs."""
         return sum(leg.duration_s for leg in self.legs) / 60.0
 
     @property
-    def metres(self) -> float:
+    def metres(self) -> Annotated[float, Key()]:
         """Metres through the water of all legs."""
         return sum(leg.distance_m for leg in self.legs)
 
     @property
-    def break_probability(self) -> float:
+    def break_probability(self) -> Annotated[float, Key()]:
         """Probability that a pass leaves the envelope, the largest of the legs'."""
         return max((leg.break_probability for leg in self.legs), default=0.0)
 

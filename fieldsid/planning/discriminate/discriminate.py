@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from fieldsid.planning.flight.closed_loop import Response
 from fieldsid.planning.flight.excitation import Excitation, Window, fits, flown_all
 from fieldsid.planning.flight.operating_point import autopilot_of, operating_point
 from fieldsid.planning.safety.envelope import Envelope, excursion_of, used
+from fieldsid.records.keys import Key, Number
 
 Pairs = Mapping[str, float]
 Map = Callable[[Callable[[Excitation], Pairs], Sequence[Excitation]], list[Pairs]]
@@ -40,13 +41,13 @@ class Separation:
     `expected_log_odds` is that of the pair and direction it separates least; `pairs` holds all, keyed "right>wrong".
     """
 
-    maneuver: str
-    parameters: Mapping[str, float]
-    speed: float
-    expected_log_odds: float
-    pairs: Mapping[str, float]
+    maneuver: Annotated[str, Key("The maneuver.")]
+    parameters: Annotated[Mapping[str, float], Key("Its parameters.")]
+    speed: Annotated[float, Key("The speed to fly it at.", "speed_m_s")]
+    expected_log_odds: Annotated[Number, Key("Smallest log odds of the pairs.")]
+    pairs: Annotated[Mapping[str, float], Key("`true>wrong`: expected log odds for the true one.")]
     window: Window
-    alternatives: Mapping[str, float]
+    alternatives: Annotated[Mapping[str, float], Key("Other maneuvers, with what they are expected to give.")]
 
     @property
     def candidate(self) -> Excitation:
@@ -54,24 +55,24 @@ class Separation:
         return Excitation(self.maneuver, self.parameters)
 
     @property
-    def decides(self) -> bool:
+    def decides(self) -> Annotated[bool, Key()]:
         """Whether every pair is expected to be discriminated at odds of 20 to 1 or better."""
         return self.expected_log_odds >= DECISIVE_LOG_ODDS
 
-    def plain(self) -> dict[str, Any]:
-        """Return the separation as a mapping for JSON and YAML."""
-        return {
-            "maneuver": self.maneuver,
-            "spec": self.candidate.spec,
-            "parameters": dict(self.parameters),
-            "speed_m_s": self.speed,
-            "duration_s": self.window.length,
-            "expected_log_odds": self.expected_log_odds,
-            "expected_odds": float(np.exp(min(self.expected_log_odds, MOST_LOG_ODDS))),
-            "pairs": dict(self.pairs),
-            "decides": self.decides,
-            "alternatives": dict(self.alternatives),
-        }
+    @property
+    def spec(self) -> Annotated[str, Key()]:
+        """The maneuver with its parameters, as `--maneuver` takes it."""
+        return self.candidate.spec
+
+    @property
+    def duration_s(self) -> Annotated[float, Key()]:
+        """Its length."""
+        return self.window.length
+
+    @property
+    def expected_odds(self) -> Annotated[Number, Key()]:
+        """The same as odds."""
+        return float(np.exp(min(self.expected_log_odds, MOST_LOG_ODDS)))
 
     def says(self) -> list[str]:
         """Return what is expected, in sentences."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.flight.closed_loop import Response, respond
 from fieldsid.planning.flight.operating_point import OperatingPoint
 from fieldsid.planning.flight.rule_flight import fly_operating_points
+from fieldsid.records.keys import Key
 
 LONGEST_WINDOW_S = 300.0
 """No maneuver of the catalogue has a longer period."""
@@ -22,9 +24,9 @@ LONGEST_WINDOW_S = 300.0
 class Window:
     """The part of a leg that is identified on: `lead` s steady, the excitation, at least `recover` s; `length` s in all."""
 
-    length: float = 33.0
-    lead: float = 2.0
-    recover: float = 5.0
+    length: Annotated[float, Key("Its length.", "length_s")] = 33.0
+    lead: Annotated[float, Key("Straight run at its start.", "lead_s")] = 2.0
+    recover: Annotated[float, Key("Recovery at its end.", "recover_s")] = 5.0
     rate_hz: float = 20.0
 
     @property
@@ -62,8 +64,8 @@ class Window:
 class Excitation:
     """A maneuver by name with all its parameters."""
 
-    maneuver: str
-    parameters: Mapping[str, float]
+    maneuver: Annotated[str, Key("The maneuver.")]
+    parameters: Annotated[Mapping[str, float], Key("Its parameters.")]
 
     @property
     def record(self) -> Maneuver:

@@ -16,6 +16,7 @@ from fieldsid.planning.design.leg import Leg, commands_of
 from fieldsid.planning.design.plan import Plan
 from fieldsid.planning.output.mission import instead, refuse_blind, render, styles
 from fieldsid.planning.safety.envelope import NOT_LIMITED, limits_said
+from fieldsid.records.keys import body_of
 from fieldsid.registry import near
 
 TABLE, BAG = "csv", "ros2"
@@ -97,7 +98,7 @@ def conditions_text(plan: Plan, leg: Leg) -> str:
         "schema": "fieldsid/abort/1",
         "fin_max_rad": limits.fin,
         "fin_rate_max_rad_s": limits.fin_rate,
-        "fins": None if plan.fins is None else plan.fins.record(),
+        "fins": None if plan.fins is None else body_of(plan.fins),
         "abort": [asdict(a) for a in aborts_of(leg, plan.envelope)],
         "not_limited": [name for name, words in limits_said(limits).items() if words == NOT_LIMITED],
     }

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fieldsid.artifacts import plain, save_record
+from fieldsid.artifacts import save_record
 from fieldsid.errors import ArtifactError, FieldsidError, shortened
 from fieldsid.maneuvers import Autopilot, pick_maneuver
 from fieldsid.models.allocation import plane_fins_of
 from fieldsid.models.axis import Axis
-from fieldsid.planning.design.abort_conditions import aborts_of
 from fieldsid.planning.design.leg import Expected, Leg
 from fieldsid.planning.design.plan import MOST_PASSES, Plan
 from fieldsid.planning.flight.excitation import Excitation, Window, fits
-from fieldsid.planning.safety.envelope import LARGEST_SPEED, Envelope, limits_said
+from fieldsid.planning.safety.envelope import LARGEST_SPEED, Envelope
+from fieldsid.records.keys import body_of
 from fieldsid.records.reading import load_record
 
 KIND = "fieldsid/plan"
@@ -29,54 +28,7 @@ MOST_LEGS = 200
 
 def save_plan(plan: Plan, path: Path, *, inputs: Sequence[Path] = (), parent: Path | None = None, force: bool = False) -> Path:
     """Write a plan as YAML; raises ArtifactError."""
-    return save_record(path, f"{KIND}/1", plan_body(plan), inputs=inputs, parent=parent, force=force)
-
-
-def plan_body(plan: Plan) -> dict[str, Any]:
-    """Return a plan as nested plain mappings: what the file and `--json` hold."""
-    body = {
-        "axis": plan.axis.value,
-        "vehicle": plan.vehicle,
-        "prior": plan.prior,
-        "seed": plan.seed,
-        "course_rad": plan.course,
-        "fins": None if plan.fins is None else plan.fins.record(),
-        "want": dict(plan.want),
-        "minutes": plan.minutes,
-        "metres": plan.metres,
-        "break_probability": plan.break_probability,
-        "envelope": plan.envelope.plain(),
-        "limits": limits_said(plan.envelope),
-        "legs": [_leg_body(plan, leg) for leg in plan.legs],
-    }
-    out: dict[str, Any] = plain(body)
-    return out
-
-
-def _leg_body(plan: Plan, leg: Leg) -> dict[str, Any]:
-    body: dict[str, Any] = {
-        "speed_m_s": leg.speed,
-        "purpose": leg.purpose,
-        "maneuver": leg.candidate.maneuver,
-        "parameters": dict(leg.candidate.parameters),
-        "passes": leg.passes,
-        "run_up_s": leg.run_up_s,
-        "turn_s": leg.turn_s,
-        "window": {"length_s": leg.window.length, "lead_s": leg.window.lead, "recover_s": leg.window.recover},
-        "rate_hz": leg.window.rate_hz,
-        "duration_s": leg.duration_s,
-        "distance_m": leg.distance_m,
-        "autopilot": {"angle_gain": leg.autopilot.angle_gain, "rate_gain": leg.autopilot.rate_gain},
-        "expected": {n: {f: getattr(e, f) for f in Expected.__dataclass_fields__} for n, e in leg.expected.items()},
-        "excursions": dict(leg.excursions),
-        "break_probability": leg.break_probability,
-        "heading_limit_rad": leg.heading,
-        "abort": [asdict(a) for a in aborts_of(leg, plan.envelope)],
-    }
-    if not leg.open_loop:
-        body["replay_break_probability"] = leg.replay_risk
-        body["expected_fin_rad"] = [None if math.isnan(v) else round(v, 5) for v in leg.nominal.tolist()]
-    return body
+    return save_record(path, f"{KIND}/1", body_of(plan), inputs=inputs, parent=parent, force=force)
 
 
 def load_plan(path: Path) -> Plan:

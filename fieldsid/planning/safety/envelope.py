@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import degrees
+from typing import Annotated
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from fieldsid.maneuvers import Limits
 from fieldsid.models.axis import Axis
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.flight.closed_loop import Response
+from fieldsid.records.keys import Key, Number
 
 LARGEST_FIN = 0.7
 LARGEST_SPEED = 15.0
@@ -55,17 +57,17 @@ class Envelope:
     probability of leaving any of them.
     """
 
-    fin: float
-    fin_rate: float = np.inf
-    heading: float | None = None
-    track: float | None = None
-    depth_low: float | None = None
-    depth_high: float | None = None
-    pitch: float | None = None
-    roll: float | None = None
-    area_length: float | None = None
-    area_width: float | None = None
-    share: float = 0.05
+    fin: Annotated[float, Key("Largest fin angle about trim, rad.")]
+    fin_rate: Annotated[Number, Key("Fastest fin, rad/s.")] = np.inf
+    heading: Annotated[float | None, Key("Largest deviation of heading, rad.")] = None
+    track: Annotated[float | None, Key("Largest distance from the leg's line, m.")] = None
+    depth_low: Annotated[float | None, Key("Shallowest, m.")] = None
+    depth_high: Annotated[float | None, Key("Deepest, m.")] = None
+    pitch: Annotated[float | None, Key("Largest pitch, rad.")] = None
+    roll: Annotated[float | None, Key("Largest roll, rad.")] = None
+    area_length: Annotated[float | None, Key("Room along the leg, m.")] = None
+    area_width: Annotated[float | None, Key("Room across it, m.")] = None
+    share: Annotated[float, Key("Accepted probability of leaving them.")] = 0.05
 
     def __post_init__(self) -> None:
         for name in ("fin", "fin_rate", "heading", "track", "pitch", "roll", "area_length", "area_width", "share"):
@@ -109,11 +111,6 @@ class Envelope:
         options = dict.fromkeys(f"`{SET_BY[name]}`" for name in self.rooms())
         return f"widen {' or '.join(options)}" if options else "allow more fin: `--fin-max`"
 
-    def plain(self) -> dict[str, float | None]:
-        """Return the limits as a mapping; an unlimited fin rate is None."""
-        out = {f.name: getattr(self, f.name) for f in fields(self)}
-        return out | {"fin_rate": self.fin_rate if np.isfinite(self.fin_rate) else None}
-
 
 @dataclass(frozen=True, slots=True)
 class Excursion:
@@ -122,14 +119,14 @@ class Excursion:
     along is the farthest ahead of the start of the run-up, behind the farthest back of it, across the farthest to a side.
     """
 
-    heading: float
-    track: float
-    depth: float
-    pitch: float
-    roll: float
-    along: float
-    behind: float
-    across: float
+    heading: Annotated[float, Key("Deviation of heading, rad.")]
+    track: Annotated[float, Key("Distance from the line, m.")]
+    depth: Annotated[float, Key("Change of depth, m.")]
+    pitch: Annotated[float, Key("Pitch, rad.")]
+    roll: Annotated[float, Key("Roll, rad.")]
+    along: Annotated[float, Key("Length needed, m.")]
+    behind: Annotated[float, Key("Way beyond the end of the area, m.")]
+    across: Annotated[float, Key("Width needed, m.")]
 
     def over(self, envelope: Envelope) -> dict[str, float]:
         """Return the share of its limit that each limited excursion uses, 1 at the limit: the area begins at the start."""

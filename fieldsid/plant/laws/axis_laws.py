@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from fieldsid.plant.laws.parameter_law import ParameterLaw, authority_law, other
 from fieldsid.plant.laws.regression import Regression, regression_of
 from fieldsid.plant.points import Point, check_authority, distinct_speeds
 from fieldsid.records.check import ShapeError
+from fieldsid.records.keys import Key, body_of
 from fieldsid.records.laws import LARGEST_COEFFICIENT
 from fieldsid.records.reading import load_record
 from fieldsid.rounding import nine_digits
@@ -33,10 +34,25 @@ KIND = "fieldsid/fit"
 class Laws(Plotted):
     """The laws of one axis by parameter name, and the points they were drawn through."""
 
-    axis: Axis
-    points: tuple[Point, ...]
-    by_name: Mapping[str, ParameterLaw]
+    axis: Annotated[Axis, Key("The plane.")]
+    points: Annotated[tuple[Point, ...], Key("What the laws were drawn through.")]
+    by_name: Annotated[Mapping[str, ParameterLaw], Key("By parameter.", "laws")]
     notes: tuple[Note, ...] = ()
+
+    @property
+    def speed_low(self) -> Annotated[float, Key(name="speed_low_m_s")]:
+        """Slowest point."""
+        return float(self.speeds[0])
+
+    @property
+    def speed_high(self) -> Annotated[float, Key(name="speed_high_m_s")]:
+        """Fastest point."""
+        return float(self.speeds[-1])
+
+    @property
+    def warnings(self) -> Annotated[tuple[Note, ...], Key()]:
+        """What to know before they are trusted."""
+        return (*self.notes, *law_notes(self))
 
     @property
     def authority(self) -> ParameterLaw:
@@ -113,21 +129,6 @@ def with_own_law(laws: Laws, text: str) -> Laws:
     return replace(laws, by_name=MappingProxyType({**laws.by_name, name: own}))
 
 
-def report(laws: Laws) -> dict[str, Any]:
-    """Return the laws as the plain record that `--json` prints and the file holds."""
-    return {
-        "axis": laws.axis.value,
-        "speed_low_m_s": float(laws.speeds[0]),
-        "speed_high_m_s": float(laws.speeds[-1]),
-        "points": [
-            {"name": p.name, "speed_m_s": p.speed, "values": dict(p.values), "std_errors": dict(p.std_errors)}
-            for p in laws.points
-        ],
-        "laws": {n: _law_record(law) for n, law in laws.by_name.items()},
-        "warnings": [{"code": n.code, "message": n.message} for n in (*laws.notes, *law_notes(laws))],
-    }
-
-
 def law_notes(laws: Laws) -> tuple[Note, ...]:
     """Return the remarks of every law, those on points that do not belong first."""
     odd = [
@@ -148,7 +149,7 @@ def law_notes(laws: Laws) -> tuple[Note, ...]:
 def save_laws(laws: Laws, path: Path, *, models: Sequence[Path] = (), inputs: Sequence[Path] = (), force: bool = False) -> Path:
     """Write the laws as YAML, with the models they came from whole: effects, covariance and all; raises ArtifactError."""
     carried = [{"name": p.stem, "record": load_record(p, MODEL_KIND)} for p in models]
-    return save_record(path, f"{KIND}/1", report(laws) | {"models": carried}, inputs=inputs, force=force)
+    return save_record(path, f"{KIND}/1", body_of(laws) | {"models": carried}, inputs=inputs, force=force)
 
 
 def carried_models(path: Path) -> tuple[tuple[str, Model], ...]:
@@ -192,41 +193,6 @@ def _points_of(records: Sequence[Mapping[str, Any]]) -> tuple[Point, ...]:
     if not points:
         raise ShapeError("`points` is empty: no law comes from none")
     return points
-
-
-def _law_record(law: ParameterLaw) -> dict[str, Any]:
-    exponent = law.exponent
-    affine = next((c for c in law.candidates if c.kind == "affine"), None)
-    return {
-        "sign": law.sign,
-        "chosen": law.chosen,
-        "weighted": law.std_errors is not None,
-        "slope": None if affine is None else affine.coefficients[1],
-        "intercept": None if affine is None else affine.coefficients[0],
-        "candidates": {c.kind: c.record() for c in law.candidates},
-        "exponent": None
-        if exponent is None
-        else {
-            "value": exponent.value,
-            "std_error": exponent.std_error,
-            "interval95": list(exponent.interval95),
-            "p_against_2": exponent.p_against_2,
-            "says": exponent.says,
-        },
-        "leave_one_out": [
-            {
-                "name": p.name,
-                "speed_m_s": p.speed,
-                "value": p.value,
-                "predicted_without": p.predicted_without,
-                "leading_coefficient_without": p.leading_coefficient_without,
-                "studentised": p.studentised,
-                "limit": p.limit,
-                "belongs": p.belongs,
-            }
-            for p in law.points
-        ],
-    }
 
 
 def _law_of(name: str, record: Mapping[str, Any], points: Sequence[Point]) -> ParameterLaw:

@@ -7,8 +7,9 @@ externally studentised residuals (Cook & Weisberg 1982, chapter 2) against Bonfe
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,7 @@ from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.tail_probabilities import student_quantile, student_tail
 from fieldsid.plant.laws.regression import ROUNDING_SHARE, Regression, fit_power_law, fit_powers, rounding_of, t_factor
+from fieldsid.records.keys import Interval, Key, Number
 from fieldsid.rounding import nine_digits, p_value
 
 FAMILY_ALPHA = 0.05
@@ -33,13 +35,13 @@ EXPONENT_OF_LIFT = 2.0
 class Exponent:
     """The e of |b| = k u^e with its 95 % interval, and the two-sided p of e = 2."""
 
-    value: float
-    std_error: float
-    interval95: tuple[float, float]
-    p_against_2: float
+    value: Annotated[float, Key("The estimate.")]
+    std_error: Annotated[Number, Key("Its standard error.")]
+    interval95: Annotated[Interval, Key("Its 95 % interval.")]
+    p_against_2: Annotated[Number, Key("Two-sided p-value of e = 2; null where two speeds fit any.")]
 
     @property
-    def says(self) -> str:
+    def says(self) -> Annotated[str, Key()]:
         """One sentence for the reader."""
         low, high = self.interval95
         spread = f"u^{self.value:.2f} (95 % {low:.2f} .. {high:.2f})"
@@ -60,16 +62,16 @@ class PointCheck(Brief):
     Beyond the limit it does not belong; infinite where the points are too few to say so of any.
     """
 
-    name: str
-    speed: float
-    value: float
-    predicted_without: float
-    leading_coefficient_without: float
-    studentised: float
-    limit: float
+    name: Annotated[str, Key("The point.")]
+    speed: Annotated[float, Key("Its speed.", "speed_m_s")]
+    value: Annotated[float, Key("Its value, times the sign.")]
+    predicted_without: Annotated[float, Key("What the law of the others gives there.")]
+    leading_coefficient_without: Annotated[float, Key("The leading coefficient of that law.")]
+    studentised: Annotated[Number, Key("How far off it is, externally studentised.")]
+    limit: Annotated[Number, Key("Bonferroni's limit.")]
 
     @property
-    def belongs(self) -> bool:
+    def belongs(self) -> Annotated[bool, Key()]:
         """Whether the point is within the limit."""
         return not abs(self.studentised) > self.limit
 
@@ -79,15 +81,40 @@ class ParameterLaw(Brief):
     """A parameter's law: `sign` times the chosen one of the `candidates`; magnitudes (n,) at speeds (n,)."""
 
     name: str
-    sign: float
+    sign: Annotated[float, Key("-1 where the parameter is negative.")]
     speeds: FloatArray
     values: FloatArray
     std_errors: FloatArray | None
     candidates: tuple[Regression, ...]
-    chosen: str
-    exponent: Exponent | None
-    points: tuple[PointCheck, ...]
+    chosen: Annotated[str, Key("The candidate that the next commands take.")]
+    exponent: Annotated[
+        Exponent | None, Key("The exponent of the authority, with its test against 2; null for the other parameters.")
+    ]
+    points: Annotated[tuple[PointCheck, ...], Key("Each point against the law of the others.", "leave_one_out")]
     notes: tuple[Note, ...] = ()
+
+    @property
+    def weighted(self) -> Annotated[bool, Key()]:
+        """Whether the points' standard errors weigh them."""
+        return self.std_errors is not None
+
+    @property
+    def slope(self) -> Annotated[float | None, Key()]:
+        """Slope of the affine law against u^2."""
+        return self._affine(1)
+
+    @property
+    def intercept(self) -> Annotated[float | None, Key()]:
+        """Its intercept."""
+        return self._affine(0)
+
+    @property
+    def by_kind(self) -> Annotated[Mapping[str, Regression], Key(name="candidates")]:
+        """All that were fitted."""
+        return {c.kind: c for c in self.candidates}
+
+    def _affine(self, place: int) -> float | None:
+        return next((float(c.coefficients[place]) for c in self.candidates if c.kind == "affine"), None)
 
     @property
     def line(self) -> Regression:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from fieldsid.errors import DataError
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.tail_probabilities import student_quantile
 from fieldsid.records.check import ShapeError, finite_number
+from fieldsid.records.keys import Key, Number
 from fieldsid.records.laws import LARGEST_COEFFICIENT, LARGEST_LOGARITHM
 
 CONFIDENCE_LEVEL = 0.95
@@ -25,13 +26,13 @@ ROUNDING_SHARE = 1e-9
 class Regression(Brief):
     """y(u) = sum_k c_k u^p_k, or exp(c_0) u^c_1 where `powers` is empty, with the covariance of c and its degrees of freedom."""
 
-    kind: str
-    powers: tuple[float, ...]
-    coefficients: FloatArray
-    covariance: FloatArray
-    dof: int
-    r2: float
-    rms: float
+    kind: Annotated[str, Key("`constant`, `linear`, `affine`, `through_zero` or `power`.")]
+    powers: Annotated[tuple[float, ...], Key("The powers p.")]
+    coefficients: Annotated[FloatArray, Key("The numbers c.", of=tuple[float, ...])]
+    covariance: Annotated[FloatArray, Key("Their covariance.", of=tuple[tuple[Number, ...], ...])]
+    dof: Annotated[int, Key("Degrees of freedom.")]
+    r2: Annotated[Number, Key("Share of the points' variance it explains; proves little.")]
+    rms: Annotated[float, Key("Root mean square of what it leaves.")]
 
     def columns(self, speed: npt.ArrayLike) -> FloatArray:
         """Return the derivative of y with respect to c, (n, k)."""
@@ -59,18 +60,10 @@ class Regression(Brief):
         middle = self.at(speed)
         return middle - half, middle + half
 
-    def record(self) -> dict[str, Any]:
-        """Return the plain record of this law, as a file holds it."""
-        return {
-            "kind": self.kind,
-            "powers": list(self.powers),
-            "coefficients": self.coefficients,
-            "std_errors": np.sqrt(np.maximum(np.diag(self.covariance), 0.0)),
-            "covariance": self.covariance,
-            "dof": self.dof,
-            "r2": self.r2,
-            "rms": self.rms,
-        }
+    @property
+    def std_errors(self) -> Annotated[FloatArray, Key(of=tuple[Number, ...])]:
+        """Their standard errors."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
 
 
 def regression_of(record: Mapping[str, Any]) -> Regression:

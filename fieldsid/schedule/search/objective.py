@@ -14,10 +14,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf, log
+from typing import Annotated
 
 import numpy as np
 
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.records.keys import Key, Number
 from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.flown.pace import Pace, full_bandwidth, pace_of
 from fieldsid.schedule.flown.response import (
@@ -89,8 +91,8 @@ class Outcome:
 
     own: tuple[float, ...]
     drawn: tuple[float, ...]
-    settled: float
-    fin: float
+    settled: Annotated[Number, Key("The time to settle that the rows are designed by.", "answer_s")]
+    fin: Annotated[Number, Key("The share of the fin's limit that the step asks for.", "fin_use")]
     kp: float
 
     @property

@@ -8,6 +8,7 @@ correlated residuals by the length of their autocorrelation.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from fieldsid.errors import DataError
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.white_noise import MEDIAN_OF_NORMAL
 from fieldsid.plant.laws.regression import ROUNDING_SHARE, t_factor
+from fieldsid.records.keys import Key, Number
 
 HUBER = 1.345
 LEAST_SAMPLES = 12
@@ -30,16 +32,16 @@ LEAST_TURN_FOR_CURRENT_RAD = 5.0
 class Circle(Brief):
     """A fitted circle: radius and its standard error (m), centre at t = 0 (m), current (m/s), residual (n,) m."""
 
-    radius: float
-    radius_std_error: float
-    centre: tuple[float, float]
-    current: tuple[float, float]
+    radius: Annotated[float, Key("Radius of the circle, current taken out.", "radius_m")]
+    radius_std_error: Annotated[Number, Key("Its standard error.", "std_error_m")]
+    centre: Annotated[tuple[float, float], Key("North and east of the centre.", "centre_m")]
+    current: Annotated[tuple[float, float], Key("North and east of the current.", "current_m_s")]
     residual: FloatArray
-    turned: float
+    turned: Annotated[float, Key("Angle that was turned.", "turned_rad")]
     effective_samples: float
 
     @property
-    def interval95(self) -> tuple[float, float]:
+    def interval95(self) -> Annotated[tuple[float, float], Key()]:
         """The 95 % interval of the radius, m."""
         half = t_factor(round(self.effective_samples)) * self.radius_std_error
         return self.radius - half, self.radius + half

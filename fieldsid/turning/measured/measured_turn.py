@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,7 @@ from fieldsid.errors import DataError
 from fieldsid.logs.run import Run
 from fieldsid.models.record import knows_speed
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.records.keys import INLINE, Key, Number, Side
 from fieldsid.turning.measured.circle import LEAST_TURN_FOR_CURRENT_RAD, Circle, fit_circle
 
 TURNING_SHARE = 0.5
@@ -28,14 +30,14 @@ class MeasuredTurn(Plotted):
     `track` is x and y (m) of the whole run, `settled` those of the settled part with the current taken out.
     """
 
-    run: str
-    side: str
-    circle: Circle
-    fin: float
-    entry_speed: float
-    path_speed: float
-    start_s: float
-    end_s: float
+    run: Annotated[str, Key("The run.")]
+    side: Annotated[str, Key("The side.", of=Side)]
+    circle: Annotated[Circle, INLINE]
+    fin: Annotated[Number, Key("The fin it was flown with.", "fin_rad")]
+    entry_speed: Annotated[Number, Key("Speed before the turn.", "entry_speed_m_s")]
+    path_speed: Annotated[Number, Key("Speed along the circle.", "path_speed_m_s")]
+    start_s: Annotated[float, Key("Start of the settled part.", "settled_from_s")]
+    end_s: Annotated[float, Key("End of it.", "settled_to_s")]
     track: tuple[FloatArray, FloatArray]
     settled: tuple[FloatArray, FloatArray]
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.record import knows_speed, record_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.block_means import block_means, block_width
+from fieldsid.records.keys import Key, Number
 
 BLOCK_S, BLOCK_SHARE = 0.2, 0.2
 """Block means are of 0.2 s, or of a fifth of the time in which a slow vehicle takes up its largest rate: its speed is slower."""
@@ -41,14 +43,14 @@ MIN_VARIANCE = 1e-18
 class SurgeModel(Brief):
     """a_u (1/m), k_r (m), k_d (1/m), l_r (m) with their covariance (4, 4); what was measured; the fit's scatter m/s."""
 
-    drag: float
-    turn_loss: float
-    fin_loss: float
-    drift_per_rate: float
+    drag: Annotated[float, Key("a_u.", "drag_per_m")]
+    turn_loss: Annotated[float, Key("k_r.", "turn_loss_m")]
+    fin_loss: Annotated[float, Key("k_d.", "fin_loss_per_m")]
+    drift_per_rate: Annotated[float, Key("l_r.", "drift_per_rate_m")]
     covariance: FloatArray
-    surge_measured: bool
-    sway_measured: bool
-    surge_rms: float = float("nan")
+    surge_measured: Annotated[bool, Key("Whether surge was measured.")]
+    sway_measured: Annotated[bool, Key("Whether sway was measured.")]
+    surge_rms: Annotated[Number, Key("Root mean square of what the fit to the surge leaves.", "rms_m_s")] = float("nan")
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ import pytest
 from fieldsid.change.compare import compare_models
 from fieldsid.comparison.compare import compare
 from fieldsid.diagnosis import Candidate, Diagnosis, Errors, Pair
+from fieldsid.diagnosis.records import NextManeuver
 from fieldsid.extension import Extension, Gain
 from fieldsid.fitting.fit import Fit
 from fieldsid.fitting.predict.predict import Prediction
@@ -96,7 +97,7 @@ def held():
         Axis.YAW, "effect", ("servo_lag",), "servo_lag (the fin follows late): from 3.20 to 1.04 x the noise floor",
         "servo_lag: from 3.20 to 1.04 x the noise floor",
         pair(0.015, 0.016), pair(0.005, 0.0052), NOISE, (best,), lagged, fit.model, comparison.where,
-        {"maneuver": "zigzag", "why": "it tells the two apart"}, {"roll_coupling": "needs roll, which the log lacks"}, (told,),
+        NextManeuver("zigzag", "it tells the two apart"), {"roll_coupling": "needs roll, which the log lacks"}, (told,),
     )  # fmt: skip
     gain = Gain(("servo_lag",), pair(0.015, 0.016), pair(0.005, 0.0052), NOISE, True, ("pulses",), ("zigzag",))
     slow, fast = model_named("slow", speed=1.0), model_named("fast", speed=1.4)

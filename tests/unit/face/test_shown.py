@@ -13,11 +13,14 @@ import pandas as pd
 import pytest
 
 import fieldsid
-from fieldsid.display import LONGEST, Brief, Displayed, Plotted, view_of
+from fieldsid.cli.console import out, print_page
+from fieldsid.display import LONGEST, Brief, Displayed, Plotted, page_of, view_of
 from fieldsid.errors import UsageError
 from fieldsid.face.several import Several
 from fieldsid.logs import Note
+from fieldsid.records.keys import body_of
 from fieldsid.registry import members
+from fieldsid.rounding import DEGREES, RADIANS
 
 KINDS = (
     "Candidate", "Change", "Check", "Comparison", "Diagnosis", "Extension", "Fit", "Laws", "MeasuredRow", "MeasuredTurn", "Model",
@@ -153,8 +156,7 @@ Statistics
   fitted to     pulses
   judged on     zigzag
 
-Errors, rms
-                       before    after  noise floor
+  rms error            before    after  noise floor
   angle, rad, unseen   0.0160  0.00520      0.00500
   angle, rad, fitted   0.0150  0.00500      0.00500
   rate, rad/s, unseen  0.0128  0.00416      0.00400
@@ -175,12 +177,18 @@ def test_the_summary_of_an_extension_is_this(held):
 
 def test_the_summary_of_a_diagnosis_begins_with_the_verdict_and_ranks_the_candidates(held):
     text = held["Diagnosis"].summary()
-    assert text.startswith("Diagnosis of the yaw axis: servo_lag (the fin follows late)")
+    assert text.startswith("Diagnosis of the yaw axis, effect: servo_lag (the fin follows late)")
     rows = [line.split() for line in text.splitlines()]
-    assert ["model", "as", "it", "is", "3.00", "3.20"] in rows
+    assert ["as", "it", "is", "3.00", "3.20"] in rows
     assert ["servo_lag", "0.970", "1.00", "1.04", "98", "%", "+120"] in rows
-    assert "  not tried    roll_coupling: needs roll, which the log lacks" in text
-    assert "  fly next     zigzag, it tells the two apart" in text
+    assert "not tried: roll_coupling: needs roll, which the log lacks" in text
+    assert "what would settle it: zigzag, it tells the two apart" in text
+
+
+@pytest.mark.parametrize(("angles", "rudder"), [(RADIANS, "rudder 0.3 rad, "), (DEGREES, "rudder 17.19 deg, ")])
+def test_a_console_shows_the_page_of_a_record_in_the_unit_asked_for(held, capsys, angles, rudder):
+    print_page(out(), page_of(held["TurnPrediction"], angles))
+    assert capsys.readouterr().out.startswith(rudder)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -250,7 +258,7 @@ def test_an_interval_of_a_parameter_that_is_not_there_is_refused(held):
 
 def test_the_tables_of_turns_and_gains_are_the_rows_that_json_prints(held):
     turns, schedule = held["TurnPrediction"], held["Schedule"]
-    assert list(turns.to_frame().columns) == list(turns.rows[0].record())
+    assert list(turns.to_frame().columns) == list(body_of(turns.rows[0]))
     assert list(turns.to_frame()["radius_m"]) == [r.radius for r in turns.rows]
     assert list(turns.to_frame("measured")["radius_m"]) == [m.turn.circle.radius for m in turns.measured]
     assert list(schedule.to_frame()["kp"]) == [r.gains.kp for r in schedule.rows]

@@ -18,7 +18,7 @@ from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.plant.laws.axis_laws import fit_laws, load_laws, save_laws
 from fieldsid.plant.parameter_source import draw_values, load_parameter_source, logs_of, source_of_models
-from fieldsid.plant.points import distinct_speeds
+from fieldsid.plant.points import distinct_speeds, meant_speeds
 from fieldsid.plant.table import read_table
 from fieldsid.records.named_inputs import inputs_of
 
@@ -330,3 +330,16 @@ def test_a_tables_draws_keep_the_sign_of_damping_and_authority_and_none_lies_on_
     assert np.unique(drawn["a22"]).size == 2000
     assert source.share_rejected(1.0, 2000, 1) == pytest.approx(norm.cdf(0.05 * 2.0 - 2.0), abs=0.02)
     assert source.share_rejected(1.5, 200, 1) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("flown", "meant"),
+    [
+        ([0.972, 0.999, 1.02], [1.0]),
+        ([1.407, 0.996, 1.79], [1.0, 1.4, 1.8]),
+        ([1.234], [1.23]),
+        ([1.0, 1.04, 1.08, 1.12], [1.02, 1.1]),
+    ],
+)
+def test_speeds_that_were_asked_for_are_read_off_those_that_were_flown(flown, meant):
+    assert meant_speeds(np.array(flown)) == meant

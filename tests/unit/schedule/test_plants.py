@@ -112,8 +112,8 @@ def test_how_an_unstable_hull_comes_out_of_a_turn_tighter_than_any_run_is_not_sa
 
     for flown, growth in ((1e-3, -0.1), (1e3, 0.1)):
         steps = checked(flown, growth).scheduled[0].steps
-        assert all(s.record()["said"] and np.isfinite(s.settling) for s in steps)
+        assert all(s.said and np.isfinite(s.settling) for s in steps)
     found = checked(1e-3, 0.1)
-    assert [s.record()["said"] for s in found.scheduled[0].steps] == [True, True, False]
+    assert [s.said for s in found.scheduled[0].steps] == [True, True, False]
     assert "how a 90 deg step settles is not said (`-`) until" in rests_on(found, made, source)
     assert found.scheduled[0].settling == steps[1].settling

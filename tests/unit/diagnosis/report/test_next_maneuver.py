@@ -10,7 +10,10 @@ import pytest
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.report import next_maneuver
 from fieldsid.diagnosis.verdict import Verdict
+from fieldsid.maneuvers import parse_spec
 from fieldsid.models.model import Noise
+from fieldsid.planning.discriminate.discriminate import Separation
+from fieldsid.planning.flight.excitation import Window
 
 FLOOR = Noise(0.004, 0.002)
 RIVALS = [SimpleNamespace(names=(n,), likelihood_model=None) for n in ("servo_lag", "delay")]
@@ -22,13 +25,13 @@ WORK = SimpleNamespace(
 
 @pytest.mark.parametrize("odds", [12.0, 0.4])
 def test_a_maneuver_that_is_not_expected_to_decide_is_not_advised_as_if_it_did(monkeypatch, odds):
-    plan = SimpleNamespace(expected_log_odds=odds, plain=lambda: {"maneuver": "prbs", "expected_log_odds": odds})
+    plan = Separation("prbs", parse_spec("prbs")[1], 1.4, odds, {}, Window(), {})
     monkeypatch.setattr("fieldsid.planning.discriminate.discriminate.separate", lambda *_args, **_more: plan)
     fly = next_maneuver.next_maneuver(WORK, Verdict("undecided", ("servo_lag",), (RIVALS[1],)), RIVALS[0], {}, FLOOR)
-    assert fly["expected_log_odds"] == odds
-    assert fly["command"] == "sysid plan --separate servo_lag,delay"
-    assert ("no maneuver inside the fin angles flown" in fly.get("note", "")) == (odds < next_maneuver.RIVAL_LOG_ODDS)
-    assert (fly["maneuver"] == "prbs") == (odds >= next_maneuver.RIVAL_LOG_ODDS)
+    assert fly.expected_log_odds == odds
+    assert fly.command == "sysid plan --separate servo_lag,delay"
+    assert ("no maneuver inside the fin angles flown" in (fly.note or "")) == (odds < next_maneuver.RIVAL_LOG_ODDS)
+    assert (fly.maneuver == "prbs") == (odds >= next_maneuver.RIVAL_LOG_ODDS)
 
 
 LACKS = {"roll_coupling": "needs roll, which the log lacks"}
@@ -50,4 +53,4 @@ def test_a_signal_is_missed_only_where_something_is_left_for_it(word, over, aske
     assert (fly is not None) == asked
     if fly:
         left = "an error of 1.40 x the noise floor is left"
-        assert fly["why"] == f"{left}, and roll_coupling could not be tried: needs roll, which the log lacks"
+        assert fly.why == f"{left}, and roll_coupling could not be tried: needs roll, which the log lacks"

@@ -9,7 +9,7 @@ import hidden_lag
 import numpy as np
 import pytest
 
-from fieldsid.diagnosis.diagnose import body_of, diagnose
+from fieldsid.diagnosis.diagnose import diagnose
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.search import search
 from fieldsid.diagnosis.search.budget import Budget
@@ -19,6 +19,7 @@ from fieldsid.fitting.problem.parameters import layout_of
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
+from fieldsid.records.keys import body_of
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 

@@ -68,7 +68,7 @@ def test_a_quick_search_finds_a_maneuver_inside_the_envelope_for_every_pair(name
     assert len(found.pairs) == 2
     assert found.expected_log_odds == min(found.pairs.values())
     assert found.expected_log_odds > np.log(20)
-    assert found.plain()["decides"]
+    assert found.decides
     assert len(found.says()) == 3
 
 

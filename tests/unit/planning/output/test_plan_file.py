@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 from plan_legs import ENVELOPE, leg, plan
 from ruamel.yaml import YAML
 
-from fieldsid.artifacts import to_yaml
+from fieldsid.artifacts import plain, to_yaml
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.run import Run
 from fieldsid.planning.design.abort_conditions import aborts_of
 from fieldsid.planning.design.leg import commands_of
 from fieldsid.planning.output.command_files import formats, table_text, write_all
 from fieldsid.planning.output.mission import render, steps_of, styles
-from fieldsid.planning.output.plan_file import load_plan, plan_body, save_plan
+from fieldsid.planning.output.plan_file import load_plan, save_plan
 
 
 def test_a_plan_reads_back_as_it_was(tmp_path):
@@ -68,7 +68,7 @@ NUMBERS = st.one_of(st.floats(allow_nan=True, allow_infinity=True), st.integers(
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_whatever_a_file_says_the_commands_stay_inside_the_limits_it_was_accepted_with(tmp_path, data):
-    body = plan_body(plan(leg(), leg("zigzag:duration=26", nominal=np.linspace(-0.2, 0.2, 30)), leg("chirp:duration=26")))
+    body = plain(plan(leg(), leg("zigzag:duration=26", nominal=np.linspace(-0.2, 0.2, 30)), leg("chirp:duration=26")))
     body["schema"] = "fieldsid/plan/1"
     for _ in range(data.draw(st.integers(1, 3))):
         place, key = body["legs"][data.draw(st.integers(0, 2))], None

@@ -1,0 +1,94 @@
+"""`sysid compare GAINS RUN...`: the steps that were flown with a schedule against what its verification says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fieldsid.cli.console import emit, table
+from fieldsid.cli.headlines.headline import Headline
+from fieldsid.cli.headlines.typed import pasted
+from fieldsid.cli.headlines.words import counted
+from fieldsid.cli.voice import shown_in
+from fieldsid.errors import DataError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.change.promise import KeptStep
+
+
+def as_promised(gains: Path, runs: Sequence[Path], reading: Mapping[str, Any], *, as_json: bool) -> Mapping[str, Any]:
+    """Compare the steps flown in runs with what was promised of them and print it; return the body."""
+    from fieldsid.change.promise import kept_steps
+    from fieldsid.cli.console import say
+    from fieldsid.cli.inputs import read_runs
+    from fieldsid.cli.skipped_logs import Skips
+    from fieldsid.face.arguments import designed_from, runs_behind
+    from fieldsid.plant.parameter_source import load_parameter_source
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.comparisons import AsPromised
+    from fieldsid.schedule.record import load_schedule
+    from fieldsid.schedule.verify import plants_behind
+
+    schedule, skips = load_schedule(gains), Skips()
+    logs = read_runs(runs, refused=skips.skip, **reading)
+    source = load_parameter_source(designed_from(schedule, str(gains)))
+    of, flown = plants_behind(schedule, source, runs_behind(source, say)), 0
+    steps: list[KeptStep] = []
+    for run in logs:
+        try:
+            steps += kept_steps(schedule, of, run)
+        except DataError as error:
+            if len(logs) == 1:
+                raise
+            skips.skip(run, error)
+        else:
+            flown += 1
+    told = AsPromised(gains=str(gains), axis=schedule.axis, steps=tuple(steps), skipped_runs=tuple(skips.records))
+    headline = _headline(gains, source.paths, runs, steps)
+    result = emit(body_of(told), as_json=as_json, render=lambda to: _render(to, steps), headline=headline)
+    skips.end(flown)
+    return result
+
+
+def _headline(gains: Path, models: Sequence[Path], runs: Sequence[Path], steps: Sequence[KeptStep]) -> Headline:
+    from fieldsid.change.promise import worst_of
+
+    worst, (times, unit) = worst_of(steps), shown_in("rad")
+    broken = [s for s in steps if s.broken]
+    how = f"overshoot {100 * worst.flown.overshoot:.0f} % (at most {100 * worst.promised.overshoot_most:.0f} %), "
+    how += f"settled in {_seconds(worst.flown.settling)} ({_seconds(worst.promised.settling_most)}), "
+    how += f"steady error {times * abs(worst.flown.steady_error):.2g} {unit} ({times * worst.promised.off:.2g})"
+    if broken:
+        says = f"not as promised in {', '.join(worst.broken)}, {len(broken)} of {counted(len(steps), 'step')}: {worst.run} at "
+        says += f"{worst.start:.1f} s, {how}"
+        next_ = pasted("compare", models[0], runs)
+    else:
+        says, next_ = f"as promised, {counted(len(steps), 'step')}: the worst has {how}", pasted("report")
+    return Headline(says, f"{gains}; in brackets what 95 % of the draws of its models stay within", next_)
+
+
+def _seconds(value: float) -> str:
+    return f"{value:.1f} s" if isfinite(value) else "never"
+
+
+def _render(to: Console, steps: Sequence[KeptStep]) -> None:
+    times, unit = shown_in("rad")
+    rows = [
+        (
+            s.run,
+            f"{s.start:.1f}",
+            f"{s.speed:.2f}",
+            f"{times * s.size:.3g}",
+            f"{100 * s.flown.overshoot:.0f} ({100 * s.promised.overshoot_most:.0f})",
+            f"{_seconds(s.flown.settling)} ({_seconds(s.promised.settling_most)})",
+            f"{times * abs(s.flown.steady_error):.2g} ({times * s.promised.off:.2g})",
+            ", ".join(s.broken) or "as promised",
+        )
+        for s in steps
+    ]
+    heads = ("run", "s", "m/s", f"step, {unit}", "overshoot, %", "settled", f"steady, {unit}", "")
+    to.print(table("flown, in brackets at most promised", heads, rows))

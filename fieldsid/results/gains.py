@@ -1,0 +1,84 @@
+"""What `sysid schedule design`, `verify` and `export` come to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from fieldsid.models.axis import Axis
+from fieldsid.records.keys import INLINE, Key, Number, Result
+from fieldsid.schedule.check import Check
+from fieldsid.schedule.controller import Gains
+from fieldsid.schedule.record import Schedule
+from fieldsid.schedule.verdict import Gate
+
+
+@dataclass(frozen=True, slots=True)
+class Design(Result):
+    """Gains per speed."""
+
+    SCHEMA = "fieldsid/schedule/1"
+
+    schedule: Annotated[Schedule, INLINE]
+    file: Annotated[str | None, Key("The file that was written.")] = None
+
+
+@dataclass(frozen=True, slots=True)
+class Worst:
+    """The least margins and the most overshoot, over speeds and draws."""
+
+    phase_margin_deg: Annotated[Number, Key("Phase margin.")]
+    gain_margin_db: Annotated[Number, Key("Gain margin.")]
+    delay_margin_s: Annotated[Number, Key("Delay margin.")]
+    overshoot_percent: Annotated[Number, Key("Overshoot.")]
+
+
+@dataclass(frozen=True, slots=True)
+class Verified(Result):
+    """A schedule checked over the identified set."""
+
+    SCHEMA = "fieldsid/verification/1"
+
+    verdict: Annotated[str, Key("The verdict in a word.")]
+    says: Annotated[str, Key("The same in a sentence, with its number.")]
+    rests_on: Annotated[str, Key("What it rests on.")]
+    against_constant: Annotated[str, Key("How it compares with the best one gain for all speeds.")]
+    constant_gains: Annotated[Gains, Key("That gain.")]
+    axis: Annotated[Axis, Key("The plane.")]
+    controller: Annotated[str, Key("The controller.")]
+    worst: Annotated[Mapping[str, float], Key("The worst of all.", of=Worst)]
+    scheduled: Annotated[tuple[Check, ...], Key("The schedule, at its rows and between.")]
+    constant: Annotated[tuple[Check, ...], Key("One constant gain, at the same speeds.")]
+    gates: Annotated[tuple[Gate, ...], Key("The limits that were asked for.")]
+    figure: Annotated[str | None, Key("The figure that was drawn.")]
+
+    @property
+    def passed(self) -> Annotated[bool, Key()]:
+        """Whether all hold; where not, the exit code is 1."""
+        return all(g.passed for g in self.gates)
+
+
+@dataclass(frozen=True, slots=True)
+class Exported(Result):
+    """The gains in the vehicle's own format."""
+
+    SCHEMA = "fieldsid/export/1"
+
+    target: Annotated[str, Key("The format.")]
+    text: Annotated[str, Key("The file's text.")]
+    file: Annotated[str | None, Key("The file that was written.")] = None
+    difference: Annotated[str, Key("How a file that was replaced has changed, as a unified difference.")] = ""
+    backup: Annotated[str | None, Key("That file as it was; null where none was replaced.")] = None
+
+
+@dataclass(frozen=True, slots=True)
+class Patched(Result):
+    """The gains put into a file that exists, with `--into`."""
+
+    SCHEMA = "fieldsid/export/1"
+
+    difference: Annotated[str, Key("What changes, as a unified difference.")]
+    file: Annotated[str, Key("The file.")]
+    backup: Annotated[str | None, Key("The file as it was; null where nothing was changed.")]
+    target: Annotated[Literal["into"], Key("Always `into`.")] = "into"

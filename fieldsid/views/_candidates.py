@@ -1,0 +1,48 @@
+"""The hypotheses of a diagnosis as a table, for every place that shows them: of its JSON, which a file of it holds too."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from fieldsid.page import Block
+from fieldsid.rounding import Angles, number, probability
+from fieldsid.views._words import percent, times
+
+COLUMNS = ("effect", "prob.", "fitted", "unseen", "explained", "evidence")
+
+
+def candidates(body: Mapping[str, Any], angles: Angles) -> tuple[Block, str]:
+    """Return the model as it is and each hypothesis in a row, and what the columns are."""
+    rows = [("as it is", "", *_errors(body["base"], body, angles), "", "")]
+    rows += [
+        (
+            c["effect"].replace("+", " +"),
+            probability(c["probability"]) if "probability" in c else "",
+            *_errors(c, body, angles),
+            "worse" if c.get("worse") else percent(c["explained"]) if "explained" in c else "",
+            f"{c['log_evidence']:+z.0f}" if "log_evidence" in c else "",
+        )
+        for c in body["candidates"]
+    ]
+    of = f"in {angles.unit} and {angles.unit}/s, in logs with next to no noise"
+    if not body.get("noiseless"):
+        floor = [number(angles.factor * (body["noise_floor"][name] or 0.0), 2) for name in ("angle_rad", "rate_rad_s")]
+        of = f"over the noise floor, {floor[0]} {angles.unit} and {floor[1]} {angles.unit}/s"
+    return (
+        Block("", tuple(rows), COLUMNS),
+        f"fitted, unseen: free-run error of those runs {of}; evidence: log, over the first row",
+    )
+
+
+def _errors(sides: Mapping[str, Any], body: Mapping[str, Any], angles: Angles) -> tuple[str, ...]:
+    """Return the errors on fitted and on unseen runs: over the noise floor, or in their units without noise."""
+    from fieldsid.comparison.sufficient import over_noise
+
+    def said(errors: Mapping[str, float | None]) -> str:
+        if not body.get("noiseless"):
+            return times(over_noise(errors, body["noise_floor"]))
+        known = (number(None if rms is None else angles.factor * rms, 2) for rms in errors.values())
+        return ", ".join(k for k in known if k != "-")
+
+    return said(sides["train"]), said(sides["validation"])
