@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from fieldsid.logs import Run
     from fieldsid.models.axis import Axis
     from fieldsid.models.model import Model
-    from fieldsid.online.identifier import OnlineEstimate, OnlineIdentifier
+    from fieldsid.online.estimate import OnlineEstimate
+    from fieldsid.online.identifier import OnlineIdentifier
     from fieldsid.schedule import Schedule, Verification
     from fieldsid.turning import Laws, TurnPrediction
 
@@ -54,7 +55,8 @@ _ROOMS = {
     "fieldsid.logs": ("Run",),
     "fieldsid.models.axis": ("Axis",),
     "fieldsid.models.model": ("Model",),
-    "fieldsid.online.identifier": ("OnlineEstimate", "OnlineIdentifier"),
+    "fieldsid.online.estimate": ("OnlineEstimate",),
+    "fieldsid.online.identifier": ("OnlineIdentifier",),
     "fieldsid.schedule": ("Schedule", "Verification"),
     "fieldsid.turning": ("Laws", "TurnPrediction"),
 }

@@ -13,6 +13,8 @@ from re import compile as pattern
 
 MANY = 100.0
 """Times its noise from which on an error is of a log with none to speak of, as of a towing tank or a simulation."""
+ROUNDED_SHARE = 1e-12
+"""Share of a value below which its error is what computing with doubles left."""
 TWO_SIDED_95 = 1.96
 """Quantile 0.975 of the normal distribution: standard errors to either side that 95 of 100 lie within."""
 
@@ -44,10 +46,10 @@ def nine_digits(value: float) -> float:
 
 
 def with_error(value: float, error: float, *, sign: str = "+/-") -> str:
-    """Return `2.281 +/- 0.013`; the value alone, to four digits, where the error is not a positive number."""
+    """Return `2.281 +/- 0.013`; the value alone, to four digits, where the error is not positive or is a double's rounding."""
     if not math.isfinite(value):
         return "-"
-    if not (math.isfinite(error) and error > 0.0):
+    if not (math.isfinite(error) and error > ROUNDED_SHARE * abs(value)):
         return number(value)
     decimals = digits_of_error(error)
     shown = max(decimals, 0)

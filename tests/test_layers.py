@@ -20,7 +20,7 @@ ORDER = (
     "_version", "text", "errors", "numerics", "runtime", "registry", "page", "display", "records",
     "artifacts", "rounding", "angles", "strict",
     "templates", "guide", "logs", "maneuvers", "models", "vehicle", "effects", "dynamics", "noise", "fitting", "estimators",
-    "comparison", "planning", "online", "diagnosis", "extension", "batch", "plant", "turning", "schedule", "exports",
+    "comparison", "planning", "diagnosis", "extension", "batch", "plant", "turning", "schedule", "online", "exports",
     "trial_folder", "change", "figures", "views", "reporting", "face", "results",
     "demo", "cli", "__main__",
 )  # fmt: skip

@@ -189,6 +189,12 @@ def _away(time: FloatArray, fin: FloatArray) -> tuple[BoolArray, float]:
     return off > limit, limit
 
 
+def last_moved(time: FloatArray, fin: FloatArray) -> float:
+    """Return when a fin (n,) rad was last clearly away from its trim, NaN where it never was; time (n,) s."""
+    away = np.flatnonzero(_away(time, fin)[0]) if time.size else np.empty(0, dtype=np.intp)
+    return float(time[away[-1]]) if away.size else float("nan")
+
+
 def _around(run: Run, time: FloatArray, away: BoolArray, signal: str, limit: float) -> Segment:
     moved = np.flatnonzero(away)
     first, last = float(time[moved[0]]), float(time[moved[-1]])

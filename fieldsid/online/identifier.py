@@ -3,6 +3,7 @@
     online = OnlineIdentifier("yaw")
     online.update(time_s, rudder_rad, yaw_rad, yaw_rate_rad_s)
     online.estimate().values                       # {"a22": ..., "b2": ..., "C0": ...}
+    online.gains(watch.look(online.estimate()))    # of now, by the design of `sysid schedule design`
 
 The recursion and its filter are those of `--method svf_rls`; errors allow for the residuals' colour as the block estimate's do,
 the bias of white sensor noise is taken out. NumPy and SciPy are enough: with numba a sample takes 12 us, without 31 us;
@@ -12,9 +13,8 @@ an estimate takes 0.8 ms, once in 256 samples twice that.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from math import inf, isfinite, nan
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -27,41 +27,46 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.white_noise import white_noise_std
+from fieldsid.online.authority_jump import AuthorityJump, Jump
+from fieldsid.online.estimate import OnlineEstimate
+from fieldsid.online.progress import LOOK_BACK_S, Progress
 from fieldsid.online.sample_filter import SampleFilter, present_step
-from fieldsid.rounding import TWO_SIDED_95
 
-"""Quantile 0.975 of the normal distribution."""
+if TYPE_CHECKING:
+    from fieldsid.schedule.search.of_one_model import GainsOfOne, Wanted
+
 NOISE_WINDOW, NOISE_EVERY = 1024, 256
 """Samples that the sensors' noise is learnt from, and samples between two looks."""
 WAIT_FOR_RATE_S = 1.0
 """Time after which a vehicle that has sent no rate has none."""
-STATE = 3
+PRESENT_S = 10.0
+"""Time over which the present speed is a mean."""
+STATE = 4
 """Version of the saved state."""
 _UPPER = np.triu_indices(4)
 
 
-@dataclass(frozen=True, slots=True)
-class OnlineEstimate:
-    """What is known at `time` s: values and standard errors by parameter name, NaN before they exist.
+def refuse_unsettled(now: OnlineEstimate, progress: Progress) -> None:
+    """Raise DataError while an estimate is none that gains can be designed for."""
+    if progress.contradiction:
+        raise DataError("angle and rate contradict each other", found=progress.contradiction, hint="turn the sign of one")
+    moving = [p.name for p in progress.parameters if p.name != NAMES[now.axis].trim and not p.is_settled]
+    if moving or not now.covariance:
+        hint = f"go on for {LOOK_BACK_S:.0f} s, with the fin moved"
+        raise DataError("no gains yet: the estimate has not settled", found=", ".join(moving) or "no estimate", hint=hint)
+    if not isfinite(now.speed_now):
+        raise DataError("no gains: they are for a speed", found="no surge in the samples", hint="send `surge_m_s` with them")
 
-    `used` counts rows that joined the estimate, `speed` is the mean surge in m/s (NaN where unknown), `counts` what was met:
-    missing, repeated and late samples, gaps, restarts of the clock, spikes. `contradiction` is how the last samples of angle and
-    rate contradict each other, in words, empty where they do not: with a sign turned the values mean nothing.
+
+def gains_now(now: OnlineEstimate, progress: Progress, wanted: Wanted | None = None) -> GainsOfOne:
+    """Return the gains of an estimate at the speed of its last seconds: as wanted, else as quick as the fin flown lets them be.
+
+    Raises DataError as `refuse_unsettled` does, ModelError where no gains hold the loop.
     """
+    refuse_unsettled(now, progress)
+    from fieldsid.schedule.search.of_one_model import gains_of_one, usual
 
-    axis: Axis
-    time: float
-    values: Mapping[str, float]
-    std_errors: Mapping[str, float]
-    used: int
-    speed: float
-    counts: Mapping[str, int]
-    contradiction: str = ""
-
-    @property
-    def intervals95(self) -> dict[str, tuple[float, float]]:
-        """The 95 % intervals under normal errors: values -+ 1.96 standard errors."""
-        return {n: (v - TWO_SIDED_95 * self.std_errors[n], v + TWO_SIDED_95 * self.std_errors[n]) for n, v in self.values.items()}
+    return gains_of_one(now.model, now.speed_now, wanted or usual(now.fin_most, by_rate=now.by_rate))
 
 
 class OnlineIdentifier:
@@ -91,7 +96,10 @@ class OnlineIdentifier:
         self._filter: SampleFilter | None = None
         self._by_rate = by_rate
         self._first_time = nan
-        self._window = np.full((NOISE_WINDOW, 4), nan)
+        self._window = np.full((NOISE_WINDOW, 5), nan)
+        self._authority = AuthorityJump(stiff=self._stiff)
+        self._jump: Jump | None = None
+        self._fin_most, self._is_held = 0.0, True
         self._contradiction: str | None = None
         self._seen, self._noise = 0, (MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S)
         self._speed_sum, self._speeds = 0.0, 0
@@ -123,7 +131,10 @@ class OnlineIdentifier:
         before = fed.counts["repeated"] + fed.counts["late"]
         used = fed.push(time, fin, angle, rate, is_held=fin_is_held, line=fin_line)
         if fed.counts["repeated"] + fed.counts["late"] == before and isfinite(time):
-            self._hear(time, angle, rate, fin)
+            self._hear(time, angle, rate, fin, float(speed))
+        self._is_held = fin_is_held
+        if used and (jump := self._authority.add(fed.row_time, fed.row, float(speed))) is not None:
+            self._begin_at(jump)
         return used
 
     @property
@@ -162,7 +173,16 @@ class OnlineIdentifier:
             self._speed_sum / self._speeds if self._speeds else nan,
             counts,
             self._contradicted(),
+            () if covariance is None else tuple(map(tuple, covariance.tolist())),
+            self._speed_now(),
+            self._fin_most,
+            bool(self._by_rate),
+            self._jump,
         )
+
+    def gains(self, progress: Progress, wanted: Wanted | None = None) -> GainsOfOne:
+        """Return the gains at the speed of the last seconds, for a watch's look of now; see `gains_now`."""
+        return gains_now(self.estimate(), progress, wanted)
 
     def state(self) -> dict[str, Any]:
         """Return all that is known as plain values, which `from_state` goes on from bit by bit."""
@@ -176,6 +196,9 @@ class OnlineIdentifier:
             "seen": self._seen,
             "noise": list(self._noise),
             "speed": [self._speed_sum, self._speeds],
+            "authority": self._authority.state(),
+            "fin": [self._fin_most, self._is_held],
+            "jump": None if self._jump is None else [self._jump.time, self._jump.factor, self._jump.std_error],
             "filter": None if self._filter is None else self._filter.state(),
         }
 
@@ -193,6 +216,9 @@ class OnlineIdentifier:
             made._window[:] = np.array(state["window"], dtype=np.float64)
             made._seen, made._noise = int(state["seen"]), (float(state["noise"][0]), float(state["noise"][1]))
             made._speed_sum, made._speeds = float(state["speed"][0]), int(state["speed"][1])
+            made._authority.restore(state["authority"])
+            made._fin_most, made._is_held = float(state["fin"][0]), bool(state["fin"][1])
+            made._jump = None if state["jump"] is None else Jump(*map(float, state["jump"]))
             if state["filter"] is not None:
                 made._filter = made._new_filter()
                 made._filter.restore(state["filter"])
@@ -225,10 +251,30 @@ class OnlineIdentifier:
     def _new_filter(self) -> SampleFilter:
         return SampleFilter(stiff=self._stiff, by_rate=bool(self._by_rate), **self._settings)
 
-    def _hear(self, time: float, angle: float, rate: float, fin: float) -> None:
+    def _begin_at(self, jump: Jump) -> None:
+        """Let the estimate begin at a jump: of the samples since then that are kept, as if none had come before."""
+        old, self._jump = self._filter, jump
+        self._filter = fed = self._new_filter()
+        recent = self._recent()
+        recent = recent[recent[:, 0] >= jump.time]
+        for time, angle, rate, fin, _ in recent.tolist():
+            fed.push(time, fin, angle, rate, is_held=self._is_held)
+        if old is not None:
+            fed.take_up(old)
+        speeds = recent[np.isfinite(recent[:, 4]), 4]
+        self._speed_sum, self._speeds = float(speeds.sum()), speeds.size
+
+    def _speed_now(self) -> float:
+        """Return the mean surge (m/s) of the last seconds, that of all where none came in them."""
+        recent = self._window[self._window[:, 0] > self.time - PRESENT_S, 4]
+        recent = recent[np.isfinite(recent)]
+        return float(recent.mean()) if recent.size else self._speed_sum / self._speeds if self._speeds else nan
+
+    def _hear(self, time: float, angle: float, rate: float, fin: float, speed: float) -> None:
         """Keep a sample for the noise of the sensors, and learn that now and then."""
+        self._fin_most = max(self._fin_most, abs(fin)) if isfinite(fin) else self._fin_most
         unwrapped = self._filter.newest_angle if self._filter is not None and isfinite(angle) else nan
-        self._window[self._seen % NOISE_WINDOW] = time, unwrapped, rate, fin
+        self._window[self._seen % NOISE_WINDOW] = time, unwrapped, rate, fin, speed
         self._seen += 1
         if self._seen % NOISE_EVERY == 0:
             self._contradiction = None
@@ -239,13 +285,13 @@ class OnlineIdentifier:
             self._noise = tuple(max(f, n) if isfinite(f) else n for f, n in zip(found, least, strict=True))  # type: ignore[assignment]
 
     def _recent(self) -> FloatArray:
-        """Return time, angle, rate and fin of the last samples, (NOISE_WINDOW, 4), NaN before the first."""
+        """Return time, angle, rate, fin and surge of the last samples, (NOISE_WINDOW, 5), NaN before the first."""
         return np.roll(self._window, -(self._seen % NOISE_WINDOW), axis=0)
 
     def _contradicted(self) -> str:
         """Return how angle and rate contradict each other, or are taken for the fin: looked for once in NOISE_EVERY samples."""
         if self._contradiction is None and self._seen >= NOISE_EVERY:
-            time, angle, rate, fin = self._recent()[-self._seen :].T
+            time, angle, rate, fin, _ = self._recent()[-self._seen :].T
             begun = int(np.flatnonzero(np.diff(time, prepend=inf) <= 0.0)[-1])  # where its clock last started again
             names, part = NAMES[self.axis], slice(begun, None)
             run = Run("live", time[part], {names.angle: angle[part], names.rate: rate[part], names.fin: fin[part]})

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite, pi
-from typing import Annotated, Any
+from math import isfinite, nan, pi
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from fieldsid.artifacts import plain
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.online.identifier import OnlineEstimate
+from fieldsid.online.authority_jump import Jump
+from fieldsid.online.estimate import OnlineEstimate
 from fieldsid.online.progress import LOOK_BACK_S, ParameterProgress, Progress, Verdict
-from fieldsid.records.keys import INLINE, Interval, Key, Number, Result
+from fieldsid.records.keys import INLINE, Interval, Key, Number, Result, body_of
+
+if TYPE_CHECKING:
+    from fieldsid.schedule.search.of_one_model import GainsOfOne
 
 LONGEST_GUESS_S = 3600.0
 """A time to the goal beyond which it is not told: the pace of a few seconds says nothing of hours."""
@@ -32,6 +36,44 @@ class ParameterNow:
     progress: Annotated[ParameterProgress, INLINE]
     interval95: Annotated[Interval, Key("Its 95 % interval.")]
     unit: Annotated[str, Key("Its unit.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiveGains:
+    """Gains of the estimate, by the design of `schedule design`, with `--gains`."""
+
+    time: Annotated[Number, Key("Time of the estimate they are of.", "time_s")]
+    verdict: Annotated[
+        Literal["use", "keep", "change", "refused"],
+        Key(
+            "`keep` and `change` are of the gains that are loaded, `use` where none are; `refused` until the estimate has settled."
+        ),
+    ]
+    says: Annotated[str, Key("The gains with their errors beside those loaded, or why there are none.")]
+    speed: Annotated[Number, Key("The speed they are for: that of the last 10 s.", "speed_m_s")] = nan
+    row: Annotated[Mapping[str, Any] | None, Key("Gains, margins and answer, as a row of a schedule.")] = None
+    std_errors: Annotated[Mapping[str, float] | None, Key("Standard errors of kp, ki, kd and of the feed-forward in rad.")] = None
+    loaded: Annotated[Mapping[str, Any] | None, Key("The row of the schedule that is loaded, at this speed.")] = None
+    loaded_phase_margin_deg: Annotated[
+        Number, Key("Its phase margin with the estimate: the least over 95 % of the draws.")
+    ] = nan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiveDiagnosis:
+    """What `diagnose` says of what was flown when the last maneuver had ended, with `--diagnose`."""
+
+    time: Annotated[Number, Key("The end of what was diagnosed.", "time_s")]
+    verdict: Annotated[str, Key("Its verdict; `refused` where it could not be diagnosed.")]
+    says: Annotated[str, Key("Its first line.")]
+    effects: Annotated[tuple[str, ...] | None, Key("What is missing.")] = None
+    left: Annotated[Mapping[str, Any] | None, Key("What is left: `ratio` is the error over the noise.")] = None
+    base: Annotated[Mapping[str, Any] | None, Key("The error without them.")] = None
+    final: Annotated[Mapping[str, Any] | None, Key("The error with them.")] = None
+    noise_floor: Annotated[Mapping[str, Any] | None, Key("The sensors' noise.")] = None
+    next_maneuver: Annotated[
+        Mapping[str, Any] | None, Key("What to fly before coming up; null where nothing is to be told apart.")
+    ] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +101,11 @@ class Look(Result):
     samples: Annotated[int, Key("Rows that joined the estimate.")]
     excitation: Annotated[Excitation, Key("How the vehicle was moved.")]
     parameters: Annotated[Mapping[str, ParameterNow], Key("By name.")]
+    authority_jump: Annotated[Jump | None, Key("The last jump of the fin's authority; null where there was none.")]
+    gains: Annotated[LiveGains | None, Key("Gains of now; null without `--gains`.")]
+    diagnosed: Annotated[
+        LiveDiagnosis | None, Key("A diagnosis of what was flown; null without `--diagnose`, or before the first maneuver has ended.")
+    ]
     counts: Annotated[
         Mapping[str, int],
         Key("What was met: missing, repeated, late samples, gaps, restarts, spikes, lines that could not be read."),
@@ -66,10 +113,32 @@ class Look(Result):
     next: Annotated[str, Key("The command that comes next; empty where the source is no log.")]
 
 
+def live_gains(now: OnlineEstimate, found: GainsOfOne) -> LiveGains:
+    """Return the gains of an estimate as they are told."""
+    return LiveGains(
+        time=now.time,
+        verdict=found.verdict,
+        says=found.says,
+        speed=now.speed_now,
+        row=body_of(found.row),
+        std_errors=found.std_errors,
+        loaded=None if found.loaded is None else body_of(found.loaded),
+        loaded_phase_margin_deg=found.loaded_phase_margin_deg,
+    )
+
+
 def look_body(
-    now: OnlineEstimate, progress: Progress, *, source: str, goals_from: str, unreadable: int, then: str
+    now: OnlineEstimate,
+    progress: Progress,
+    *,
+    source: str,
+    goals_from: str,
+    unreadable: int,
+    then: str,
+    gains: LiveGains | None = None,
+    diagnosed: LiveDiagnosis | None = None,
 ) -> dict[str, Any]:
-    """Return a look as nested plain values; NaN as None."""
+    """Return a look as nested plain values, with what was worked out beside the estimate; NaN as None."""
     bands, units = now.intervals95, units_of(now.axis)
     look = Look(
         axis=now.axis,
@@ -85,6 +154,9 @@ def look_body(
         samples=now.used,
         excitation=Excitation(progress.fin_rms, progress.rate_rms),
         parameters={p.name: ParameterNow(p, bands[p.name], units[p.name]) for p in progress.parameters},
+        authority_jump=now.jump,
+        gains=gains,
+        diagnosed=diagnosed,
         counts={**now.counts, "unreadable": unreadable},
         next=then,
     )

@@ -13,7 +13,7 @@ from math import inf, isfinite, nan, sqrt
 from typing import Annotated, Any, Literal
 
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.online.identifier import OnlineEstimate
+from fieldsid.online.estimate import OnlineEstimate
 from fieldsid.records.keys import Key, Number
 
 Verdict = Literal["starting", "contradicts", "collecting", "not_excited", "moving", "enough"]
@@ -172,7 +172,7 @@ class Watch:
     def look(self, now: OnlineEstimate) -> Progress:
         """Return how far an estimate is, by itself and by the looks before it."""
         looks = self._looks
-        if looks and not looks[-1].time <= now.time:
+        if looks and not (looks[-1].time <= now.time and looks[-1].jump == now.jump):
             looks.clear()
         while len(looks) > 1 and looks[1].time <= now.time - LOOK_BACK_S:
             looks.pop(0)

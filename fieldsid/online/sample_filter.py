@@ -103,6 +103,22 @@ class SampleFilter:
         """The newest measured angle in rad, a heading unwrapped."""
         return self._last_angle
 
+    @property
+    def row(self) -> FloatArray:
+        """The newest row (5,) of phi and target."""
+        row: FloatArray = self._row[0]
+        return row
+
+    @property
+    def row_time(self) -> float:
+        """Stamp in s of the newest row."""
+        return float(self.memory[TIME])
+
+    def take_up(self, other: SampleFilter) -> None:
+        """Go on where another was: the heading's turns, the spikes' limits and what was met; the rows that joined are its own."""
+        self._last_angle, self.angle_gate, self.rate_gate = other.newest_angle, other.angle_gate, other.rate_gate
+        self.counts = {**other.counts, "used": self.counts["used"]}
+
     def _unwrapped(self, angle: float) -> float:
         if not isfinite(angle):
             return angle

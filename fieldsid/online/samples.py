@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from array import array
+from collections.abc import Iterator, Mapping
 from math import isfinite, nan
 from typing import NamedTuple
 
@@ -73,10 +74,14 @@ def samples_of(run: Run, axis: Axis, after: float = -np.inf) -> Iterator[Sample]
 
 
 class MessageReader:
-    """JSON objects of canonical names, one a line, as samples of one axis; counts those that are none in `unreadable`."""
+    """JSON objects of canonical names, one a line, as samples of one axis; counts those that are none in `unreadable`.
 
-    def __init__(self, axis: Axis) -> None:
-        self._names = NAMES[axis]
+    With `keeps` all they say is kept in `columns`, by canonical name, where their time goes on.
+    """
+
+    def __init__(self, axis: Axis, *, keeps: bool = False) -> None:
+        self._names, self._keeps = NAMES[axis], keeps
+        self.columns: dict[str, array[float]] = {TIME: array("d")}
         self.unreadable = 0
         self.fin_is_measured: bool | None = None
 
@@ -93,7 +98,19 @@ class MessageReader:
             self.fin_is_measured = names.fin_measured in signals
         fin = signals.get(names.fin_measured if self.fin_is_measured else names.fin, nan)
         angle, rate, speed = (signals.get(name, nan) for name in (names.angle, names.rate, SURGE))
+        if self._keeps:
+            self._keep(signals)
         return Sample(signals[TIME], fin, angle, rate, speed, not self.fin_is_measured)
+
+    def _keep(self, signals: Mapping[str, float]) -> None:
+        times = self.columns[TIME]
+        if len(times) and signals[TIME] <= times[-1]:
+            return
+        before = len(times)
+        for name in signals:
+            self.columns.setdefault(name, array("d", [nan] * before))
+        for name, column in self.columns.items():
+            column.append(signals.get(name, nan))
 
 
 def _signals(line: bytes) -> dict[str, float] | None:

@@ -1,4 +1,4 @@
-"""Values as the bytes that go from a forked worker to the process it was forked from."""
+"""Values as the bytes that go between this process and one that it began."""
 
 from __future__ import annotations
 
@@ -33,5 +33,5 @@ def dumps(value: object, writer: Callable[[BytesIO], WorkerPickler] = WorkerPick
 
 
 def loads(answer: bytes) -> Any:
-    """Return the value that a forked worker of this process has written."""
+    """Return the value that this process, one it began, or the one that began it has written."""
     return pickle.loads(answer)  # noqa: S301 - nobody else wrote it

@@ -46,7 +46,7 @@ def design_rows(plants: Plants, knots: Sequence[float], asked: Asked) -> tuple[t
         as_slow = "" if wish.settling is not None else f" as at {_slowest(quick).plant.speed:.3g} m/s"
         found = parallel_map(lambda sought: answering(sought, answer, f"settling {answer:.3g} s{as_slow}"), quick)
     found = _no_worse_than_one(found, [place_of(s.plant, wish, limit, answer) for s in found])
-    return tuple(parallel_map(lambda sought: _row(plants, sought, asked), found)), answer
+    return tuple(parallel_map(lambda sought: row_of(plants, sought, asked), found)), answer
 
 
 def place_of(plant: LinearPlant, wish: Wish, fin_limit: float, answer: float) -> Place:
@@ -115,7 +115,8 @@ def _no_worse_than_one(rows: Sequence[Sought], places: Sequence[Place]) -> list[
     return parallel_map(kept, range(len(rows)))
 
 
-def _row(plants: Plants, sought: Sought, asked: Asked) -> Row:
+def row_of(plants: Plants, sought: Sought, asked: Asked) -> Row:
+    """Return the row of gains that were sought, with its margins over the draws."""
     plant, made = sought.plant, designed(sought)
     phase, gain, delay = margins(plant, made.gains).worst()
     return Row(

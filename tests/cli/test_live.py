@@ -153,3 +153,26 @@ def test_a_narrow_terminal_shows_every_name_and_goal(width, has_band):
     assert "wanted" in text
     assert "\N{HORIZONTAL ELLIPSIS}" not in text
     assert ("95 % band" in text) is has_band
+
+
+def test_gains_and_a_diagnosis_are_said_beside_the_estimate(run_cli, tmp_path):
+    run = trial.flown(tmp_path, spec="square_pulses")
+    said = ("live", run, "--axis", "yaw", "--speed", "0", "--json", "--every", "5", "--gains", "--diagnose")
+    found = looks(run_cli(*said, "--want", "a22=30%,b2=30%"))
+    assert found[0]["gains"]["verdict"] == "refused"
+    last = found[-1]
+    assert last["gains"]["verdict"] == "use"
+    assert last["gains"]["row"]["kp"] * last["parameters"]["b2"]["value"] > 0.0
+    after = run_cli("diagnose", run, "--axis", "yaw", "--json").json
+    assert last["diagnosed"]["verdict"] == after["verdict"]
+    assert last["diagnosed"]["effects"] == after["effects"]
+    assert after["short"] in last["diagnosed"]["says"]
+
+
+@pytest.mark.parametrize(
+    ("more", "says"), [(["--depth", "--gains"], "depth is held through pitch"), (["--schedule", "no.yaml"], "no.yaml")]
+)
+def test_gains_that_cannot_be_meant_are_refused(run_cli, tmp_path, more, says):
+    answer = run_cli("live", trial.flown(tmp_path), "--axis", "yaw", *more)
+    assert answer.code == 2
+    assert says in answer.err

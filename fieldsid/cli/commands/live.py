@@ -15,18 +15,22 @@ import typer
 
 from fieldsid.cli.console import emit, out, say
 from fieldsid.cli.exit_codes import GATE_FAILED
-from fieldsid.cli.options import AxisOption, JsonFlag, MappingFile
+from fieldsid.cli.options import AxisOption, JsonFlag, MappingFile, VehicleFile
 from fieldsid.cli.voice import voice
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
     from io import BufferedIOBase
 
+    from rich.console import Console
+
+    from fieldsid.cli.live.beside import Beside
+    from fieldsid.logs.run import Run
     from fieldsid.online.identifier import OnlineIdentifier
     from fieldsid.online.progress import Goal, Watch
     from fieldsid.online.samples import MessageReader, Sample
 
-SOURCE, GOAL = "Where the samples come from", "What is to be reached"
+SOURCE, GOAL, BESIDE = "Where the samples come from", "What is to be reached", "What a second process works out"
 """The groups of its own options on the page of help."""
 
 Log = Annotated[
@@ -97,6 +101,22 @@ UntilEnough = Annotated[
     bool, typer.Option("--until-enough", help="End at enough data; exit code 1 where that is not reached.", rich_help_panel=GOAL)
 ]
 
+GainsFlag = Annotated[
+    bool, typer.Option("--gains", help="Design gains for the speed that is flown, once settled.", rich_help_panel=BESIDE)
+]
+Loaded = Annotated[
+    Path | None,
+    typer.Option(
+        "--schedule", metavar="YAML", help="The gains loaded, and what they were designed for.", show_default=False,
+        rich_help_panel=BESIDE,
+    ),
+]  # fmt: skip
+DepthFlag = Annotated[bool, typer.Option("--depth", help="With the depth loop above pitch.", rich_help_panel=BESIDE)]
+Diagnose = Annotated[
+    bool,
+    typer.Option("--diagnose", help="Diagnose what was flown whenever a maneuver ends.", rich_help_panel=BESIDE),
+]
+
 SAVE_EVERY_S = 1.0
 
 
@@ -112,6 +132,11 @@ def command(
     state: StateFile = None,
     every: Every = 1.0,
     until_enough: UntilEnough = False,
+    gains: GainsFlag = False,
+    schedule: Loaded = None,
+    depth: DepthFlag = False,
+    diagnose: Diagnose = False,
+    vehicle: VehicleFile = None,
     bandwidth: Bandwidth = 4.0,
     forgetting: Forgetting = 1.0,
     mapping: MappingFile = None,
@@ -120,13 +145,17 @@ def command(
     """Identify while the vehicle flies, sample by sample, and say when there is enough data.
 
     Replays a log, follows one that grows, or takes JSON lines: `{"time_s": 1.25, "rudder_deg": 5, "yaw_deg": 91}`.
-    `--json` prints one object a look, a line each. With `--state` a program that was killed goes on where it was.
+    `--json` prints one object a look, a line each. With `--state` a program that was killed goes on where it was. A jump of the
+    fin's authority, as by a payload swapped or a fin lost, is told, and the estimate begins anew. `--gains` designs as `schedule
+    design` does and says which of the loaded gains to change; `--diagnose` says what `diagnose` does, and what to fly next.
 
     Example: sysid live run7.csv --axis yaw --speed 10 --plan plan.yaml
     """
     _check_source(log, udp, follow=follow)
     feed = _Feed(axis, log, speed if speed > 0.0 else inf, follow, udp, inf if idle is None else idle, mapping)
     goals, goals_from = _goals(axis, plan, want)
+    feed.keeps = diagnose
+    beside = _beside(feed, (schedule, vehicle, depth) if gains or schedule else None, diagnose=diagnose)
     from fieldsid.online.progress import Watch
 
     watch = Watch(goals(float("nan")))
@@ -134,7 +163,7 @@ def command(
     body: Mapping[str, Any] = {}
     with _shown(as_json=as_json) as show:
         try:
-            for body in _looks(feed, identifier, watch, goals, goals_from, every, state, skipped):
+            for body in _looks(feed, identifier, watch, goals, goals_from, every, state, skipped, beside):
                 show(body)
                 if until_enough and body["verdict"] == "enough":
                     break
@@ -142,6 +171,8 @@ def command(
             if not body:
                 raise
         finally:
+            if beside is not None:
+                beside.close()
             if state is not None:
                 _save(state, identifier, watch, feed.name)
     if not as_json:
@@ -176,6 +207,8 @@ class _Feed:
     idle_s: float
     mapping: Path | None
     reader: MessageReader | None = None
+    run: Run | None = None
+    keeps: bool = False
 
     @property
     def name(self) -> str:
@@ -199,6 +232,15 @@ class _Feed:
         words = ["identify", str(self.log), "--axis", self.axis.value, "-o", "models/"] if usable else ["inspect", str(self.log)]
         return shlex.join(["sysid", *words])
 
+    def flown(self, until: float) -> Run | Mapping[str, Any]:
+        """Return what was flown up to a time in s: a run, or the columns of what was said."""
+        from fieldsid.cli.inputs import read_run
+
+        if self.reader is not None:
+            return dict(self.reader.columns)
+        run = self.run or read_run(Path(str(self.log)), mapping=self.mapping)
+        return run if until >= float(run.time[-1]) else run.between(-inf, until)
+
     def samples(self, after: float) -> Iterator[Sample | None]:
         """Yield the samples after a time in s."""
         from fieldsid.cli.inputs import mapping_of, read_run
@@ -206,13 +248,13 @@ class _Feed:
         from fieldsid.online.sources import datagrams, followed, lines_of, replayed
 
         if not self.is_log:
-            self.reader = MessageReader(self.axis)
+            self.reader = MessageReader(self.axis, keeps=self.keeps)
             if self.udp is not None:
                 return datagrams(self.udp, self.reader, idle_s=self.idle_s)
             return lines_of(cast("BufferedIOBase", sys.stdin.buffer), self.reader)
         if self.log is None or not self.follow:
-            run = read_run(Path(str(self.log)), mapping=self.mapping)
-            return replayed(run, self.axis, self.factor, after)
+            self.run = read_run(Path(str(self.log)), mapping=self.mapping)
+            return replayed(self.run, self.axis, self.factor, after)
         return followed(self.log, mapping_of(self.mapping), self.axis, idle_s=self.idle_s, after=after)
 
 
@@ -233,6 +275,17 @@ def _goals(axis: AxisOption, plan: Path | None, want: str | None) -> tuple[Calla
         asked = asked_goals(axis, want)
         return (lambda _speed: asked), "`--want`"
     return (lambda _speed: default_goals(axis)), f"{100.0 * DEFAULT_ACCURACY:.0f} % of each value"
+
+
+def _beside(feed: _Feed, gains: tuple[Path | None, Path | None, bool] | None, *, diagnose: bool) -> Beside | None:
+    """Return what works beside the estimate: gains of a schedule, a vehicle, with depth or not, and a diagnosis."""
+    if gains is None and not diagnose:
+        return None
+    from fieldsid.cli.live.beside import Beside, wanted_at
+
+    waits = feed.is_log and not feed.follow and not isfinite(feed.factor)
+    wanted = None if gains is None else wanted_at(feed.axis, *gains)
+    return Beside(feed.axis, feed.flown if diagnose else None, wanted, waits=waits)
 
 
 def _begun(feed: _Feed, state: Path | None, watch: Watch, bandwidth: float, forgetting: float) -> tuple[OnlineIdentifier, float]:
@@ -261,6 +314,7 @@ def _looks(
     every: float,
     state: Path | None,
     after: float,
+    beside: Beside | None,
 ) -> Iterator[Mapping[str, Any]]:
     """Yield a look every so many seconds of the log, one when it ends, and save the state as time goes on."""
     import time as clock
@@ -269,12 +323,16 @@ def _looks(
 
     due, saved, fresh, unreadable = -inf, clock.monotonic(), True, 0
 
-    def look() -> Mapping[str, Any]:
+    def look(*, ended: bool = False) -> Mapping[str, Any]:
         now = identifier.estimate()
         watch.goals = dict(goals(now.speed))
         progress = watch.look(now)
         then = feed.then(usable=not progress.contradiction)
-        return look_body(now, progress, source=feed.name, goals_from=goals_from, unreadable=feed.unreadable, then=then)
+        told: dict[str, Any] = {}
+        if beside is not None:
+            beside.look(now, progress, ended=ended)
+            told = {"gains": beside.gains, "diagnosed": beside.diagnosed}
+        return look_body(now, progress, source=feed.name, goals_from=goals_from, unreadable=feed.unreadable, then=then, **told)
 
     with closing(feed.samples(after)) as samples:  # type: ignore[type-var]
         for sample in samples:
@@ -283,6 +341,8 @@ def _looks(
             identifier.update(*sample[:5], fin_is_held=sample.fin_is_held, fin_line=sample.fin_line)
             watch.excitation.hear(sample.time, sample.fin, sample.rate)
             fresh = True
+            if beside is not None:
+                beside.hear(sample)
             if sample.time >= due or sample.time < due - 2.0 * every:
                 due = sample.time + every
                 yield look()
@@ -290,8 +350,8 @@ def _looks(
             if state is not None and clock.monotonic() - saved >= SAVE_EVERY_S:
                 _save(state, identifier, watch, feed.name)
                 saved = clock.monotonic()
-    if fresh or feed.unreadable > unreadable:
-        yield look()
+    if fresh or feed.unreadable > unreadable or beside is not None:
+        yield look(ended=True)
 
 
 def _save(state: Path, identifier: OnlineIdentifier, watch: Watch, source: str) -> None:
@@ -303,7 +363,7 @@ def _save(state: Path, identifier: OnlineIdentifier, watch: Watch, source: str) 
 @contextmanager
 def _shown(*, as_json: bool) -> Iterator[Callable[[Mapping[str, Any]], None]]:
     """Yield what shows a look: a line of JSON, a screen on a terminal, else a line of text; nothing where it is to be quiet."""
-    from fieldsid.cli.live.screen import line, screen
+    from fieldsid.cli.live.screen import line, screen, told_of
 
     if as_json:
         import json
@@ -319,7 +379,16 @@ def _shown(*, as_json: bool) -> Iterator[Callable[[Mapping[str, Any]], None]]:
         yield lambda _body: None
         return
     if not console.is_terminal:
-        yield lambda body: console.print(line(body), soft_wrap=True)
+        told: list[str] = []
+
+        def print_line(body: Mapping[str, Any]) -> None:
+            console.print(line(body), soft_wrap=True)
+            for text in told_of(body):
+                if text not in told:
+                    console.print(f"{'':12}{text}", soft_wrap=True)
+            told[:] = told_of(body)
+
+        yield print_line
         return
     from rich.live import Live
 
@@ -328,7 +397,12 @@ def _shown(*, as_json: bool) -> Iterator[Callable[[Mapping[str, Any]], None]]:
 
 
 def _end(body: Mapping[str, Any]) -> None:
-    from fieldsid.cli.live.screen import Parameters, headline_of
+    from fieldsid.cli.live.screen import Parameters, headline_of, told_of
+
+    def render(to: Console) -> None:
+        to.print(Parameters(body))
+        for text in told_of(body):
+            to.print(text, soft_wrap=True)
 
     if body:
-        emit(body, as_json=False, render=lambda to: to.print(Parameters(body)), headline=headline_of(body))
+        emit(body, as_json=False, render=render, headline=headline_of(body))

@@ -30,10 +30,15 @@ class Searched:
 
 
 def of_diagnosis(body: Body, searched: Searched) -> Headline:
-    """Return the verdict with its numbers and probability."""
-    sure = _sure(body) if body["verdict"] in ("effect", "undecided") else ""
+    """Return the verdict with its numbers and how far the next best lies behind."""
     rests = f"{_judged(body)}; {counted(len(body['candidates']), 'hypothesis', 'hypotheses')} compared"
-    return Headline(f"{body['verdict']}: {body['short']}{sure}", rests, _after(body, searched))
+    return Headline(first_line(body), rests, _after(body, searched))
+
+
+def first_line(body: Body) -> str:
+    """Return what is said first of a diagnosis."""
+    sure = _sure(body) if body["verdict"] in ("effect", "undecided") else ""
+    return f"{body['verdict']}: {body['short']}{sure}"
 
 
 def _judged(body: Body) -> str:

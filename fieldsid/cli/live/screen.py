@@ -15,6 +15,7 @@ from rich.table import Table
 from fieldsid.cli.console import FAR, words
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.voice import shown_estimate, shown_in
+from fieldsid.rounding import with_error
 
 STYLE = {
     "starting": "dim",
@@ -30,13 +31,43 @@ BAR = 20
 def screen(body: Mapping[str, Any]) -> RenderableType:
     """Return the whole view of one look: verdict, parameters with bands, excitation, what was met."""
     head = words(body["said"], STYLE[body["verdict"]])
-    return Group(head, words(f"rests on {rests_on(body)}", "dim"), "", Parameters(body), "", _meters(body), _met(body))
+    told = [words(text) for text in told_of(body)]
+    return Group(head, words(f"rests on {rests_on(body)}", "dim"), "", Parameters(body), "", *told, _meters(body), _met(body))
+
+
+def told_of(body: Mapping[str, Any]) -> list[str]:
+    """Return what else there is to tell of a look: a jump of the authority, gains, a diagnosis, each in a line."""
+    jump, gains, found = body["authority_jump"], body["gains"], body["diagnosed"]
+    told = []
+    if jump is not None:
+        factor = with_error(jump["factor"], jump["std_error"])
+        told.append(
+            f"the fin's authority is {factor} times what it was, since about {jump['since_s']:.0f} s: estimated anew from there"
+        )
+    if gains is not None:
+        at = "" if gains["verdict"] == "refused" else f"gains at {gains['time_s']:.0f} s for {gains['speed_m_s']:.2f} m/s: "
+        told.append(f"{at}{gains['says']}{_of_row(gains)}")
+    if found is not None:
+        fly = found.get("next_maneuver")
+        then = f"; before coming up fly {fly['maneuver']}, {fly['why']}" if fly else ""
+        until = "" if found["verdict"] == "refused" else f"flown up to {found['time_s']:.0f} s: "
+        told.append(f"{until}{found['says']}{then}")
+    return told
+
+
+def _of_row(gains: Mapping[str, Any]) -> str:
+    """Return what gains come to, and where they differ from the loaded ones what those do."""
+    if gains["verdict"] == "refused":
+        return ""
+    row, loaded = gains["row"], gains["loaded_phase_margin_deg"]
+    margin = "no phase crossing" if row["phase_margin_deg"] is None else f"phase margin {row['phase_margin_deg']:.0f} deg"
+    before = f", {loaded:.0f} deg with the loaded" if loaded is not None else ""
+    settles = "" if row["settling_s"] is None else f", settles in {row['settling_s']:.1f} s"
+    return f" ({margin}{before}{settles}; bound by {row['binds']})"
 
 
 def line(body: Mapping[str, Any]) -> str:
     """Return one look in a line: time, verdict, values with errors."""
-    from fieldsid.rounding import with_error
-
     known = (
         f"{name} {with_error(p['value'], p['std_error'])}" for name, p in body["parameters"].items() if p["std_error"] is not None
     )

@@ -20,7 +20,7 @@ from fieldsid.schedule.search.binding import bound_by
 from fieldsid.schedule.search.formulas import bandwidth_of
 from fieldsid.schedule.search.objective import BETTER_SHARE, LACK_ROUNDING, Place, demand_of
 from fieldsid.schedule.search.optimum import Found, Search
-from fieldsid.schedule.wish import PROPORTIONAL, Wish
+from fieldsid.schedule.wish import PROPORTIONAL, QUICKEST, Wish
 
 LEAST_HELD = 0.5
 """P and PI that hold fewer of the draws are refused: no proportional gain holds an unstable hull."""
@@ -75,9 +75,12 @@ class Designed:
     binds: str
 
 
-def design_gains(plant: LinearPlant, wish: Wish, fin_limit: float) -> Designed:
-    """Return the gains of one speed alone, as quick as its fin and margins let them be; see `quickest`."""
-    return designed(quickest(plant, wish, fin_limit))
+def design_gains(plant: LinearPlant, wish: Wish, fin_limit: float, answer: float = QUICKEST) -> Sought:
+    """Return the gains of one speed alone: of a bandwidth or an answer (s) that is asked, as quick as may be where none serve."""
+    quick = quickest(plant, wish, fin_limit)
+    if wish.bandwidth is not None:
+        return with_bandwidth(quick, wish.bandwidth) or quick
+    return answering(quick, answer, f"settling {answer:.3g} s") if answer > QUICKEST else quick
 
 
 def quickest(plant: LinearPlant, wish: Wish, fin_limit: float) -> Sought:

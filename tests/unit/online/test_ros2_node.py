@@ -20,13 +20,13 @@ class Node:
     settings: ClassVar[dict[str, object]] = {}
 
     def __init__(self, _name):
-        self.sent, self.heard = [], []
+        self.sent, self.gained, self.heard = [], [], []
 
     def declare_parameter(self, name, default):
         return SimpleNamespace(value=self.settings.get(name, default))
 
-    def create_publisher(self, _kind, _topic, _depth):
-        return SimpleNamespace(publish=self.sent.append)
+    def create_publisher(self, _kind, topic, _depth):
+        return SimpleNamespace(publish=(self.gained if topic == "~/gains" else self.sent).append)
 
     def create_subscription(self, _kind, topic, _call, _depth):
         self.heard.append(topic)
@@ -45,17 +45,21 @@ def stand_in(monkeypatch, name, **names):
 
 
 def test_the_node_identifies_from_its_messages(monkeypatch, tmp_path):
-    for name in ("rclpy", "geometry_msgs", "sensor_msgs", "std_msgs"):
+    for name in ("rclpy", "geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs"):
         stand_in(monkeypatch, name)
     stand_in(monkeypatch, "rclpy.node", Node=Node)
     stand_in(monkeypatch, "geometry_msgs.msg", Vector3Stamped=object)
+    stand_in(monkeypatch, "nav_msgs.msg", Odometry=object)
     stand_in(monkeypatch, "sensor_msgs.msg", Imu=object)
     stand_in(monkeypatch, "std_msgs.msg", String=lambda data: data)
     file = template_path("ros2") / "sysid_live_node.py"
-    assert len(file.read_text().splitlines()) <= 80
+    assert len(file.read_text().splitlines()) <= 100
     kind = runpy.run_path(str(file))["SysidLive"]
     monkeypatch.setattr(Node, "settings", {"state": str(tmp_path / "state.json")})
     node = kind()
+    node.on_odometry(SimpleNamespace(twist=SimpleNamespace(twist=SimpleNamespace(linear=SimpleNamespace(x=1.4)))))
+    node.on_half_minute()
+    node.job.result()
     for i, (time, fin, angle, rate) in enumerate(zip(*(s.tolist() for s in flown()), strict=True)):
         node.on_fins(SimpleNamespace(vector=SimpleNamespace(x=fin, y=0.0)))
         half = 0.5 * angle
@@ -72,4 +76,10 @@ def test_the_node_identifies_from_its_messages(monkeypatch, tmp_path):
     last = json.loads(node.sent[-1])
     for name, truth in TRUTH["yaw"].items():
         assert abs(last["parameters"][name]["value"] - truth) < 4.0 * last["parameters"][name]["std_error"]
+    node.on_half_minute()
+    node.job.result()
+    first, then = map(json.loads, node.gained)
+    assert first["verdict"] == "refused"
+    assert then["verdict"] == "use"
+    assert then["row"]["kp"] < 0.0 < then["std_errors"]["kp"]
     assert kind().online.estimate().used == node.online.estimate().used
