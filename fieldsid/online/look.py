@@ -45,18 +45,14 @@ class LiveGains:
     time: Annotated[Number, Key("Time of the estimate they are of.", "time_s")]
     verdict: Annotated[
         Literal["use", "keep", "change", "refused"],
-        Key(
-            "`keep` and `change` are of the gains that are loaded, `use` where none are; `refused` until the estimate has settled."
-        ),
+        Key("`keep` and `change` are of the gains loaded, `use` where none are; `refused` until the estimate has settled."),
     ]
     says: Annotated[str, Key("The gains with their errors beside those loaded, or why there are none.")]
     speed: Annotated[Number, Key("The speed they are for: that of the last 10 s.", "speed_m_s")] = nan
     row: Annotated[Mapping[str, Any] | None, Key("Gains, margins and answer, as a row of a schedule.")] = None
     std_errors: Annotated[Mapping[str, float] | None, Key("Standard errors of kp, ki, kd and of the feed-forward in rad.")] = None
     loaded: Annotated[Mapping[str, Any] | None, Key("The row of the schedule that is loaded, at this speed.")] = None
-    loaded_phase_margin_deg: Annotated[
-        Number, Key("Its phase margin with the estimate: the least over 95 % of the draws.")
-    ] = nan
+    loaded_phase_margin_deg: Annotated[Number, Key("Its phase margin with the estimate: the least over 95 % of the draws.")] = nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,7 +100,8 @@ class Look(Result):
     authority_jump: Annotated[Jump | None, Key("The last jump of the fin's authority; null where there was none.")]
     gains: Annotated[LiveGains | None, Key("Gains of now; null without `--gains`.")]
     diagnosed: Annotated[
-        LiveDiagnosis | None, Key("A diagnosis of what was flown; null without `--diagnose`, or before the first maneuver has ended.")
+        LiveDiagnosis | None,
+        Key("A diagnosis of what was flown; null without `--diagnose`, or before the first maneuver has ended."),
     ]
     counts: Annotated[
         Mapping[str, int],
