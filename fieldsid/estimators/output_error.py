@@ -18,7 +18,7 @@ from fieldsid.fitting.covariance.kenward_roger import (
 )
 from fieldsid.fitting.covariance.noise_selection import chosen_noise
 from fieldsid.fitting.covariance.output_error_covariance import white_weight_covariance
-from fieldsid.fitting.covariance.reml import linearise_runs, reml_likelihood
+from fieldsid.fitting.covariance.reml import linearise_runs, restricted_likelihood
 from fieldsid.fitting.initial.effect_screen import backtrack, carry_parameters, linearise_at, screen_effect
 from fieldsid.fitting.initial.forward_build import forward_build
 from fieldsid.fitting.initial.other_event_times import starts_at_other_times
@@ -169,7 +169,7 @@ def errors(problem: Problem, found: Minimum, weights: Noise, noise: Noise, noise
     if sum(len(r) for r in problem.records) > KNOWN_NOISE_SAMPLES:
         return white_weight_covariance(problem, found, weights, vector, normal, results)
     lines, count = linearise_runs(problem, found.x), len(problem.layout.parameters)
-    spread = noise_covariance(lambda v: reml_likelihood(lines, count, v), vector, noise_kind)
+    spread = noise_covariance(restricted_likelihood(lines, count), vector, noise_kind)
     still = found.x[list(found.free)]
     return kenward_roger(
         lambda v: (still, white_weight_covariance(problem, found, weights, v, normal, results)),

@@ -14,8 +14,8 @@ from fieldsid.fitting.covariance.reml import (
     MAX_NOISE_SAMPLES,
     gls_step,
     linearise_runs,
-    reml_likelihood,
     reml_noise,
+    restricted_likelihood,
     select_noise,
 )
 from fieldsid.fitting.optimise.levenberg_marquardt import Minimum, covariance, levenberg_marquardt
@@ -68,7 +68,7 @@ def errors(problem: Problem, found: Minimum, noise: Noise, noise_kind: str) -> F
     if noise_kind == "white" or sum(len(r) for r in problem.records) > KNOWN_NOISE_SAMPLES:
         return covariance(found.normal)
     lines, count, vector = linearise_runs(problem, found.x), len(problem.layout.parameters), noise_vector(noise)
-    spread = noise_covariance(lambda v: reml_likelihood(lines, count, v), vector, noise_kind)
+    spread = noise_covariance(restricted_likelihood(lines, count), vector, noise_kind)
     return kenward_roger(lambda v: gls_step(lines, count, v), vector, noise_kind, spread)
 
 

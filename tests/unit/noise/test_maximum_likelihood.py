@@ -10,7 +10,7 @@ from truth.noise import ar1
 from truth.paper import YAW, paper_run
 
 from fieldsid.fitting.covariance.kenward_roger import kenward_roger, noise_covariance, with_log_steps
-from fieldsid.fitting.covariance.reml import linearise_runs, reml_likelihood, select_noise
+from fieldsid.fitting.covariance.reml import linearise_runs, restricted_likelihood, select_noise
 from fieldsid.fitting.problem.parameters import layout_of
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.logs.run import Run
@@ -100,7 +100,7 @@ def test_restricted_likelihood_does_not_move_with_the_point_of_linearisation():
     known, x = problem(gust=0.03)
     off = x + np.array([0.002, 0.001, 1e-4, 0.01, 0.002])
     vector = noise_vector(Noise(SIGMA / 4, SIGMA / 4, 0.03, 1.0))
-    one, two = (reml_likelihood(linearise_runs(known, at), 5, vector) for at in (x, off))
+    one, two = (restricted_likelihood(linearise_runs(known, at), 5)(vector) for at in (x, off))
     assert one == pytest.approx(two, abs=0.2)
 
 
