@@ -26,6 +26,7 @@ from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.voice import voice
 from fieldsid.logs.run import Note
 from fieldsid.page import Block, Page, told
+from fieldsid.records.keys import body_of
 from fieldsid.text.one_line import one_line
 
 T = TypeVar("T")
@@ -79,7 +80,7 @@ def emit(
     alone. Only what is no result, as a page of the guide, has no headline. Where what `render` prints `is_file`, to be redirected
     to one, the headline goes to stderr, and the file is what is left where it is to be quiet.
     """
-    whole = body if headline is None else {**body, "headline": headline}
+    whole = body if headline is None else {**body, "headline": body_of(headline)}
     if as_json:
         sys.stdout.write(json.dumps(plain(whole), allow_nan=False) + "\n")
         return whole

@@ -139,8 +139,8 @@ def model_first(model: Path, runs: Sequence[Path]) -> tuple[Path, list[Path]]:
     from fieldsid.logs.unknown_file import own_kind
 
     given = [model, *runs]
-    first = next((path for path in given if own_kind(path) == "model"), model)
-    return first, [path for path in given if path != first]
+    at = next((i for i, path in enumerate(given) if own_kind(path) == "model"), 0)
+    return given[at], [*given[:at], *given[at + 1 :]]
 
 
 def models_among(paths: Sequence[Path]) -> list[Path]:

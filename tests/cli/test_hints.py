@@ -88,7 +88,6 @@ CASES = {
     "a folder": (lambda: trial.flown(Path("the runs")), "identify 'the runs' --axis yaw"),
     "a model for a log": (model, "identify model.yaml --axis yaw"),
     "a log for a model": (table, f"compare '{LOG}' '{LOG}'"),
-    "the wrong way round": (model, "compare run7.parquet model.yaml"),
     "a fin that never moves": (still, "identify still.parquet --axis yaw"),
     "the other axis": (lambda: trial.flown(Path(), Axis.PITCH), "identify run7.parquet --axis yaw"),
     "effects of a method without": (table, f"identify '{LOG}' --axis yaw --method svf_ls --effects servo_lag"),

@@ -50,6 +50,7 @@ from fieldsid.registry import members
 from fieldsid.reporting.material import material_of
 from fieldsid.reporting.page import html_of
 from fieldsid.reporting.sections import context_of
+from fieldsid.results.logs import inspected as told
 from fieldsid.schedule.record import load_schedule
 from fieldsid.templates import template_path
 from fieldsid.trial_folder.journal import Entry, Stamp, append
@@ -80,7 +81,7 @@ class Kind:
 def inspected(path):
     """Inspect a log, and import it by the mapping that this proposes."""
     found = inspect_log(path)
-    json.dumps(found.record(None))
+    json.dumps(plain(told(found, None)))
     mapping = path.parent / "proposed.yaml"
     mapping.write_text(found.yaml(), encoding="utf-8")
     with contextlib.suppress(FieldsidError):

@@ -13,7 +13,7 @@ import pytest
 from binary_logs import write_mat, write_ulog
 from fuzz.kinds import SIGNALS, TIME, as_radius_table, as_run, bag, good_files
 
-from fieldsid.artifacts import to_yaml
+from fieldsid.artifacts import plain, to_yaml
 from fieldsid.cli.app import run as command
 from fieldsid.dynamics.free_run import effects_of
 from fieldsid.errors import ArtifactError, DataError, FieldsidError, LogError, MappingError, ModelError
@@ -31,6 +31,7 @@ from fieldsid.models.record import record_of
 from fieldsid.planning.belief.prior_file import load_prior
 from fieldsid.plant.laws.axis_laws import carried_models, load_laws
 from fieldsid.records.reading import read_yaml
+from fieldsid.results.logs import inspected
 from fieldsid.schedule.record import load_schedule
 
 
@@ -187,7 +188,7 @@ ODD_COLUMNS = {
 @pytest.mark.parametrize("odd", ODD_COLUMNS)
 def test_a_column_of_any_type_is_listed_and_read_or_refused(tmp_path, odd):
     path = parquet(tmp_path, {"time_s": TIME, **SIGNALS, "yaw_rad": ODD_COLUMNS[odd]})
-    json.dumps(inspect_log(path).record(None))
+    json.dumps(plain(inspected(inspect_log(path), None)))
     try:
         run = load_run(path)
     except LogError as error:

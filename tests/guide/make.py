@@ -22,7 +22,7 @@ FIGURES: dict[str, tuple[str, float, tuple[float, float, float, float]]] = {
     "recursive": ("demo/recursive/learn_1.4_yaw_over_time.png", 0.62, WHOLE),
     "compare": ("demo/models/joint_yaw_on_check_1.6.png", 0.62, (0.0, 0.05, 0.625, 1.0)),
     "where": ("demo/models/joint_yaw_on_check_1.6.png", 0.62, (0.64, 0.05, 1.0, 1.0)),
-    "loop": ("demo/figures/loop.png", 0.55, WHOLE),
+    "loop": ("demo/figures/loop.png", 0.5, WHOLE),
     "diagnose": ("demo/models/diagnosis.png", 0.62, WHOLE),
     "history": ("demo/models/history.png", 0.75, WHOLE),
     "law": ("demo/final/law_yaw.png", 0.7, WHOLE),

@@ -14,7 +14,7 @@ from fieldsid.dynamics.free_run import base_at, effects_of
 from fieldsid.dynamics.steady_kernel import straight_slopes
 from fieldsid.errors import ModelError, UsageError
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.hull import Core
+from fieldsid.models.hull import OF_ANGLE, Core
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.belief.prior_file import load_prior
@@ -69,9 +69,12 @@ def checked_prior(model: Model, axis: Axis, speeds: tuple[float, ...]) -> Model:
 def growth_of(base: Base, core: Core) -> float:
     """Return the growth rate (1/s) of the least stable motion; a free heading counts as neither stable nor unstable.
 
-    y'' = -a y' - k y + m x, x' = -c x - c_r y': sway may hold a hull that is unstable without it, and upset another.
+    y'' = -a y' - k y + m x, x' = -c x - c_r y': sway may hold a hull that is unstable without it, and upset another. What goes
+    with the angle itself, as a compass's error, pulls to one heading and moves no other motion.
     """
-    a, k, c, by_rate, _ = straight_slopes(np.array([core]))[:, 0] + [base.damping, base.stiffness, 0.0, 0.0, 0.0]
+    constants = np.array([core], dtype=np.float64)
+    constants[:, OF_ANGLE] = 0.0
+    a, k, c, by_rate, _ = straight_slopes(constants)[:, 0] + [base.damping, base.stiffness, 0.0, 0.0, 0.0]
     roots = np.roots([1.0, a + c, k + a * c + by_rate, k * c])
     worst = float(np.max(roots.real))
     return worst if worst > 1e-6 else 0.0

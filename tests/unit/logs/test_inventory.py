@@ -6,9 +6,11 @@ from bags import KINDS, write_bag
 from binary_logs import write_alog, write_mat
 from look_alikes import truth
 
+from fieldsid.artifacts import plain
 from fieldsid.logs.inspection import inspect_log
 from fieldsid.logs.run import Run
 from fieldsid.logs.save import save_run
+from fieldsid.results.logs import inspected
 
 TRUTH = truth(seconds=30.0)
 SIGNALS = {s: TRUTH[s] for s in ("yaw_rad", "yaw_rate_rad_s", "surge_m_s", "rudder_rad")}
@@ -25,7 +27,7 @@ def test_a_bag_shows_the_ranges_of_its_fields(tmp_path, kind):
     rate = next(span for (_, path), span in known.items() if path == "angular_velocity.z")
     wanted = -TRUTH["yaw_rate_rad_s"] if rate[0] != pytest.approx(TRUTH["yaw_rate_rad_s"].min()) else TRUTH["yaw_rate_rad_s"]
     assert rate == pytest.approx((wanted.min(), wanted.max()))
-    shown = {row["name"].strip(): row["holds"] for row in found.record(None)["shown"]}
+    shown = {row["name"].strip(): row["holds"] for row in plain(inspected(found, None))["shown"]}
     assert " .. " in shown["angular_velocity.z"]
 
 

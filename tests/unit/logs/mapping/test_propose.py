@@ -6,6 +6,7 @@ from bags import KINDS, write_bag
 from binary_logs import write_lsf
 from ruamel.yaml import YAML
 
+from fieldsid.artifacts import plain
 from fieldsid.errors import ArtifactError
 from fieldsid.logs import load_run
 from fieldsid.logs.inspection import inspect_log, write_proposal
@@ -13,6 +14,7 @@ from fieldsid.logs.mapping.guesses import of_topic
 from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import ChannelInfo, FieldInfo
+from fieldsid.results.logs import inspected
 
 TIME = 0.05 * np.arange(400)
 TRUTH = {
@@ -86,7 +88,7 @@ def test_a_mapping_that_exists_is_kept(tmp_path):
 
 
 def test_the_record_holds_what_the_page_shows(tmp_path):
-    record = inspect_log(vendor_table(tmp_path / "vendor.csv")).record(None)
+    record = plain(inspected(inspect_log(vendor_table(tmp_path / "vendor.csv")), None))
     assert record["schema"] == "fieldsid/inspection/1"
     assert [c["name"] for c in record["channels"]][:2] == ["Time [ms]", "Heading"]
     assert record["mapping"]["signals"]["yaw_rad"]["unit"] == "deg"
