@@ -25,10 +25,7 @@ from fieldsid.models.effect import effect_named, with_variant
 from fieldsid.models.model import Noise
 from fieldsid.models.record import ROLES, Record
 from fieldsid.noise.fisher_scoring import score_of_innovations
-from fieldsid.noise.kalman.disturbance import disturbance_filter
-from fieldsid.noise.kalman.full import full_filter
-from fieldsid.noise.kalman.full_batched import full_filter_batched
-from fieldsid.noise.kalman.sensor_colour import sensor_colour_filter
+from fieldsid.noise.kalman.univariate import three_states, with_sensors, with_sensors_abreast
 from fieldsid.noise.maximum_likelihood import estimate_noise
 from fieldsid.noise.moment_response import base_responses
 from fieldsid.noise.sandwich_covariance import score_covariance, score_covariance_kernel
@@ -114,13 +111,12 @@ class WarmupJob:
 
 WARMUP_JOBS = (
     WarmupJob(_linear, (linear_sensitivities, linear_motion, accumulate_normal_equations)),
-    WarmupJob(lambda: _whiten(replace(DISTURBED, own_moment=0.01)), (disturbance_filter, base_responses)),
+    WarmupJob(lambda: _whiten(replace(DISTURBED, own_moment=0.01)), (three_states, base_responses)),
     WarmupJob(_nonlinear, (nonlinear_sensitivities, nonlinear_motion)),
     WarmupJob(_lag, (first_order_lag, held_first_order_lag)),
     WarmupJob(lambda: _estimate("disturbance"), (score_of_innovations,)),
-    WarmupJob(lambda: _estimate("coloured"), (sensor_colour_filter,)),
-    WarmupJob(lambda: _whiten(replace(DISTURBED, coloured_rate=0.01)), (full_filter,)),
-    WarmupJob(lambda: _estimate("both"), (full_filter_batched,)),
+    WarmupJob(lambda: _whiten(replace(DISTURBED, coloured_rate=0.01)), (with_sensors,)),
+    WarmupJob(lambda: _estimate("both"), (with_sensors_abreast,)),
     WarmupJob(_sandwich, (score_covariance_kernel,)),
 )
 """What a fit calls, in the order in which it is needed."""

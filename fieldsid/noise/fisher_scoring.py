@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.models.record import Record
-from fieldsid.noise.innovations import filter_of, kalman_filter
-from fieldsid.noise.kalman.full_batched import LANES, full_filter_batched
+from fieldsid.noise.innovations import filter_of
+from fieldsid.noise.kalman.univariate import LANES, with_sensors_abreast
 from fieldsid.noise.noise_kinds import IS_STANDARD_DEVIATION
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
@@ -41,23 +41,18 @@ def innovations_of(
     them.
     """
     if place.size < noise.size:
-        standardised, innovation_std = np.empty((1, *residual.shape)), np.empty(residual.shape)
-        logs = kalman_filter(
-            record.nominal_steps, record.ok, a, k, noise, np.ascontiguousarray(residual[None]), standardised, innovation_std
-        )
-        return _innovations(standardised[0], innovation_std, logs)
-    standardised, innovation_std = np.empty((LANES, *residual.shape)), np.empty((LANES, *residual.shape))
+        standardised, innovation_std = np.empty((2, 1, *residual.shape))
+        series = np.ascontiguousarray(residual[None])
+        logs = filter_of(noise)(record.nominal_steps, record.ok, a, k, noise[None], series, standardised, innovation_std)
+        return _innovations(standardised[0], innovation_std[0], logs)
+    standardised, innovation_std = np.empty((2, LANES, *residual.shape))
     noises = np.tile(noise, (LANES, 1))
     noises[np.arange(1, place.size), place[1:]] *= STEP_FACTOR
-    full_filter_batched(record.nominal_steps, record.ok, a, k, noises, residual, standardised, innovation_std)
+    series = np.ascontiguousarray(residual[None])
+    logs = with_sensors_abreast(record.nominal_steps, record.ok, a, k, noises, series, standardised, innovation_std)
     # copies: the first rows become those of the first number moved
-    d_log_std = innovation_std[0].copy()
-    return _innovations(
-        standardised[0].copy(),
-        d_log_std,
-        2.0 * float(np.log(d_log_std).sum()),
-        (standardised[: place.size], innovation_std[: place.size]),
-    )
+    moved = standardised[: place.size], innovation_std[: place.size]
+    return _innovations(standardised[0].copy(), innovation_std[0].copy(), logs, moved)
 
 
 def _innovations(
@@ -92,12 +87,12 @@ def _moved(
 ) -> tuple[FloatArray, FloatArray]:
     """Return innovations and their spreads (P, 2, n) with each of the noise's numbers moved but the first."""
     series, kalman = np.ascontiguousarray(residual[None]), filter_of(noise)
-    standardised, innovation_std = np.empty((place.size, 1, *residual.shape)), np.empty((place.size, *residual.shape))
+    standardised, innovation_std = np.empty((2, place.size, 1, *residual.shape))
     for row, p in enumerate(place.tolist()[1:], 1):
-        moved = noise.copy()
-        moved[p] *= STEP_FACTOR
+        moved = noise[None].copy()
+        moved[0, p] *= STEP_FACTOR
         kalman(record.nominal_steps, record.ok, a, k, moved, series, standardised[row], innovation_std[row])
-    return standardised[:, 0], innovation_std
+    return standardised[:, 0], innovation_std[:, 0]
 
 
 @jit

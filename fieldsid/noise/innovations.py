@@ -1,37 +1,22 @@
 """Innovations of a residual: the Kalman filter of the motion that disturbances and coloured sensor noise cause.
 
-State (y, p, w, n_y, n_p), see noise/whiten.py; a noise is a vector (7,) in the order of NOISE_FIELDS. The filter is that of the
-first kind in NOISE_KINDS that holds all of the noise; each is compiled only once it is called.
+State (y, p, w, n_y, n_p), see noise/whiten.py; a noise is a vector (7,) in the order of NOISE_FIELDS.
 """
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from fieldsid.noise.noise_kinds import NOISE_KINDS, Filter, NoiseKind
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.noise.kalman.univariate import Filter, three_states, with_sensors
+from fieldsid.noise.noise_kinds import NOISE_KINDS, NoiseKind
+from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 KINDS = tuple((kind, kind.absent) for kind in NOISE_KINDS.values())
 
 
-def kalman_filter(
-    steps: FloatArray,
-    ok: npt.NDArray[np.bool_],
-    a: float,
-    k: float,
-    noise: FloatArray,
-    series: FloatArray,
-    out: FloatArray,
-    spreads: FloatArray,
-) -> float:
-    """Do what `innovations` does, and fill spreads (2, n) with their standard deviations, one where not measured."""
-    return filter_of(noise)(steps, ok, a, k, noise, series, out, spreads)
-
-
 def filter_of(noise: FloatArray) -> Filter:
-    """Return the filter of the first kind that holds all of a noise vector (7,)."""
-    return kind_of(noise).filter
+    """Return the filter of a noise vector (7,): with states for the sensors' colour where the water moves the hull too."""
+    return with_sensors if noise[2] > 0.0 and noise[4] + noise[5] > 0.0 else three_states
 
 
 def kind_of(noise: FloatArray) -> NoiseKind:
@@ -41,17 +26,10 @@ def kind_of(noise: FloatArray) -> NoiseKind:
 
 
 def innovations(
-    steps: FloatArray,
-    ok: npt.NDArray[np.bool_],
-    a: float,
-    k: float,
-    noise: FloatArray,
-    series: FloatArray,
-    out: FloatArray,
-) -> float:
-    """Fill out (m, 2, n) with the standardised innovations of series (m, 2, n); return the sum of log variances.
+    steps: FloatArray, ok: BoolArray, a: float, k: float, noise: FloatArray, series: FloatArray, out: FloatArray
+) -> float:  # fmt: skip
+    """Fill out (m, 2, n) with the standardised innovations of series (m, 2, n) under a noise vector (7,), as its filter does.
 
-    Samples not measured give zero. Once four steps in a row of equal length leave the gains as they are, they are kept
-    until a sample is missing or the step changes.
+    Samples not measured give zero. Returns the sum of the log variances.
     """
-    return kalman_filter(steps, ok, a, k, noise, series, out, np.empty((2, steps.shape[0] + 1)))
+    return filter_of(noise)(steps, ok, a, k, noise[None], series, out, np.empty((1, 2, steps.shape[0] + 1)))

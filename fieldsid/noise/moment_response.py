@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.noise.kalman.transition import transition
+from fieldsid.noise.kalman.transition import is_other_step, transition
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 
@@ -23,7 +23,7 @@ def base_responses(steps: FloatArray, a: float, k: float) -> FloatArray:
     out[1, 0, 0] = out[2, 1, 0] = 1.0
     yy, yp, py, pp, yw, pw = 1.0, 0.0, 0.0, 1.0, 0.0, 0.0
     for i in range(n - 1):
-        if abs(steps[i] - last_h) > 1e-7 * steps[i]:
+        if is_other_step(steps[i], last_h):
             last_h = steps[i]
             yy, yp, py, pp, yw, pw = transition(a, k, last_h)
         for row in range(3):

@@ -1,22 +1,17 @@
-"""The kinds of noise: which processes each holds, the filter that whitens it, and the bounds of each parameter.
+"""The kinds of noise: which processes each holds, and the bounds of each parameter.
 
 To add a kind of the processes that are here, add a `NoiseKind`. To add a process, add its parameters to `models.model.Noise` and
-to NOISE_PARAMETERS, and write its filter in `kalman/`, which takes the same arguments as `full_filter`.
+to NOISE_PARAMETERS, and its state to `kalman/univariate.py`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.noise.kalman.disturbance import disturbance_filter
-from fieldsid.noise.kalman.full import full_filter
-from fieldsid.noise.kalman.sensor_colour import sensor_colour_filter
 from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S
-from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 SEA_TIMES_S = (0.5, 8.0)
 """Correlation times (s) of a moment that the water turns a hull by, 95 of 100. A wave has lost its memory after a sixth of its
@@ -25,8 +20,6 @@ left to the slow. What moves more slowly yet is no sea but a trim that changes, 
 the trim was left to a disturbance of 25 to 30 s. The two banks, by different hands, have 0.3 to 2 and 2 to 5 s."""
 STANDARD_DEVIATIONS = 4.0
 """Standard deviations of a normal distribution between which 95 of 100 lie."""
-
-Filter = Callable[[FloatArray, BoolArray, float, float, FloatArray, FloatArray, FloatArray, FloatArray], float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,23 +46,15 @@ class NoiseParameter:
 
 @dataclass(frozen=True, slots=True)
 class NoiseKind:
-    """Fields of `Noise` that are estimated, the filter of this noise, and what residuals of this kind are said to be."""
+    """Fields of `Noise` that are estimated, and what residuals of this kind are said to be."""
 
     fields: tuple[str, ...]
-    filter: Filter
     says: str
 
     @property
     def absent(self) -> tuple[int, ...]:
         """The places in the noise vector of the standard deviations that are zero."""
         return tuple(i for i, (n, p) in enumerate(NOISE_PARAMETERS.items()) if p.is_standard_deviation and n not in self.fields)
-
-
-def _without_motion(
-    steps: FloatArray, ok: BoolArray, _a: float, _k: float, noise: FloatArray,
-    series: FloatArray, out: FloatArray, innovation_std: FloatArray,
-) -> float:  # fmt: skip
-    return sensor_colour_filter(steps, ok, noise, series, out, innovation_std)
 
 
 NOISE_PARAMETERS = {
@@ -88,21 +73,17 @@ LOG_MEDIANS, LOG_PRECISIONS = np.array([p.log_prior for p in NOISE_PARAMETERS.va
 IS_STANDARD_DEVIATION: npt.NDArray[np.bool_] = np.array([p.is_standard_deviation for p in NOISE_PARAMETERS.values()])
 
 NOISE_KINDS = {
-    "white": NoiseKind(("angle", "rate"), disturbance_filter, "no coloured noise fits them better than white noise"),
+    "white": NoiseKind(("angle", "rate"), "no coloured noise fits them better than white noise"),
     "disturbance": NoiseKind(
         ("angle", "rate", "disturbance", "disturbance_time"),
-        disturbance_filter,
         "of the noises compared a disturbance moment fits them best",
     ),
     "coloured": NoiseKind(
         ("angle", "rate", "coloured_angle", "coloured_rate", "coloured_time"),
-        _without_motion,
         "of the noises compared coloured sensor noise fits them best",
     ),
-    "both": NoiseKind(
-        NOISE_FIELDS, full_filter, "of the noises compared a disturbance moment with coloured sensor noise fits them best"
-    ),
+    "both": NoiseKind(NOISE_FIELDS, "of the noises compared a disturbance moment with coloured sensor noise fits them best"),
 }
-"""The kinds that a fit compares, simple ones first: the first that holds all of a noise filters it."""
+"""The kinds that a fit compares, simple ones first."""
 SINGLE_NOISE_KINDS, JOINT_NOISE = ("disturbance", "coloured"), "both"
 """The kinds that models are compared under, and all of them together."""

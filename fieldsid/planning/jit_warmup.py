@@ -7,11 +7,11 @@ import numpy as np
 from fieldsid.dynamics.linear_kernel import linear_sensitivities
 from fieldsid.maneuvers import Autopilot, Limits, Schedule, all_maneuvers, fly
 from fieldsid.models.hull import CONSTANTS, DRIVES
-from fieldsid.noise.kalman.disturbance import disturbance_filter
+from fieldsid.noise.kalman.univariate import three_states
 from fieldsid.planning.flight.closed_loop import closed_loop
 from fieldsid.planning.flight.rule_flight import OperatingPointPlant
 
-SHARED_KERNELS = (linear_sensitivities, disturbance_filter)
+SHARED_KERNELS = (linear_sensitivities, three_states)
 """What planning calls of what every fit needs."""
 SCENES, SAMPLES = 2, 3
 """More than one of each, so that what is handed over lies in memory as it does when planning."""

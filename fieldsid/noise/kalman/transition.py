@@ -1,15 +1,13 @@
-"""What the compiled filters have in common: how (y, p) goes over an interval, and when gains have settled."""
+"""How angle and rate (y, p) of the linear base model go over an interval, under a moment w that is held."""
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import inner
 
-STEADY_GAIN_STEPS = 4
-"""Steps in a row that leave the gains as they are, after which they are kept."""
+SAME_STEP_SHARE = 1e-7
+"""Share of a step within which another is the same: times are rounded."""
 
 
 @inner
@@ -39,24 +37,6 @@ def transition(a: float, k: float, h: float) -> tuple[float, float, float, float
 
 
 @inner
-def gains_repeat(gain: float, last: float) -> bool:
-    """Whether a gain is what it was at the sample before."""
-    return abs(gain - last) < 1e-7 * (abs(gain) + 1e-6)
-
-
-@inner
-def steady_until(steps: FloatArray, ok: npt.NDArray[np.bool_], first: int, h: float) -> int:
-    """Return the first sample from `first` on that is not measured in full or not followed by a step of h."""
-    n = steps.shape[0] + 1
-    i = first
-    while i < n and ok[0, i] and ok[1, i] and (i == n - 1 or abs(steps[i] - h) <= 1e-7 * h):
-        i += 1
-    return i
-
-
-@inner
-def hold_gains(spreads: FloatArray, first: int, stop: int, spread: float) -> float:
-    """Fill a channel's spreads over samples first..stop - 1, where they stay, and return the sum of their log variances."""
-    for i in range(first, stop):
-        spreads[i] = spread
-    return 2.0 * (stop - first) * float(np.log(spread))
+def is_other_step(step: float, last: float) -> bool:
+    """Whether a step between samples is another than the last one, for which the transition is known."""
+    return abs(step - last) > SAME_STEP_SHARE * step

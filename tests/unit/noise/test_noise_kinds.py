@@ -10,7 +10,7 @@ from scipy.stats import norm
 
 from fieldsid.models.model import Noise
 from fieldsid.noise.innovations import innovations
-from fieldsid.noise.kalman.full import full_filter
+from fieldsid.noise.kalman.univariate import with_sensors
 from fieldsid.noise.noise_kinds import NOISE_FIELDS, NOISE_KINDS, NOISE_PARAMETERS
 
 NOISE = Noise(0.004, 0.006, 0.01, 1.3, 0.003, 0.005, 0.8)
@@ -32,9 +32,9 @@ def test_a_kind_is_filtered_as_the_noise_of_all_processes_without_the_others(nam
     steps, ok = np.full(79, 0.1), np.ones((2, 80), dtype=bool)
     own, full = np.empty_like(series), np.empty_like(series)
     logs = innovations(steps, ok, 0.7, 0.0, noise, series, own)
-    # a standard deviation of zero is none of the full filter's
+    # a sensor without any noise would have an infinite weight
     there = np.array([max(v, 1e-9) for v in noise])
-    assert logs == pytest.approx(full_filter(steps, ok, 0.7, 0.0, there, series, full, np.empty((2, 80))), rel=1e-6)
+    assert logs == pytest.approx(with_sensors(steps, ok, 0.7, 0.0, there[None], series, full, np.empty((1, 2, 80))), rel=1e-6)
     np.testing.assert_allclose(own, full, rtol=1e-5, atol=1e-7)
 
 
