@@ -60,7 +60,9 @@ def test_a_model_given_for_a_log_is_called_a_model(run_cli, here, line):
 @pytest.mark.parametrize("words", [("compare",), ("extend", "--add", "servo_lag")])
 def test_run_and_model_may_stand_the_wrong_way_round(run_cli, here, words):
     name, *rest = words
-    right, wrong = (run_cli(name, *files, *rest, "--force", "--json") for files in (("truth.yaml", "run7.csv"), ("run7.csv", "truth.yaml")))
+    right, wrong = (
+        run_cli(name, *files, *rest, "--force", "--json") for files in (("truth.yaml", "run7.csv"), ("run7.csv", "truth.yaml"))
+    )
     assert right.json == wrong.json
 
 

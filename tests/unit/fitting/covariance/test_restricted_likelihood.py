@@ -26,7 +26,11 @@ def lines_of(places):
     common = np.cumsum(rng.standard_normal((2, SAMPLES)), axis=1)
     made = []
     for place in places:
-        log = {"yaw_rad": rng.standard_normal(SAMPLES), "yaw_rate_rad_s": rng.standard_normal(SAMPLES), "rudder_rad": np.sin(time)}
+        log = {
+            "yaw_rad": rng.standard_normal(SAMPLES),
+            "yaw_rate_rad_s": rng.standard_normal(SAMPLES),
+            "rudder_rad": np.sin(time),
+        }
         record = record_of(Run("run", time, log), Axis.YAW)
         own = rng.standard_normal((len(place), 2, SAMPLES))
         stack = np.concatenate([0.01 * rng.standard_normal((1, 2, SAMPLES)), common + NEARLY * own])
