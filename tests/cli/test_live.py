@@ -144,7 +144,7 @@ def test_a_narrow_terminal_shows_every_name_and_goal(width, has_band):
         "said": "enough data, come up", "verdict": "enough", "axis": "yaw", "samples": 644, "speed_m_s": 1.8,
         "goals_from": "`--want`", "parameters": {"a22": known, "b2": known}, "share": 1.0,
         "excitation": {"fin_rms_rad": 0.1, "rate_rms_rad_s": 0.1},
-        "counts": {"unreadable": 0},
+        "counts": {"unreadable": 0}, "authority_jump": None, "gains": None, "diagnosed": None,
     }  # fmt: skip
     to = Console(width=width, file=io.StringIO())
     to.print(screen(body))
