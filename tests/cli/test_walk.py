@@ -89,6 +89,7 @@ def test_pitch(trial_with, tmp_path):
     walk.until_done()
 
 
+@pytest.mark.slow
 @pytest.mark.field
 @pytest.mark.parametrize("logs", ["lauv/rudder_v*", "lauv/elevator_v*", "kvlcc2/*.dat"])
 def test_a_vehicle_of_others(trial_with, shared_data, logs):
