@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 
 from fieldsid.errors import VehicleError
 from fieldsid.models.allocation import Fins, plane_fins_of
+from fieldsid.records.keys import body_of
 from fieldsid.vehicle import vehicle_of
 
 X = Fins(("a", "b", "c", "d"), (0.25, 0.25, -0.25, -0.25), (0.25, -0.25, 0.25, -0.25), (0.35,) * 4)
@@ -84,6 +85,6 @@ def test_a_limit_beyond_the_fins_reach_is_refused_with_the_one_to_write():
 
 def test_fins_come_back_from_a_file():
     fins = X.of("yaw")
-    assert plane_fins_of(fins.record()) == fins
+    assert plane_fins_of(body_of(fins)) == fins
     with pytest.raises(ValueError, match="a share and a limit"):
-        plane_fins_of(fins.record() | {"limits": [0.3]})
+        plane_fins_of(body_of(fins) | {"limits": [0.3]})
