@@ -118,20 +118,20 @@ class AuthorityJump:
         self._before.count += one.count
 
     def _found(self) -> Jump | None:
-        """Return the jump at the place that explains all rows best, if there is one.
+        """Return the jump at the place that explains all rows best, once it lies LEAST_S back.
 
-        Where that is the latest place looked at, it may have begun later yet: the next second tells.
+        A second that does not fit lets earlier places explain it too: the latest ones must be among those compared.
         """
         seconds = list(self._seconds)
-        places = range(max(len(seconds) - MOST_S, 0), len(seconds) - LEAST_S + 1)
+        places = range(max(len(seconds) - MOST_S, 0), len(seconds))
         tried = [(found, place) for place in places if (found := self._at(seconds, place)) is not None]
         (_, jump), place = min(tried, key=lambda t: t[0][0], default=((0.0, None), 0))
-        return jump if place < len(seconds) - LEAST_S else None
+        return jump if place <= len(seconds) - LEAST_S else None
 
     def _at(self, seconds: Sequence[_Sums], place: int) -> tuple[float, Jump | None] | None:
         """Return the squared errors left with a jump before the second at a place, and that jump where it is one.
 
-        None where what came before or since does not tell.
+        None where what came before does not tell; no jump where what came since does not.
 
         What has come last is fitted with the damping, drag and stiffness from before: its authority and trim alone are free.
         """
@@ -141,14 +141,15 @@ class AuthorityJump:
         counts = self._before.count + sum(s.count for s in earlier), sum(s.count for s in recent)
         keep, size = self._keep, self._keep.size - FREE.size
         inverse = _inverse(before[np.ix_(keep, keep)], LEAST_EXCITED)
-        solved = _inverse(after[np.ix_(FREE, FREE)], LEAST_MOVED)
-        if inverse is None or solved is None:
+        if inverse is None:
             return None
         theta = inverse @ before[keep, -1]
         if len(earlier) >= LEAST_DRAWS:
             self._noise = self._noise_of(earlier, theta)
         if not isfinite(self._noise):
             return None
+        told = _inverse(after[np.ix_(FREE, FREE)], LEAST_MOVED)
+        solved = np.linalg.pinv(after[np.ix_(FREE, FREE)], hermitian=True) if told is None else told
         whole = np.concatenate([keep[:size], [WIDTH - 1]])
         given = np.append(-theta[:size], 1.0)
         reached = solved @ after[np.ix_(FREE, whole)]
@@ -160,7 +161,7 @@ class AuthorityJump:
         moved = np.append(-reached[0, :size], [-1.0, 0.0])
         error = sqrt(self._noise * float(moved @ inverse @ moved + noisier * solved[0, 0]))
         known_to = sqrt(self._noise * float(inverse[size, size]))
-        if known_to > KNOWN_SHARE * abs(was) or abs(is_now - was) <= OTHER_MOTION * abs(was) + SURE * error:
+        if told is None or known_to > KNOWN_SHARE * abs(was) or abs(is_now - was) <= OTHER_MOTION * abs(was) + SURE * error:
             return left + left_now, None
         return left + left_now, Jump(recent[0].begin, is_now / was, error / abs(was))
 

@@ -21,7 +21,7 @@ from fieldsid.batch.archive import SCHEMA, known_rows
 from fieldsid.cli.app import main
 from fieldsid.errors import ArtifactError, LogError, UsageError
 from fieldsid.exports._patch import patch_yaml
-from fieldsid.logs.inspection import LISTED, inspect_log
+from fieldsid.logs.inspection import inspect_log
 from fieldsid.logs.readers._mat_elements import refuse_damaged
 from fieldsid.logs.readers._unpacked_size import SMALL, UnpackedSize
 from fieldsid.logs.readers.bags.messages.definitions import _parsed
@@ -34,7 +34,7 @@ from fieldsid.plant.laws.axis_laws import load_laws
 from fieldsid.records.reading import read_yaml
 from fieldsid.reporting.material import material_of
 from fieldsid.reporting.sections import context_of
-from fieldsid.results.logs import inspected
+from fieldsid.results.logs import LISTED, inspected
 from fieldsid.schedule.record import load_schedule
 from fieldsid.trial_folder.state import state_of
 
