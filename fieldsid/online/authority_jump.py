@@ -3,7 +3,8 @@
 The equation's rows are summed second by second. At each second what came last is compared with all before, for every place
 where it may have begun: by damping, drag and stiffness as they were the fin turns the vehicle so much more or less. Damping goes
 with the speed, authority with its square. How little the drag is known at rates that were not flown before is in the error. A
-second is longer than residuals remember, so that its sum of scores is one independent draw of their noise.
+second is longer than residuals remember, so that its sum of scores is one independent draw of their noise. What takes damping and
+authority by one share, as more inertia or a smaller fin at the stern does, hardly shows: the turn it comes to stays the same.
 Source: Chow 1960, Econometrica 28(3); the scores' variance by clusters: Liang and Zeger 1986, Biometrika 73(1).
 """
 
@@ -120,10 +121,10 @@ class AuthorityJump:
     def _found(self) -> Jump | None:
         """Return the jump at the place that explains all rows best, if there is one.
 
-        Where that is the latest place looked at, it may have begun later yet: the next second tells.
+        Places with less than LEAST_S since are looked at as well: where one of them is the best, the next seconds tell.
         """
         seconds = list(self._seconds)
-        places = range(max(len(seconds) - MOST_S, 0), len(seconds) - LEAST_S + 1)
+        places = range(max(len(seconds) - MOST_S, 0), len(seconds))
         tried = [(found, place) for place in places if (found := self._at(seconds, place)) is not None]
         (_, jump), place = min(tried, key=lambda t: t[0][0], default=((0.0, None), 0))
         return jump if place < len(seconds) - LEAST_S else None

@@ -23,7 +23,7 @@ def second():
 
 def test_it_answers_one_task_after_the_other_and_hands_back_the_errors_a_user_can_meet(second):
     assert second.answer(wait=True) is None
-    for task, answer in (((number, 1.5), "1.5"), ((with_error, 2.0, 0.1), "2.00 +/- 0.10")):
+    for task, answer in (((number, 1.5), "1.500"), ((with_error, 2.0, 0.1), "2.00 +/- 0.10")):
         second.give(*task)
         assert second.is_busy
         assert second.answer(wait=True) == answer
