@@ -3,7 +3,8 @@
 The equation's rows are summed second by second. At each second what came last is compared with all before, for every place
 where it may have begun: by damping, drag and stiffness as they were the fin turns the vehicle so much more or less. Damping goes
 with the speed, authority with its square. How little the drag is known at rates that were not flown before is in the error. A
-second is longer than residuals remember, so that its sum of scores is one independent draw of their noise.
+second is longer than residuals remember, so that its sum of scores is one independent draw of their noise. What takes damping and
+authority by one share, as more inertia or a smaller fin at the stern does, hardly shows: the turn it comes to stays the same.
 Source: Chow 1960, Econometrica 28(3); the scores' variance by clusters: Liang and Zeger 1986, Biometrika 73(1).
 """
 

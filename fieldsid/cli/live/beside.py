@@ -85,6 +85,8 @@ class Beside:
         except DataError as error:
             self.gains = LiveGains(time=now.time, **_refused(error))
             return
+        if self.gains is not None and self.gains.verdict == "refused":
+            self.gains = None  # what was said of an estimate that had not settled holds no more
         self._designed = now
         self._designing.give(designed, now, progress, wanted(now))
 
