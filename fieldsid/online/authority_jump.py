@@ -1,4 +1,4 @@
-"""A jump of the fin's authority told as it happens: a payload swapped, a fin lost.
+"""A jump of the fin's authority told as it happens, the damping as it was: a linkage that slipped.
 
 The equation's rows are summed second by second. At each second what came last is compared with all before, for every place
 where it may have begun: by damping, drag and stiffness as they were the fin turns the vehicle so much more or less. Damping goes
@@ -41,7 +41,7 @@ _UPPER = np.triu_indices(WIDTH)
 
 @dataclass(frozen=True, slots=True)
 class Jump:
-    """A jump of the fin's authority, as by a payload swapped or a fin lost."""
+    """A jump of the fin's authority at the damping there was, as by a linkage that slipped."""
 
     time: Annotated[float, Key("When it was, about; the estimate is of what came since.", "since_s")]
     factor: Annotated[float, Key("The authority over what it was, at the same speed.")]
