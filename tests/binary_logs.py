@@ -24,20 +24,20 @@ def write_alog(path, time, signals, commands=((), ())):
     return path
 
 
-def write_ulog(path, time, signals, commands=((), ())):
-    """A PX4 file: one topic `trial` with a double for each signal, and one of the rudder where it is told by itself."""
+def write_ulog(path, time, signals, commands=((), ()), topic="trial", fields=""):
+    """A PX4 file: one topic with a double for each signal, or of `fields`, and one of the rudder where it is told by itself."""
 
     def message(kind, body):
         return struct.pack("<HB", len(body), ord(kind)) + body
 
-    fields = "".join(f"double {name};" for name in signals)
+    fields = fields or "".join(f"double {name};" for name in signals)
     out = bytearray(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 10))
     out += message("B", bytes(40))
-    out += message("F", f"trial:uint64_t timestamp;{fields}".encode())
+    out += message("F", f"{topic}:uint64_t timestamp;{fields}".encode())
     if len(commands[0]):
         out += message("F", b"command:uint64_t timestamp;double rudder_rad;")
         out += message("A", struct.pack("<BH", 0, 8) + b"command")
-    out += message("A", struct.pack("<BH", 0, 7) + b"trial")
+    out += message("A", struct.pack("<BH", 0, 7) + topic.encode())
     for t, value in zip(*commands, strict=True):
         out += message("D", struct.pack("<HQd", 8, round(t * 1e6) + 5_000_000, value))
     for i, t in enumerate(time):

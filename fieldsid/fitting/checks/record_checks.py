@@ -105,16 +105,18 @@ def _channels(record: Record) -> Sequence[tuple[str, FloatArray, npt.NDArray[np.
 def clipped_share(values: FloatArray, shortest: int) -> tuple[float, float]:
     """Return the level of the worse extreme and the share of samples (n,) that stay at it in stretches of `shortest`.
 
-    A stretch that is entered by less than three of the signal's smallest changes is a rounded peak, not a limit.
+    A stretch that is entered by less than three of the signal's smallest changes among numbers as large, which of three digits
+    have steps as large, is a rounded peak, not a limit.
     """
     worst = (0.0, 0.0)
     moves = np.abs(np.diff(values))
     if values.size < 2 * shortest or not moves.any():
         return worst
-    smallest = float(moves[moves > 0].min())
     for level in (float(values.max()), float(values.min())):
         edges = np.flatnonzero(np.diff(np.concatenate([[False], values == level, [False]]).astype(int)))
         starts, ends = edges[::2], edges[1::2]
+        among = moves[(moves > 0) & (np.abs(values[1:]) >= 0.5 * abs(level))]
+        smallest = float(among.min() if among.size else moves[moves > 0].min())
         long = (ends - starts >= shortest) & (starts > 0)
         entered = np.array([abs(values[s] - values[s - 1]) >= 3.0 * smallest for s in starts[long]], dtype=bool)
         share = float((ends - starts)[long][entered].sum()) / values.size

@@ -30,9 +30,7 @@ _FINS = (("rudder_rad", "rudder_measured_rad"), ("elevator_rad", "elevator_measu
 
 def pair_findings(run: Run, stated: Stated) -> list[Note]:
     """Return the findings on pairs of signals of a run."""
-    found: list[Note] = []
-    if all(run.has(s) for s in ("surge_m_s", "x_m", "y_m")):
-        found += _speed_and_way(run, stated)
+    found = _speed_and_way(run, stated)
     if all(run.has(s) for s in ("surge_m_s", "propeller_rpm")):
         found += _speed_and_turns(run)
     for command, fin in _FINS:
@@ -71,6 +69,8 @@ def unit_of_ratio(ratio: float, units: Mapping[str, float]) -> str | None:
 
 def _way_by_speed(run: Run) -> float | None:
     """Return how many times the speed the way made in a second is; None where there is too little of either."""
+    if not all(run.has(s) for s in ("surge_m_s", "x_m", "y_m")):
+        return None
     good = np.isfinite(run["x_m"]) & np.isfinite(run["y_m"]) & np.isfinite(run["surge_m_s"])
     if good.sum() < 50:
         return None

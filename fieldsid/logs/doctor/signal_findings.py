@@ -6,6 +6,7 @@ import numpy as np
 
 from fieldsid.logs.convert.servo_counts import FINS, servo_of
 from fieldsid.logs.doctor.dropouts import dropout_findings
+from fieldsid.logs.doctor.pair_findings import goes_with_way
 from fieldsid.logs.doctor.spikes import spikes_of
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import GOALS, SIGNALS, Note, Run
@@ -40,8 +41,12 @@ def signal_findings(run: Run, name: str, stated: Stated) -> list[Note]:
     present = values[seen]
     if present.size > 2 and float(np.ptp(present)) == 0.0 and name not in PROPULSION | GOALS:
         message = f"{name} is constant at {present[0]:.6g} over {present.size} samples; check the sensor, or map another one"
-        return [*found, *_size(name, present, stated), Note("constant", message, {"signal": name, "value": float(present[0])})]
-    found += _size(name, present, stated)
+        return [
+            *found,
+            *_size(run, name, present, stated),
+            Note("constant", message, {"signal": name, "value": float(present[0])}),
+        ]
+    found += _size(run, name, present, stated)
     if name in MEASURED and present.size > 20:
         found += [*_frozen(name, run.time[seen], present), *_coarse(name, present), *_spikes(name, run.time[seen], present)]
         found += dropout_findings(name, present)
@@ -58,13 +63,13 @@ def _missing(name: str, seen: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> lis
     return [Note("missing", message, {"signal": name, "value": share, "limit": MISSING_LIMIT})]
 
 
-def _size(name: str, values: FloatArray, stated: Stated) -> list[Note]:
+def _size(run: Run, name: str, values: FloatArray, stated: Stated) -> list[Note]:
     if name not in LARGEST:
         return []
     limit, unit = LARGEST[name]
     largest = float(np.percentile(np.abs(values), 99))
     found = []
-    if largest > limit:
+    if largest > limit and not (name == "surge_m_s" and goes_with_way(run)):
         servo = servo_of(values) if name in FINS and stated.is_si(name) else None
         advice, told = stated.probable(name, unit, largest, limit)
         if servo is not None:

@@ -13,9 +13,7 @@ from typing import Any
 from fieldsid.logs.channels import ANGLES, ATTITUDE, ChannelMap, is_enough
 from fieldsid.logs.doctor.angle_and_rate import CONTRADICTING
 from fieldsid.logs.mapping.draft import place_of
-from fieldsid.logs.mapping.name_words import words_of
 from fieldsid.logs.mapping.trial import Proposal
-from fieldsid.logs.mapping.vocabulary import OVER_GROUND
 from fieldsid.logs.run import READ_AS, Note
 
 SAID: Mapping[str, str] = MappingProxyType(
@@ -23,7 +21,8 @@ SAID: Mapping[str, str] = MappingProxyType(
      "course_against": "the course goes against it", "course_slope": "the course turns otherwise", "unit": "its unit is open",
      "course_offset": "the course is off it", "fin_range": "no fin goes so far", "fin_late": "the motion comes before it",
      "rate_scale": "angle and rate differ", "constant": "it never moves", "speed_unit": "its unit is open",
-     "depth_unit": "its unit is open", "dive_sign": "its sign is open", "speed_sign": "its sign is open"}
+     "depth_unit": "its unit is open", "dive_sign": "its sign is open", "speed_sign": "its sign is open",
+     "over_ground": "it may be a course over ground"}
     | dict.fromkeys(CONTRADICTING - {"unit"}, "angle and rate contradict each other")
 )  # fmt: skip
 """Codes of notes that put the signal they name in doubt, and how that is said."""
@@ -65,8 +64,6 @@ def _doubts(signals: Mapping[str, Any], notes: Iterable[Note]) -> dict[str, str]
             found |= {s: SAID[note.code] for s in named if s in signals or s in ANGLES}
     if ATTITUDE in signals and set(ANGLES) & found.keys():
         found[ATTITUDE] = found[next(s for s in ANGLES if s in found)]
-    if OVER_GROUND & set(words_of(place_of(signals.get("yaw_rad", {})))):
-        found["yaw_rad"] = "it may be a course over ground"
     return found
 
 

@@ -14,7 +14,7 @@ from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, servo_of
 from fieldsid.logs.doctor.signal_findings import LARGEST
 from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion_of
 from fieldsid.logs.mapping.name_words import words_of
-from fieldsid.logs.mapping.numbers.recognise import recognised, unit_of_heading
+from fieldsid.logs.mapping.numbers.recognise import PLACES, recognised, unit_of_heading
 from fieldsid.logs.mapping.numbers.true_north import true_north
 from fieldsid.logs.mapping.vocabulary import LATITUDE, LONGITUDE
 from fieldsid.logs.mapping.word_meaning import meaning_of
@@ -196,14 +196,20 @@ def _by_numbers(samples: Samples, signals: dict[str, Any], inventory: Inventory)
     used = {*known.values(), *samples.source.places, *(c for i in signals.values() for c in i.get("columns", ()))}
     named = inventory.table is None or inventory.table.header
     free = [c for c in columns if c not in used and not (named and isinstance(c, str) and meaning_of(c) is not None)]
+    if "unit" not in signals.get(POSITION, {"unit": ""}):
+        known |= dict(zip((LATITUDE, LONGITUDE), signals[POSITION]["columns"], strict=True))
     known = {s: c for s, c in known.items() if c in columns}
-    if {"yaw_rad", "x_m", "y_m"} <= known.keys():
-        unit = unit_of_heading(samples, known["yaw_rad"], (known["x_m"], known["y_m"]))
+    where = [known[s] for s in PLACES if s in known]
+    if "yaw_rad" in known and len(where) == 2:
+        unit = unit_of_heading(samples, known["yaw_rad"], (where[0], where[1]))
         signals["yaw_rad"] |= {} if unit is None or "unit" in signals["yaw_rad"] else {"unit": unit}
     notes = []
     for found in recognised(samples, known, free):
         place = found.column if named else int(found.column)
-        signals[found.signal] = {"column": place, **found.item}
+        if found.signal == LONGITUDE:
+            signals[POSITION] = {"columns": [signals.pop(LATITUDE)["column"], place]}
+        else:
+            signals[found.signal] = {"column": place, **found.item}
         data = {"signal": found.signal, "column": place}
         notes.append(Note("evidence", f"{found.signal} is column {found.column}: {found.why}", data))
     return notes

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from fieldsid.logs.mapping.draft import Draft, draft_of, label_of, with_units_by_span
+from fieldsid.logs.mapping.draft import Draft, draft_of, label_of, place_of, with_units_by_span
 from fieldsid.logs.mapping.fins.several import which_output, with_several_fins
+from fieldsid.logs.mapping.name_words import words_of
 from fieldsid.logs.mapping.numbers.row_rate import ASSUMED_HZ, rate_by_turning
-from fieldsid.logs.mapping.numbers.true_heading import better_heading
+from fieldsid.logs.mapping.numbers.true_heading import better_heading, lead_of
 from fieldsid.logs.mapping.trial import Log, Proposal, tried
+from fieldsid.logs.mapping.vocabulary import OVER_GROUND
 from fieldsid.logs.reader import Inventory, Reader, ReadOptions
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.several.sifting import attempt
@@ -33,13 +35,25 @@ def _tried(log: Log, draft: Draft) -> Proposal:
     for _ in range(TRIES if signals else 0):
         done = attempt(lambda draft: _with_fins(log, _with_own_heading(log, draft), draft), draft)
         if isinstance(done, Proposal):
-            return done.saying(*left_out)
+            return done.saying(*left_out, *_over_ground(done))
         if done.signal not in signals or len(signals) < 2:
             with_units_by_span(draft, log.inventory)
             return Proposal(draft.body, problem=done).saying(*draft.notes, *left_out)
         message = f"{done.signal} is not proposed from {label_of(signals.pop(done.signal))}: {done.what}"
         left_out.append(Note("left_out", message, {"signal": done.signal}))
     return Proposal(draft.body).saying(*draft.notes, *left_out)
+
+
+def _over_ground(done: Proposal) -> tuple[Note, ...]:
+    """Return the note that the heading is, by its name, what a receiver gives, where it is not ahead of the course made."""
+    place, lead = place_of(done.body["signals"].get("yaw_rad", {})), None if done.run is None else lead_of(done.run)
+    if not OVER_GROUND & set(words_of(place)) or (lead is not None and lead.is_clear):
+        return ()
+    message = (
+        f"yaw_rad is {place}, by its name of a receiver: where that is the course over ground, what is fitted is the course, "
+        "which lies behind the heading in a turn; map a compass where the log has one"
+    )
+    return (Note("over_ground", message, {"signal": "yaw_rad"}),)
 
 
 def _with_own_heading(log: Log, draft: Draft) -> Proposal:

@@ -28,7 +28,7 @@ COMMANDED = word_set(
 MEASURED = word_set("measured meas feedback fb actual state states encoder position")
 OF_ANOTHER = word_set(
     "error err cov covariance std sigma variance var bias limit lim max min quality valid flag gain gains temp temperature sound "
-    "wind air variation status mode enabled count id"
+    "wind ws air variation status mode enabled count id"
 )
 """Words that make a name one of something else than the signal it also names."""
 OVER_GROUND = word_set("gps gnss course cog sog vtg ground track")
@@ -37,7 +37,7 @@ that hears nothing under water, beside a position that was estimated."""
 OF_SPEED = word_set("v vel velocity speed acceleration accel acc")
 """Words of a speed or acceleration north or east, which is no place."""
 OTHERS = word_set(
-    "angle signal raw filtered estimate estimated sensor compass stick servo true magnetic joint vehicle boat glider"
+    "angle signal raw filtered est estimate estimated sensor compass stick servo true magnetic joint vehicle boat glider"
 )
 """Words that say nothing of the signal, and stand glued to those that do, as in `rudderangle`."""
 
@@ -74,7 +74,7 @@ _TILT = within(STEEPEST_DEG)
 _TURN = word_set("rate fin")
 
 RULES = (
-    Rule(TIME, "time, timestamp, stamp, utc, seconds, datetime, epoch, zeit, uhrzeit, datenum, elapsed"),
+    Rule(TIME, "time, timestamp, stamp, ts, utc, seconds, datetime, epoch, zeit, uhrzeit, datenum, elapsed"),
     Rule(
         "yaw_rate_rad_s",
         "yaw rate, yaw rt, heading rate, head rate, hdg rate, turn rate, rate turn, rot, gyro z, gyr z, gyroscope z, gz, "

@@ -179,7 +179,7 @@ def _check_source(path: Path, signal: str, source: Source) -> None:
 
 NO_CLOCK = "where no column is a time write how many rows there are a second at the top of the mapping, as `time: {rate: 10}`"
 COUNTERS = frozenset(
-    {"sample", "samples", "index", "idx", "row", "frame", "no", "nr", "number", "count", "counter", "seq", "step"}
+    {"sample", "samples", "index", "idx", "row", "frame", "no", "nr", "number", "count", "counter", "seq", "step", "entry"}
 )
 """Words of a column that counts the rows of a table."""
 

@@ -50,7 +50,9 @@ def form_of(text: str, asked: TableForm, path: Path) -> Form:
         form, score = _try(lines, first, separator, asked)
         if form is not None and score > best_score:
             best, best_score = form, score
-    if best is None and (known := known_text(path, lines)) is not None:
+    # sentences of several kinds have no columns in common
+    is_mixed = best is not None and best.is_sentences and len({line.partition(",")[0] for line in lines if line.strip()}) > 1
+    if (best is None or is_mixed) and (known := known_text(path, lines)) is not None:
         raise known
     if best is None:
         shown = next((line for line in lines if line.strip()), "")[:80]

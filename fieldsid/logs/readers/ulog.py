@@ -25,6 +25,9 @@ MEANS: Means = {
     "vehicle_local_position.x": ("x_m", {}),
     "vehicle_local_position.y": ("y_m", {}),
     "vehicle_local_position.z": ("depth_m", {}),
+    "actuator_controls_0.control[1]": ("elevator_rad", {"unit": "1"}),
+    "actuator_controls_0.control[2]": ("rudder_rad", {"unit": "1"}),
+    "actuator_controls_0.control[3]": ("thrust", {}),
 }
 """What the definitions of PX4's own topics say."""
 

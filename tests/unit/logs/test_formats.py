@@ -291,3 +291,15 @@ def test_the_list_of_a_gliders_sensors_is_found_where_gliders_people_keep_it(tmp
     (folder / name).write_bytes(raw[first:last])
     log.write_bytes(raw[:first].replace(b"factored:    0", b"factored:    1") + raw[last:])
     np.testing.assert_allclose(inspect_log(log).run["yaw_rad"], YAW, atol=1e-12)
+
+
+def test_the_controls_of_px4_are_what_their_index_says_in_shares_of_their_range(tmp_path):
+    pytest.importorskip("pyulog")
+    controls = {f"{k}": 0.1 * k * np.sign(np.sin(0.5 * k * TIME + 0.1)) for k in range(4)}
+    log = write_ulog(tmp_path / "log.ulg", TIME, controls, topic="actuator_controls_0", fields="double[4] control;")
+    signals = inspect_log(log).proposal.body["signals"]
+    assert {s: (item["field"], item.get("unit")) for s, item in signals.items()} == {
+        "elevator_rad": ("control[1]", "1"),
+        "rudder_rad": ("control[2]", "1"),
+        "thrust": ("control[3]", None),
+    }

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.number_cells import as_numbers
-from fieldsid.logs.convert.times.dates import days_of, texts
+from fieldsid.logs.convert.times.dates import DATE, days_of, texts
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
@@ -95,13 +95,23 @@ def going_on(seconds: FloatArray, period_s: float) -> tuple[FloatArray, int]:
 
 def stamps_of_text(cells: npt.NDArray[Any]) -> FloatArray | None:
     """Return the seconds (n,) since 1970 of cells with a date and a clock in one; None where less than half are."""
+    halves = _halves(cells)
+    days = days_of(halves[0]) if halves is not None else None
+    clock = _of_a_day(halves[1]) if halves is not None and days is not None else None
+    return DAY_S * days + clock.seconds if days is not None and clock is not None else _in_words(cells)
+
+
+def clock_behind_dates(cells: npt.NDArray[Any]) -> Clock | None:
+    """Return the clock (n,) behind dates that no calendar has, as 31 November: of a logger that was never told the day."""
+    halves = _halves(cells)
+    is_dated = halves is not None and texts(halves[0]).str.fullmatch(DATE.pattern).mean() > MOSTLY
+    return _of_a_day(halves[1]) if halves is not None and is_dated else None
+
+
+def _halves(cells: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], npt.NDArray[Any]] | None:
+    """Return what stands before the first blank between digits of cells, and what behind it (n,); None where there is none."""
     parts = texts(cells).str.split(r"(?<=\d)[ T_]+(?=\d)", n=1, regex=True, expand=True)
-    if parts.shape[1] == 2:
-        days, clocks = days_of(parts[0].to_numpy(dtype=object)), parts[1].to_numpy(dtype=object)
-        clock = _of_a_day(clocks) if days is not None else None
-        if days is not None and clock is not None:
-            return DAY_S * days + clock.seconds
-    return _in_words(cells)
+    return None if parts.shape[1] != 2 else (parts[0].to_numpy(dtype=object), parts[1].to_numpy(dtype=object))
 
 
 def _of_a_day(cells: npt.NDArray[Any]) -> Clock | None:

@@ -18,6 +18,7 @@ from fieldsid.logs.convert.times.clock_text import (
     STAMP,
     WEEK_S,
     Clock,
+    clock_behind_dates,
     clock_of_digits,
     clock_of_stamps,
     clock_of_text,
@@ -212,8 +213,9 @@ def _of_text(cells: npt.NDArray[Any], unit: str | None, name: str, options: Read
         other = stamps_of_text(cells)
         if other is not None:
             return _from_start(other, cells, name, options)
-        if clock_of_text(cells) is not None:
-            return _of_clock(cells, None, name, options, ())
+        clock = clock_of_text(cells) or clock_behind_dates(cells)
+        if clock is not None:
+            return _going_on(clock, cells, name, options, ())
     missing = np.flatnonzero(np.isnat(stamps))
     if missing.size == cells.size and wrong.size < cells.size:
         raise _refused(f"column `{name}` holds cells that are no times", wrong, cells, options)

@@ -16,9 +16,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fieldsid.logs.convert.geodetic import north_and_east
 from fieldsid.logs.convert.servo_counts import COUNTS, servo_of
 from fieldsid.logs.convert.units import KNOT
 from fieldsid.logs.mapping.fins.shares import beyond
+from fieldsid.logs.mapping.vocabulary import LATITUDE, LONGITUDE
 from fieldsid.logs.reader import Samples
 from fieldsid.numerics.arrays import FloatArray
 
@@ -39,11 +41,16 @@ EXPLAINS = 0.3
 CLEARLY = 2.0
 """How many times as much as any other column a fin must explain that the others do not: 4.8 to 18 on five ships' zigzags."""
 UNITS = {"deg": math.pi / 180.0, "rad": 1.0}
+GLOBE = (90.0, 180.0)
+"""Largest latitude and longitude in degrees."""
+AT_REST = 1e-3
+"""A way of less than this in a second is no vehicle's in m, and every vehicle's in degrees of latitude and longitude."""
 WITHIN = 0.1
 """Share of the speed by which the way made along the heading may differ from it."""
 SPEEDS = {"m/s": 1.0, "kn": KNOT}
 MOST_COLUMNS, FEWEST = 40, 50
 RATES = {"yaw_rad": "yaw_rate_rad_s", "pitch_rad": "pitch_rate_rad_s", "roll_rad": "roll_rate_rad_s"}
+PLACES = ("x_m", "y_m", LATITUDE, LONGITUDE)
 Column = str | int
 ComplexArray = npt.NDArray[np.complex128]
 
@@ -78,6 +85,21 @@ class _Scene:
     def changes(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return the change of a column (n,) over the window."""
         return np.asarray(values[self.width :] - values[: -self.width])
+
+    def is_geographic(self, x: Column, y: Column) -> bool:
+        """Whether two columns are a latitude and a longitude in degrees: on the globe, and as slow as no way in m is."""
+        columns = (self.samples.columns[x], self.samples.columns[y])
+        if any(float(np.nanmax(np.abs(c))) > limit for c, limit in zip(columns, GLOBE, strict=True)):
+            return False
+        way, passed = np.hypot(*(self.changes(c) for c in columns)), self.passed
+        good = np.isfinite(way) & (passed > 0.0)
+        return bool(good.any()) and 0.0 < float(np.median(way[good] / passed[good])) < AT_REST
+
+    def way(self, x: Column, y: Column) -> ComplexArray:
+        """Return the way in m (n,) over the window by two columns, x real: metres, or degrees of latitude and longitude."""
+        places = self.samples.columns[x], self.samples.columns[y]
+        x_m, y_m = north_and_east(np.stack(places, axis=1)) if self.is_geographic(x, y) else places
+        return np.asarray(self.changes(x_m + 1j * y_m))
 
     def middle(self, values: FloatArray) -> FloatArray:
         """Return a column (n,) in the middle of each window."""
@@ -131,7 +153,7 @@ def _scenes(samples: Samples, known: Mapping[str, Column], free: list[Column]) -
 
 
 def _worth(found: tuple[Recognised, ...]) -> tuple[int, float]:
-    return len(found), round(max((r.trust for r in found if r.signal not in ("x_m", "y_m")), default=0.0), ndigits=3)
+    return len(found), round(max((r.trust for r in found if r.signal not in PLACES), default=0.0), ndigits=3)
 
 
 def _moves(values: FloatArray) -> bool:
@@ -193,11 +215,12 @@ def _with_rates(scene: _Scene) -> dict[Column, tuple[float, str]]:
 def _pointing(scene: _Scene, heading: Column, place: tuple[Column, Column]) -> Iterator[list[Recognised]]:
     """Yield what a heading, x and y are, where the way that two columns make is made along the one taken as a heading."""
     x, y = place
-    way = scene.changes(scene.samples.columns[x] + 1j * scene.samples.columns[y])
+    way = scene.way(x, y)
     seen = np.isfinite(way)
     made = float(np.abs(way[seen]).sum())
     if not made > 0.0 or not float(np.median(np.abs(way[seen]))) > 0.0:
         return
+    signals = (LATITUDE, LONGITUDE) if scene.is_geographic(x, y) else ("x_m", "y_m")
     course, values = np.unwrap(np.angle(way[seen])), scene.middle(np.nan_to_num(scene.samples.columns[heading]))[seen]
     for unit, factor in UNITS.items():
         along = float((way[seen] * np.exp(-1j * factor * values)).real.sum()) / made
@@ -206,7 +229,7 @@ def _pointing(scene: _Scene, heading: Column, place: tuple[Column, Column]) -> I
             why = f"{100 * along:.1f} % of the way that columns {x} and {y} make is made along it, correlation {trust:.3f}"
             same = f"the way made in it is along the heading in column {heading}"
             yield [Recognised("yaw_rad", heading, {"unit": unit}, why, trust),
-                   *(Recognised(s, c, {}, same) for s, c in zip(("x_m", "y_m"), place, strict=True))]  # fmt: skip
+                   *(Recognised(s, c, {}, same) for s, c in zip(signals, place, strict=True))]  # fmt: skip
 
 
 def _rates(scene: _Scene) -> Iterator[Recognised]:
@@ -227,10 +250,10 @@ def _rates(scene: _Scene) -> Iterator[Recognised]:
 
 def _speeds(scene: _Scene) -> Iterator[Recognised]:
     """Yield surge and sway: the columns that are the way made in a second along the heading and across it."""
-    if "surge_m_s" in scene.known or not {"x_m", "y_m", "yaw_rad"} <= scene.known.keys():
+    place = [scene.known[s] for s in PLACES if s in scene.known]
+    if "surge_m_s" in scene.known or len(place) != 2 or "yaw_rad" not in scene.known:
         return
-    x, y = (scene.changes(scene.samples.columns[scene.known[s]]) for s in ("x_m", "y_m"))
-    made = (x + 1j * y) * np.exp(-1j * scene.middle(scene.angle("yaw_rad"))) / scene.passed
+    made = scene.way(*place) * np.exp(-1j * scene.middle(scene.angle("yaw_rad"))) / scene.passed
     middle = {c: scene.middle(scene.samples.columns[c]) for c in scene.free}
     along = float(np.nanmedian(np.abs(made)))
     ahead = [(float(np.nanmedian(np.abs(f * v - made.real))) / along, c, u) for c, v in middle.items() for u, f in SPEEDS.items()]

@@ -23,7 +23,7 @@ NEEDS_NONE = frozenset({"thrust", "thrust_ratio", "propeller_rpm"})
 def assumed_units(run: Run, known: Collection[str], signals: Mapping[str, Any]) -> list[Note]:
     """Return the note on the signals of a run that are taken in SI though nothing says so; `known` have a unit that is told."""
     sure = {s for s in run.signals if s in known}
-    if _all_there(run, "x_m", "y_m", "surge_m_s") and goes_with_way(run):
+    if goes_with_way(run):
         sure |= {"x_m", "y_m", "surge_m_s"}
     if _all_there(run, "x_m", "y_m", "yaw_rad") and goes_along_course(run):
         sure.add("yaw_rad")

@@ -141,6 +141,8 @@ def test_a_clipped_rate_sensor_is_named():
 def test_the_rounded_peak_of_a_coarse_sensor_is_not_clipping():
     wave = np.round(0.2 * np.sin(np.arange(660) * 0.02) / 0.01) * 0.01
     assert clipped_share(wave, 5)[1] == 0.0
+    of_three_digits = np.array([float(f"{v:.2e}") for v in 35.1 * np.sin(np.arange(2000) * 0.002)])
+    assert clipped_share(of_three_digits, 5)[1] == 0.0
 
 
 @pytest.mark.parametrize(

@@ -198,3 +198,19 @@ def test_a_table_with_a_fin_or_alone_says_nothing_of_others(tmp_path):
     assert "tables_beside" not in {n.code for n in inspect_log(whole).notes}
     alone = motion(tmp_path / "alone" / "state.csv")
     assert "tables_beside" not in {n.code for n in inspect_log(alone).notes}
+
+
+@pytest.mark.parametrize(("unit", "in_deg"), [("rad", np.pi / 180.0), ("deg", 1.0)])
+def test_latitude_and_longitude_of_joined_tables_are_metres_in_either_unit(tmp_path, unit, in_deg):
+    way = 1.2 * TIME
+    latitude, longitude = 41.18 + np.degrees(way * np.cos(0.3) / 6.36e6), -8.7 + np.degrees(way * np.sin(0.3) / 4.81e6)
+    place = listed(TIME, in_deg * latitude, in_deg * longitude, YAW)
+    table(tmp_path / "EstimatedState.csv", ["time_s", f"lat ({unit})", f"lon ({unit})", "psi (rad)"], *place)
+    command(tmp_path / "SetServoPosition.csv")
+    found = inspect_log(tmp_path)
+    position = found.proposal.body["signals"]["position"]
+    assert position.get("unit", "deg") == unit
+    run = load_run(tmp_path, mapping_of(found.proposal.body))
+    assert_allclose(np.hypot(run["x_m"], run["y_m"])[-1], way[-1], rtol=0.01)
+    assert_allclose(np.arctan2(run["y_m"], run["x_m"])[-1], 0.3, atol=0.01)
+    assert_allclose(run["yaw_rad"], YAW[: len(run)], atol=1e-9)
