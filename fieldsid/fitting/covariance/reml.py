@@ -92,6 +92,7 @@ class RestrictedLikelihood:
         return -0.5 * (logs + float(left + np.linalg.slogdet(normal)[1]) + 2.0 * self.log_size)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of a motion without bound, whose noise `estimate_noise` refuses
 def restricted_likelihood(lines: list[LinearisedRun], count: int) -> RestrictedLikelihood:
     """Return the restricted likelihood of linearised runs with so many parameters; one that nothing tells of is left out.
 
@@ -140,10 +141,11 @@ def _orthonormal(columns: FloatArray, sizes: FloatArray) -> tuple[FloatArray, fl
 
     A column of which the others leave less than MIN_INFORMATION_SHARE of its size is left out.
     """
-    left = np.abs(np.diag(np.linalg.qr(columns, mode="r")))
-    left = np.concatenate([left, np.zeros(columns.shape[1] - left.size)])
+    upper = np.asarray(np.linalg.qr(columns, mode="r"))
+    left = np.concatenate([np.abs(np.diag(upper)), np.zeros(columns.shape[1] - upper.shape[0])])
     kept = np.flatnonzero(left > MIN_INFORMATION_SHARE * sizes)
-    upper = np.linalg.qr(columns[:, kept], mode="r")
+    if kept.size < columns.shape[1]:
+        upper = np.asarray(np.linalg.qr(columns[:, kept], mode="r"))
     inverse = np.zeros((columns.shape[1], kept.size))
     inverse[kept] = solve_triangular(upper, np.eye(kept.size))
     return inverse, float(np.log(np.abs(np.diag(upper))).sum())
@@ -156,8 +158,10 @@ def gls_step(lines: list[LinearisedRun], count: int, noise: FloatArray) -> tuple
     return inverse @ square[1:, 0], inverse
 
 
-def reml_noise(problem: Problem, lines: list[LinearisedRun], noise_kind: str, start: Noise) -> tuple[Noise, float]:
-    """Return the noise of a family of highest restricted likelihood, and that log likelihood."""
+def reml_noise(
+    problem: Problem, lines: list[LinearisedRun], likelihood: RestrictedLikelihood, noise_kind: str, start: Noise
+) -> tuple[Noise, float]:
+    """Return the noise of a family of highest restricted likelihood, that of the lines, and that log likelihood."""
     dynamics, residuals = [(line.damping, line.stiffness) for line in lines], [line.residual for line in lines]
     return estimate_noise(
         [line.record for line in lines],
@@ -165,7 +169,7 @@ def reml_noise(problem: Problem, lines: list[LinearisedRun], noise_kind: str, st
         residuals,
         noise_kind,
         start,
-        restricted_likelihood(lines, len(problem.layout.parameters)),
+        likelihood,
         evaluations=problem.evaluations,
     )
 
@@ -177,6 +181,7 @@ def select_noise(problem: Problem, x: FloatArray, start: Noise) -> tuple[str, No
     """
     problem = problem.first(MAX_NOISE_SAMPLES // len(problem.records))
     lines = linearise_runs(problem, x)
+    likelihood = restricted_likelihood(lines, len(problem.layout.parameters))
     found: dict[str, tuple[Noise, float]] = {}
 
     def penalised_likelihood(noise_kind: str) -> float:
@@ -185,7 +190,7 @@ def select_noise(problem: Problem, x: FloatArray, start: Noise) -> tuple[str, No
     for noise_kind in NOISE_KINDS:
         if noise_kind == JOINT_NOISE and innovations_are_white(lines, max(found, key=penalised_likelihood), found):
             continue
-        found[noise_kind] = reml_noise(problem, lines, noise_kind, start)
+        found[noise_kind] = reml_noise(problem, lines, likelihood, noise_kind, start)
     best = max(found, key=penalised_likelihood)
     return best, *found[best]
 

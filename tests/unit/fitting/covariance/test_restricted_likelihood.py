@@ -86,3 +86,12 @@ def test_it_has_slopes():
             there[place] *= np.exp(step)
             line.append(likelihood(there))
         assert np.abs(np.diff(line, 3)).max() < 2e-5
+
+
+@pytest.mark.parametrize("beyond", [np.inf, np.nan, 1e300])
+@pytest.mark.parametrize("row", [0, 1, 3])
+def test_it_is_made_of_a_motion_without_bound_as_well(row, beyond):
+    """What has no bound is refused by the search for the noise, in words."""
+    lines = lines_of([[0, 1, 2, 3], [0, 1, 4, 5, 6]])
+    lines[0].stack[row, 1, 200:] = beyond
+    assert restricted_likelihood(lines, COUNT).count <= COUNT
