@@ -9,15 +9,15 @@ TRUTH = {"yaw": {"a22": 1.2, "b2": -0.8, "C0": 0.02}, "pitch": {"c22": 1.1, "c23
 STEP_S = 0.05
 
 
-def flown(axis="yaw", count=1200, seed=1, colour=0.0, noise=(0.004, 0.006), factor=1.0, faster=1.0):
+def flown(axis="yaw", count=1200, seed=1, colour=0.0, noise=(0.004, 0.006), factor=1.0, damped=1.0, faster=1.0):
     """Time, fin, angle and rate (n,) under a fin that jumps at random; noise of AR(1) colour on both sensors.
 
-    The authority is `factor` times the truth's, the vehicle `faster` than at the speed of the truth.
+    The authority is `factor` times the truth's, the damping `damped` times, the vehicle `faster` than at the truth's speed.
     """
     rng = np.random.default_rng(seed)
     values = list(TRUTH[axis].values())
     damping, stiffness, authority, trim = values if axis == "pitch" else (values[0], 0.0, *values[1:])
-    damping, authority = damping * faster, authority * factor * faster**2
+    damping, authority = damping * damped * faster, authority * factor * faster**2
     fin = np.concatenate([np.full(rng.integers(20, 60), rng.choice([-0.2, 0.0, 0.2])) for _ in range(count // 20)])[:count]
     system = np.zeros((3, 3))
     system[0, 1], system[1] = 1.0, [-stiffness, -damping, 1.0]

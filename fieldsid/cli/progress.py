@@ -13,7 +13,7 @@ import typer
 from rich.live import Live
 
 from fieldsid.artifacts import check_output
-from fieldsid.cli.console import messages, shows_progress
+from fieldsid.cli.console import messages, say, shows_progress
 from fieldsid.cli.session import session_of
 from fieldsid.errors import UsageError
 
@@ -72,7 +72,7 @@ def trying(says: str) -> Iterator[Callable[[str], None]]:
     """Yield a function that shows what is being tried, on stderr: on a terminal as it goes, elsewhere in a line now and then."""
     console = messages()
     if not shows_progress(console):
-        yield _now_and_then(says, lambda line: console.print(line, markup=False))
+        yield _now_and_then(says, say)
         return
     # drawn by hand: a thread that redraws would keep the search from using a second core
     with Live(console=console, auto_refresh=False, transient=True) as line:

@@ -1,10 +1,10 @@
-"""A jump of the fin's authority told as it happens, the damping as it was: a linkage that slipped.
+"""A jump of the fin's authority told as it happens, with the damping or without: a linkage that slipped, a fin that was lost.
 
 The equation's rows are summed second by second. At each second what came last is compared with all before, for every place
-where it may have begun: by damping, drag and stiffness as they were the fin turns the vehicle so much more or less. Damping goes
-with the speed, authority with its square. How little the drag is known at rates that were not flown before is in the error. A
-second is longer than residuals remember, so that its sum of scores is one independent draw of their noise. What takes damping and
-authority by one share, as more inertia or a smaller fin at the stern does, hardly shows: the turn it comes to stays the same.
+where it may have begun: authority, damping and trim are free after it, as a payload's inertia or a smaller fin at the stern takes
+authority and damping by one share; drag and stiffness stay. Damping goes with the speed, authority with its square. How little
+the drag is known at rates that were not flown before is in the error. A second is longer than residuals remember, so that its sum
+of scores is one independent draw of their noise.
 Source: Chow 1960, Econometrica 28(3); the scores' variance by clusters: Liang and Zeger 1986, Biometrika 73(1).
 """
 
@@ -13,35 +13,36 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import floor, isfinite, nan, sqrt
+from math import floor, isfinite, log, nan
 from typing import Annotated, Any
 
 import numpy as np
 
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.arrays import BoolArray, FloatArray, IntArray
 from fieldsid.records.keys import Key
 
 KEPT_S, LEAST_S, MOST_S = 60, 6, 20
 """Seconds that are kept apart, and the least and the most of them that may have come after a jump."""
-OTHER_MOTION = 0.15
-"""Share by which one authority answers for another motion otherwise: sway and lag that no such model has."""
+OTHER_MOTION, OTHER_POWER = 0.15, 1.0
+"""Share by which one authority answers for another motion otherwise, sway and lag that no such model has; and the power of the
+speed by which it may differ from u^2: sway and heave make it another."""
 SURE = 4.5
 """Standard errors beyond that: at 15 places a second, an hour of noise alone makes fewer than one in ten thousand."""
 KNOWN_SHARE = 0.1
-"""Standard error, as a share, at which the authority before is known well enough to be compared with."""
+"""Standard error, as a share of the larger, at which the authorities before and since are known well enough to be compared."""
 LEAST_DRAWS = 20
 """Seconds that the noise of the scores is told from."""
 LEAST_EXCITED, LEAST_MOVED = 1e-6, 0.05
 """Least eigenvalue, scaled to ones, of all columns before and of fin and trim since: a fin that is held tells neither."""
-WIDTH = 6
-FREE = np.array([3, 4])
-"""Columns: rate, rate with its size, angle, fin, one, target; fin and one are free after a jump."""
+WIDTH, FIN, ONE = 6, 3, 4
+FREE = (0, FIN, ONE)
+"""Columns: rate, rate with its size, angle, fin, one, target; rate, fin and one are free after a jump."""
 _UPPER = np.triu_indices(WIDTH)
 
 
 @dataclass(frozen=True, slots=True)
 class Jump:
-    """A jump of the fin's authority at the damping there was, as by a linkage that slipped."""
+    """A jump of the fin's authority, the damping free to change with it."""
 
     time: Annotated[float, Key("When it was, about; the estimate is of what came since.", "since_s")]
     factor: Annotated[float, Key("The authority over what it was, at the same speed.")]
@@ -60,10 +61,11 @@ class _Sums:
 class AuthorityJump:
     """Sums of rows, those of the last minute second by second; `stiff` says whether the second column has a parameter."""
 
-    __slots__ = ("_before", "_keep", "_noise", "_rows", "_seconds", "_speed", "_usual")
+    __slots__ = ("_before", "_free", "_keep", "_noise", "_rows", "_seconds", "_speed", "_usual")
 
     def __init__(self, *, stiff: bool) -> None:
-        self._keep = np.array([0, 1, 2, 3, 4] if stiff else [0, 1, 3, 4])
+        self._keep = np.array([0, 1, 2, FIN, ONE] if stiff else [0, 1, FIN, ONE])
+        self._free = np.flatnonzero(np.isin(self._keep, FREE))
         self._before = _Sums(nan, np.zeros((WIDTH, WIDTH)))
         self._seconds: deque[_Sums] = deque()
         self._rows: list[tuple[float, ...]] = []
@@ -123,66 +125,76 @@ class AuthorityJump:
 
         A second that does not fit lets earlier places explain it too: the latest ones must be among those compared.
         """
-        seconds = list(self._seconds)
-        places = range(max(len(seconds) - MOST_S, 0), len(seconds))
-        tried = [(found, place) for place in places if (found := self._at(seconds, place)) is not None]
-        (_, jump), place = min(tried, key=lambda t: t[0][0], default=((0.0, None), 0))
-        return jump if place <= len(seconds) - LEAST_S else None
+        sums, keep, free, count = np.array([s.products for s in self._seconds]), self._keep, self._free, len(self._seconds)
+        if not count:
+            return None
+        places = np.arange(max(count - MOST_S, 0), count)
+        until, so_many = np.cumsum(sums, axis=0), np.cumsum([s.count for s in self._seconds])
+        earlier = until[places] - sums[places]
+        before, after = self._before.products + earlier, until[-1] - earlier
+        since = so_many[-1] - np.append(0.0, so_many)[places]
+        inverse, tells = _inverses(before[:, keep][:, :, keep], LEAST_EXCITED)
+        theta = (inverse @ before[:, keep, -1:])[..., 0]
+        noise = self._noises(sums, theta, places)
+        products = after[:, keep][:, :, keep]
+        solved, _ = _inverses(products[:, free][:, :, free], 0.0)
+        # the new numbers follow from the target, and from drag and stiffness as they were
+        slopes = -solved @ products[:, free]
+        slopes[:, :, free] = 0.0
+        new = theta.copy()
+        new[:, free] = (solved @ after[:, keep[free], -1:] + slopes @ theta[..., None])[..., 0]
+        left = np.maximum(before[:, -1, -1] - (theta * before[:, keep, -1]).sum(axis=1), 0.0)
+        left_now = after[:, -1, -1] - 2.0 * (new * after[:, keep, -1]).sum(axis=1) + _squares(new, products)
+        left_now = np.maximum(left_now, 0.0)
+        fin, own = int(np.flatnonzero(keep == FIN)[0]), FREE.index(FIN)
+        was, is_now = theta[:, fin], new[:, fin]
+        counted = self._before.count + so_many[-1] - since
+        noisier = np.maximum(left_now * counted / np.maximum(left * since, 1e-30), 1.0)
+        moved = slopes[:, own].copy()
+        moved[:, fin] -= 1.0
+        error = np.sqrt(noise * np.maximum(_squares(moved, inverse) + noisier * solved[:, own, own], 0.0))
+        _, is_moved = _inverses(after[:, (FIN, ONE)][:, :, (FIN, ONE)], LEAST_MOVED)
+        known_to = np.sqrt(noise * np.maximum(inverse[:, fin, fin], 0.0))
+        is_known = np.maximum(known_to, error) <= KNOWN_SHARE * np.maximum(abs(was), abs(is_now))
+        misfit = OTHER_MOTION + OTHER_POWER * abs(log(self._speed / self._usual) if isfinite(self._speed) else 0.0)
+        jumps = is_moved & is_known & (abs(is_now - was) > misfit * abs(was) + SURE * error)
+        best = int(np.argmin(np.where(tells & np.isfinite(noise), left + left_now, np.inf)))
+        if not jumps[best] or places[best] > count - LEAST_S:
+            return None
+        return Jump(self._seconds[places[best]].begin, float(is_now[best] / was[best]), float(error[best] / abs(was[best])))
 
-    def _at(self, seconds: Sequence[_Sums], place: int) -> tuple[float, Jump | None] | None:
-        """Return the squared errors left with a jump before the second at a place, and that jump where it is one.
+    def _noises(self, sums: FloatArray, theta: FloatArray, places: IntArray) -> FloatArray:
+        """Return the variance of the scores before each place over that of the columns (P,); before few, that of the last look.
 
-        None where what came before does not tell; no jump where what came since does not.
-
-        What has come last is fitted with the damping, drag and stiffness from before: its authority and trim alone are free.
+        It is the noise of a row, with what its neighbours share.
         """
-        earlier, recent = seconds[:place], seconds[place:]
-        before = self._before.products + sum(s.products for s in earlier)
-        after = np.asarray(sum(s.products for s in recent))
-        counts = self._before.count + sum(s.count for s in earlier), sum(s.count for s in recent)
-        keep, size = self._keep, self._keep.size - FREE.size
-        inverse = _inverse(before[np.ix_(keep, keep)], LEAST_EXCITED)
-        if inverse is None:
-            return None
-        theta = inverse @ before[keep, -1]
-        if len(earlier) >= LEAST_DRAWS:
-            self._noise = self._noise_of(earlier, theta)
-        if not isfinite(self._noise):
-            return None
-        told = _inverse(after[np.ix_(FREE, FREE)], LEAST_MOVED)
-        solved = np.linalg.pinv(after[np.ix_(FREE, FREE)], hermitian=True) if told is None else told
-        whole = np.concatenate([keep[:size], [WIDTH - 1]])
-        given = np.append(-theta[:size], 1.0)
-        reached = solved @ after[np.ix_(FREE, whole)]
-        new = reached @ given
-        left = max(float(before[-1, -1] - theta @ before[keep, -1]), 0.0)
-        left_now = max(float(given @ after[np.ix_(whole, whole)] @ given - new @ after[np.ix_(FREE, whole)] @ given), 0.0)
-        was, is_now = float(theta[size]), float(new[0])
-        noisier = max(left_now * counts[0] / (left * counts[1]), 1.0) if left > 0.0 else 1.0
-        moved = np.append(-reached[0, :size], [-1.0, 0.0])
-        error = sqrt(self._noise * float(moved @ inverse @ moved + noisier * solved[0, 0]))
-        known_to = sqrt(self._noise * float(inverse[size, size]))
-        if told is None or known_to > KNOWN_SHARE * abs(was) or abs(is_now - was) <= OTHER_MOTION * abs(was) + SURE * error:
-            return left + left_now, None
-        return left + left_now, Jump(recent[0].begin, is_now / was, error / abs(was))
-
-    def _noise_of(self, seconds: Sequence[_Sums], theta: FloatArray) -> float:
-        """Return the variance of the scores over that of the columns: the noise of a row, with what its neighbours share."""
-        keep, count = self._keep, len(seconds)
-        products = np.array([s.products for s in seconds])[:, keep]
-        scores = products[:, :, -1] - products[:, :, keep] @ theta
-        normal = np.linalg.pinv(products[:, :, keep].sum(axis=0), hermitian=True)
-        spread = float(np.einsum("ji,ik,jk->", scores, normal, scores)) / keep.size
-        return spread * count / (count - keep.size)
+        keep = self._keep
+        is_before = np.arange(len(sums)) < places[:, None]
+        draws = is_before.sum(axis=1)
+        columns = sums[:, keep][:, :, keep]
+        scores = (sums[:, keep, -1] - np.einsum("sij,pj->psi", columns, theta)) * is_before[..., None]
+        normal = np.linalg.pinv(np.einsum("ps,sij->pij", is_before.astype(float), columns), hermitian=True)
+        spread = np.maximum(np.einsum("psi,pij,psj->p", scores, normal, scores), 0.0) / keep.size
+        noise = np.where(draws >= LEAST_DRAWS, spread * draws / np.maximum(draws - keep.size, 1), self._noise)
+        self._noise = float(noise[-1])
+        return noise
 
 
-def _inverse(normal: FloatArray, least: float) -> FloatArray | None:
-    """Return the inverse of a normal matrix; None where, scaled to ones, it has an eigenvalue below the least."""
-    scale = np.sqrt(np.diag(normal))
-    if not (scale > 0.0).all():
-        return None
-    ones = normal / np.outer(scale, scale)
-    return None if np.linalg.eigvalsh(ones)[0] < least else np.asarray(np.linalg.inv(ones) / np.outer(scale, scale))
+def _squares(vectors: FloatArray, matrices: FloatArray) -> FloatArray:
+    """Return v' M v of each of some vectors (P, K) and matrices (P, K, K)."""
+    return np.asarray(np.einsum("pi,pij,pj->p", vectors, matrices, vectors))
+
+
+def _inverses(normals: FloatArray, least: float) -> tuple[FloatArray, BoolArray]:
+    """Return the pseudo-inverse of each normal matrix (P, K, K), each column scaled to one, and whether it tells all numbers.
+
+    It does where no eigenvalue of the scaled matrix is below `least`.
+    """
+    scale = np.sqrt(np.einsum("pii->pi", normals))
+    told, scale = (scale > 0.0).all(axis=1), np.where(scale > 0.0, scale, 1.0)
+    outer = scale[:, :, None] * scale[:, None, :]
+    ones = normals / outer
+    return np.asarray(np.linalg.pinv(ones, hermitian=True) / outer), told & (np.linalg.eigvalsh(ones)[:, 0] >= least)
 
 
 def _plain(sums: _Sums) -> list[Any]:

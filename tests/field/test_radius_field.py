@@ -44,7 +44,7 @@ def test_pulses_and_zigzag_predict_full_rudder_within_five_percent_both_sides(tm
         assert row.interval95[0] <= wanted <= row.interval95[1], (row.speed, row.side)
 
 
-@pytest.mark.parametrize("effects", [(), EFFECTS], ids=["plain", "effects"])
+@pytest.mark.parametrize("effects", [pytest.param((), id="plain"), pytest.param(EFFECTS, id="effects", marks=pytest.mark.slow)])
 def test_pulses_alone_are_extrapolated_and_their_band_holds_the_truth(tmp_path, shared_data, truth, effects):
     source, runs = models(tmp_path, shared_data, ("rudder",), effects)
     for row in turn_radius(source, [float(v) for v in SPEEDS], truth["delta_max_rad"], runs=runs).rows:
@@ -61,6 +61,7 @@ def test_measured_circle_is_the_true_one_within_half_a_percent(shared_data, trut
     assert turn.side == ("port" if kind == "circle_port" else "starboard")
 
 
+@pytest.mark.slow
 def test_a_u_turn_at_one_speed_helps_the_others_and_is_no_settled_circle(tmp_path, shared_data, truth):
     source, runs = models(tmp_path, shared_data, ("rudder",), EFFECTS)
     u_turn = load_run(shared_data / "lauv" / "uturn_v1.50.csv.gz")

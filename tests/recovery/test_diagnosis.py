@@ -117,9 +117,12 @@ def test_an_effect_of_another_shape_is_followed_down_to_the_floor(seed: int, ind
             75,
             None,
             id="far off",
-            marks=pytest.mark.xfail(
-                strict=True, reason="the pair leads by 24 nats, and its coupling is not accepted where 15 x is left"
-            ),
+            marks=[
+                pytest.mark.slow,
+                pytest.mark.xfail(
+                    strict=True, reason="the pair leads by 24 nats, and its coupling is not accepted where 15 x is left"
+                ),
+            ],
         ),
         pytest.param(132, 84, "ar1", id="many ends", marks=pytest.mark.slow),
         pytest.param(136, 100, None, id="play behind a slow fin"),

@@ -14,6 +14,8 @@ from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.wish import Wish
 
 SEED = 7
+LONG = ("slim torpedo", "unstable")
+"""Kinds whose gains take as long as those of all others together."""
 
 
 def at_one_speed(number: int) -> Hull:
@@ -37,7 +39,10 @@ def test_the_table_counts_what_was_said_never_to_settle_and_what_was_refused():
     assert any(line.split() == ["90", "deg", "1", "none", "said"] for line in unsaid)
 
 
-@pytest.mark.parametrize("number", range(len(KINDS)), ids=list(KINDS))
+@pytest.mark.parametrize(
+    "number",
+    [pytest.param(i, id=kind, marks=pytest.mark.slow if kind in LONG else ()) for i, kind in enumerate(KINDS)],
+)
 def test_hulls_of_every_kind_settle_within_what_was_said_and_none_hunts(number):
     rows = evaluate(at_one_speed(number), number, SEED, "pd", "pulses")
     assert rows

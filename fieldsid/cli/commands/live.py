@@ -146,9 +146,9 @@ def command(
 
     Replays a log, follows one that grows, or takes JSON lines: `{"time_s": 1.25, "rudder_deg": 5, "yaw_deg": 91}`.
     `--json` prints one object a look, a line each. With `--state` a program that was killed goes on where it was. A jump of the
-    fin's authority at the damping there was, as by a linkage that slipped, is told, and the estimate begins anew. `--gains`
-    designs as `schedule design` does and says which of the loaded gains to change; `--diagnose` says what `diagnose` does, and
-    what to fly next.
+    fin's authority, as by a payload or a linkage that slipped, is told, and the estimate begins anew. `--gains` designs as
+    `schedule design` does and says which of the loaded gains to change; `--diagnose` says what `diagnose` does, and what to fly
+    next.
 
     Example: sysid live run7.csv --axis yaw --speed 10 --plan plan.yaml
     """
