@@ -1,6 +1,6 @@
 """A model with one physical effect more, kept only where that pays, and the line of models it comes from."""
 
-from fieldsid.extension.extend import Extension, Gain, extend
+from fieldsid.extension.extend import Extension, Gain, extend, extend_in_steps, whole_of
 from fieldsid.extension.lineage import (
     CHANGED,
     INTACT,
@@ -11,9 +11,9 @@ from fieldsid.extension.lineage import (
     kept_by,
     parent_of,
     save_extension,
+    save_steps,
 )
 from fieldsid.extension.loop import Loop, LoopStep, loop_of
-from fieldsid.extension.steps import extend_in_steps, save_steps, whole_of
 
 __all__ = [
     "CHANGED",

@@ -7,7 +7,7 @@ so that the difference between them is the addition and nothing else.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -121,12 +121,26 @@ def extend(
     report: Callable[[str], None] = lambda _text: None,
     unfit: Refused[Run] | None = None,
 ) -> Extension:
-    """Return a model with effects added by name, base and all effects refitted to the training runs together.
+    """Return a model with effects added by name, as `extend_in_steps` finds it and raises, as one extension."""
+    return whole_of(extend_in_steps(parent, add, training, validation, report=report, unfit=unfit))
 
-    Without validation runs a part of the training runs is held back to judge by. Where an addition is accepted though its error
-    on the validation runs does not fall, since the training runs leave its size open, all runs are fitted together. report is
-    told what is being tried. unfit is told of each of several runs that cannot be fitted; without it, and where none of a group
-    is left, its error is raised.
+
+def extend_in_steps(
+    parent: Model,
+    add: Sequence[str],
+    training: Sequence[Run],
+    validation: Sequence[Run] = (),
+    *,
+    report: Callable[[str], None] = lambda _text: None,
+    unfit: Refused[Run] | None = None,
+) -> tuple[Extension, ...]:
+    """Return an extension for each of some effects, each of the model before it, so that a person watches the error fall.
+
+    All come from one search, base and all effects refitted to the training runs together: the whole is reached in the best of
+    several orders, of which that of the steps is one. Without validation runs a part of the training runs is held back to judge
+    by. Where an addition is accepted though its error on the validation runs does not fall, since the training runs leave its
+    size open, all runs are fitted together. report is told what is being tried. unfit is told of each of several runs that cannot
+    be fitted; without it, and where none of a group is left, its error is raised.
     Raises UsageError for an effect that is unknown, of the other axis or in the model already, DataError for runs that
     cannot be used or lack a signal the effects need, EffectError for a user's effect that fails, or has a coefficient of a name
     that another effect of the model has.
@@ -138,12 +152,43 @@ def extend(
     parts = _with_signals((*(effect_held(n, parent.own) for n in parent.effects), *new), [*learned, *judged])
     notes = (*notes, *left_out([run for run, _ in (*fitted, *checked)], parent.axis))
     work = Search(learned, judged, parent.axis, parts, parent.effects, report, thorough=True)
-    before, after = base_from(work, parent), _with_all(work)
-    found = _extension(work, before, after, new, notes)
-    if found.pays or not judged or not is_accepted(before, after):
-        return found
+    line = _grown(work, parent, new)
+    steps = _steps(work, line, new, notes)
+    if not judged or whole_of(steps).pays or not is_accepted(line[0], line[-1]):
+        return steps
     work = Search((*learned, *judged), (), parent.axis, parts, parent.effects, report, thorough=True)
-    return _extension(work, base_from(work, parent), _with_all(work), new, (*notes, FITTED_TO_ALL))
+    return _steps(work, _grown(work, parent, new), new, (*notes, FITTED_TO_ALL))
+
+
+def whole_of(steps: Sequence[Extension]) -> Extension:
+    """Return steps as one extension: from before the first to after the last."""
+    first, last = steps[0].gain, steps[-1].gain
+    gain = replace(last, added=tuple(name for s in steps for name in s.gain.added), before=first.before)
+    notes = tuple({(n.code, n.message): n for s in steps for n in s.notes}.values())
+    return replace(steps[-1], gain=gain, evidence=sum(s.evidence for s in steps), notes=notes)
+
+
+def _grown(work: Search, parent: Model, new: Sequence[Effect]) -> list[ScoredModel]:
+    """Return the parent and what it becomes with each of the new effects after the other, refitted.
+
+    The whole is grown from the best few sets of each size and from the first effects in their order.
+    """
+    base_from(work, parent)
+    line = [work.root | {e.name for e in new[:size]} for size in range(len(new) + 1)]
+    front = {work.root}
+    for ends in line[1:]:
+        children = {frozenset(c.names): c for key in front for c in work.grow(work.tried[key], forced=True)}
+        front = set(sorted(children, key=lambda key: -children[key].log_evidence)[:BEAM_WIDTH]) | {ends}
+    return [work.tried[names] for names in line]
+
+
+def _steps(
+    work: Search, line: Sequence[ScoredModel], new: Sequence[Effect], notes: tuple[Note, ...]
+) -> tuple[Extension, ...]:  # fmt: skip
+    """Return the extensions from each model of a line to the next; what the last leaves over is noise in all of them."""
+    work.lower_floor(line[-1])
+    steps = zip(line[:-1], line[1:], new, strict=True)
+    return tuple(_extension(work, before, after, [effect], notes) for before, after, effect in steps)
 
 
 def _extension(
@@ -153,7 +198,6 @@ def _extension(
     learned, judged = work.records, work.validation
     told = common_own_moment(before, after)
     before, after = before.with_own_moment(told), after.with_own_moment(told)
-    work.lower_floor(after)
     # as `diagnose` has it: what runs without noise leave over is no colour of a sensor's
     ended_with = after.likelihood_fit if work.is_noiseless else joint_noise_fit(after.likelihood_fit, work.parallel)
     noise = ended_with.noise
@@ -206,15 +250,6 @@ def base_from(work: Search, parent: Model) -> ScoredModel:
     if again.log_likelihood > base.likelihood_fit.log_likelihood + EQUAL_LOG_LIKELIHOOD:
         work.tried[work.root] = prefer_output_error(score_model(again, work.validation), work.floor)
     return work.base()
-
-
-def _with_all(work: Search) -> ScoredModel:
-    """Return the model of all effects of the search's catalogue, grown one effect at a time."""
-    front = [work.base()]
-    for _ in range(len(work.catalogue) - len(work.known)):
-        children = {frozenset(c.names): c for parent in front for c in work.grow(parent, forced=True)}
-        front = sorted(children.values(), key=lambda h: -h.log_evidence)[:BEAM_WIDTH]
-    return front[0]
 
 
 def new_effects(parent: Model, add: Sequence[str]) -> tuple[Effect, ...]:

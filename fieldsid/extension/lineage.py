@@ -86,6 +86,15 @@ def save_extension(
     return save_model(model, path, inputs=[p for _, _, p in files], parent=parent, force=force)
 
 
+def save_steps(
+    steps: Sequence[Extension], files: Sequence[Path], parent: Path, data: tuple[Sequence[Run], Sequence[Run]], *, force: bool
+) -> None:
+    """Write each step's model with the one before it as its parent; data: training and unseen runs. Raises ArtifactError."""
+    training, unseen = data
+    for step, file, before in zip(steps, files, [parent, *files], strict=False):
+        save_extension(step, file, parent=before, training=training, validation=unseen, force=force)
+
+
 def parent_of(path: Path) -> Parent | None:
     """Return the parent a model file names, None where it names none; raises ArtifactError.
 
