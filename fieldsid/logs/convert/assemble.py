@@ -13,7 +13,7 @@ from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, ChannelMap, Source
 from fieldsid.logs.convert.clock import Track, one_clock, summed
 from fieldsid.logs.convert.conditioning import MAX_GAP_S, in_order, possible, refuse_impossible_steps, refuse_long_gaps
-from fieldsid.logs.convert.frames import SWAPPED_BY_WORLD, angles_of_quaternion, to_ned_frd
+from fieldsid.logs.convert.frames import SWAPPED_BY_WORLD, about_level, angles_of_quaternion, to_ned_frd
 from fieldsid.logs.convert.geodetic import north_and_east
 from fieldsid.logs.convert.heading_fills import without_fills
 from fieldsid.logs.convert.heading_unwrap import unwrapped_over
@@ -68,6 +68,8 @@ def assemble(
         tracks["yaw_rad"], fills = without_fills(tracks["yaw_rad"])
         tracks["yaw_rad"], lines = unwrapped_over(tracks["yaw_rad"], tracks.get("yaw_rate_rad_s"), mapping.gap_factor)
         notes += fills + lines
+    for name in {"roll_rad", "pitch_rad"} & tracks.keys():
+        tracks[name] = replace(tracks[name], values=about_level(tracks[name].values))
     time, signals, clock_notes = _on_one_clock(raw, tracks, mapping)
     if time.size < 2:
         counted = _counted(time, [*notes, *clock_notes])

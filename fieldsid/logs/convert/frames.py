@@ -96,3 +96,15 @@ def unwrapped(angle_rad: FloatArray) -> FloatArray:
     result = np.array(angle_rad, dtype=np.float64)
     result[seen] = np.unwrap(result[seen])
     return result
+
+
+def about_level(angle_rad: FloatArray) -> FloatArray:
+    """Return a roll or pitch (n,) that its logger wraps, as 359 deg for -1 or -179 beside 180, without jumps, and about level.
+
+    What goes beyond a turn is no wrapped angle and stays.
+    """
+    seen = np.isfinite(angle_rad)
+    if not seen.any() or np.abs(angle_rad[seen]).max() > 2.0 * math.pi:
+        return angle_rad
+    result = unwrapped(angle_rad)
+    return np.asarray(result - 2.0 * math.pi * np.round(np.median(result[seen]) / (2.0 * math.pi)))

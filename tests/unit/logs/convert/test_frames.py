@@ -8,7 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fieldsid.logs.convert.frames import Frame, angles_of_quaternion, heading_of_enu, quaternion_of_angles, to_ned_frd, unwrapped
+from fieldsid.logs.convert.frames import (
+    Frame,
+    about_level,
+    angles_of_quaternion,
+    heading_of_enu,
+    quaternion_of_angles,
+    to_ned_frd,
+    unwrapped,
+)
 
 ENU_TO_NED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 FLU_TO_FRD = np.diag([1.0, -1.0, -1.0])
@@ -92,3 +100,21 @@ def test_unwrapping_leaves_gaps_and_small_steps_alone():
     np.testing.assert_allclose(unwrapped(heading), [3.0, np.nan, 2 * math.pi - 3.0, 2 * math.pi - 2.9])
     small = np.array([0.1, 0.3, -0.2])
     assert (unwrapped(small) == small).all()
+
+
+@pytest.mark.parametrize("middle", [0.02, -0.02, math.pi, 1.0])
+@pytest.mark.parametrize("begin", [0.0, -math.pi, -2.0 * math.pi])
+def test_a_roll_that_its_logger_wraps_comes_back_about_level(middle, begin):
+    roll = middle + 0.05 * np.sin(np.arange(200.0))
+    roll[7] = np.nan
+    turned = about_level((roll - begin) % (2.0 * math.pi) + begin)
+    off = (turned - roll)[np.isfinite(roll)]
+    assert np.isnan(turned[7])
+    np.testing.assert_allclose(off, 2.0 * math.pi * round(off[0] / (2.0 * math.pi)), atol=1e-12)
+    assert abs(np.nanmedian(turned)) <= math.pi + 0.1
+
+
+def test_a_roll_that_is_level_and_one_beyond_a_turn_stay_as_they_are():
+    level, degrees = np.array([0.1, -0.2, 0.0]), np.array([-20.0, 5.0, 355.0])
+    assert (about_level(level) == level).all()
+    assert about_level(degrees) is degrees
