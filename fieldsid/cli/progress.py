@@ -20,6 +20,8 @@ from fieldsid.errors import UsageError
 if TYPE_CHECKING:
     from fieldsid.fitting.jit_warmup import Warmup
 
+FILES = (".yaml", ".yml", ".json", ".csv", ".parquet")
+"""How the files end that commands write: no folder is meant by such a name."""
 LINE_EVERY_S = 5.0
 """Seconds between two lines of progress where standard error is no terminal."""
 
@@ -32,15 +34,15 @@ def refuse_existing(*paths: Path | None, force: bool) -> None:
 
 
 def refuse_closed(folder: Path | None) -> None:
-    """Refuse a folder that nothing can be written to, or with the name of a figure, before the work is done and not after it.
+    """Refuse a folder that nothing can be written to, or with the name of a file, before the work is done and not after it.
 
     Raises ArtifactError or UsageError.
     """
     from fieldsid.figures.kinds import is_figure
 
-    if folder is not None and is_figure(folder):
+    if folder is not None and (is_figure(folder) or folder.suffix in FILES) and not folder.is_dir():
         raise UsageError(
-            f"`{folder}` is a figure's name, and what is written here is a folder",
+            f"`{folder}` is a {'figure' if is_figure(folder) else 'file'}'s name, and what is written here is a folder",
             found=f"-o {folder}",
             hint=f"`-o {folder.with_suffix('')}/`",
         )

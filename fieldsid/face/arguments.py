@@ -137,7 +137,8 @@ def runs_behind(source: ParameterSource, say: Callable[[str], None]) -> list[Run
     there = [p for _, p in named if p is not None]
     runs = [run for run in (attempt(load_run, path) for path in there) if not isinstance(run, FieldsidError)]
     if len(runs) < len(named):
-        say(f"{len(named) - len(runs)} of {len(named)} runs of the models cannot be read again: they show how the vehicle turns")
+        lost = f"{len(named) - len(runs)} of {len(named)} runs of the models"
+        say(f"{lost} are gone, closed or outside of this folder: the speed lost in a turn is not measured in them")
     return runs
 
 

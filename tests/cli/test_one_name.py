@@ -76,3 +76,14 @@ def test_where_a_folder_is_written_a_figures_name_is_refused(run_cli, tmp_path):
     assert answer.code == 2
     assert "is a figure's name" in answer.err
     assert not (tmp_path / "x.pdf").exists()
+
+
+@pytest.mark.parametrize("name", ["model.yaml", "model.json"])
+@pytest.mark.parametrize("line", ["identify run7.parquet --axis yaw", "plan --speeds 1.4"])
+def test_where_a_folder_is_written_a_files_name_is_refused_too(run_cli, tmp_path, monkeypatch, line, name):
+    monkeypatch.chdir(tmp_path)
+    trial.flown(tmp_path)
+    answer = run_cli(*line.split(), "-o", tmp_path / name)
+    assert answer.code == 2
+    assert f"hint: `-o {tmp_path / 'model'}/`" in answer.err
+    assert not (tmp_path / name).exists()

@@ -11,7 +11,7 @@ import typer
 
 from fieldsid.cli.console import emit, progress, say
 from fieldsid.cli.options import LIMITS, WRITTEN, Figures, Force, JsonFlag, OutputDir, VehicleFile, names_of
-from fieldsid.cli.progress import compiling, refuse_existing
+from fieldsid.cli.progress import compiling, refuse_closed, refuse_existing
 from fieldsid.cli.session import tasks_of
 from fieldsid.cli.voice import shown_in
 from fieldsid.models.axis import Axis
@@ -130,6 +130,7 @@ def command(
     from fieldsid.results.plans import Planned
 
     _check_write(write, output)
+    refuse_closed(output)
     refuse_existing(output / "plan.yaml" if output is not None else None, force=force)
     limiting = EnvelopeLimits(area, depth_band, max_heading, max_track, max_pitch, max_roll, fin_max, fin_rate, risk)
     asked = PlanRequest(
