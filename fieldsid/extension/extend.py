@@ -171,7 +171,8 @@ def whole_of(steps: Sequence[Extension]) -> Extension:
 def _grown(work: Search, parent: Model, new: Sequence[Effect]) -> list[ScoredModel]:
     """Return the parent and what it becomes with each of the new effects after the other, refitted.
 
-    The whole is grown from the best few sets of each size and from the first effects in their order.
+    The whole is grown from the best few sets of each size and from the first effects in their order; then the search goes on as
+    that of `diagnose` does, with these effects alone, and keeps of each set the better optimum.
     """
     base_from(work, parent)
     line = [work.root | {e.name for e in new[:size]} for size in range(len(new) + 1)]
@@ -179,6 +180,7 @@ def _grown(work: Search, parent: Model, new: Sequence[Effect]) -> list[ScoredMod
     for ends in line[1:]:
         children = {frozenset(c.names): c for key in front for c in work.grow(work.tried[key], forced=True)}
         front = set(sorted(children, key=lambda key: -children[key].log_evidence)[:BEAM_WIDTH]) | {ends}
+    work.best()
     return [work.tried[names] for names in line]
 
 
