@@ -2,33 +2,28 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from fieldsid.cli.console import emit, out, say
 from fieldsid.cli.exit_codes import GATE_FAILED
+from fieldsid.cli.live.feed import Feed
 from fieldsid.cli.options import AxisOption, JsonFlag, MappingFile, VehicleFile
 from fieldsid.cli.voice import voice
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
-    from io import BufferedIOBase
-
     from rich.console import Console
 
     from fieldsid.cli.live.beside import Beside
-    from fieldsid.logs.run import Run
     from fieldsid.online.identifier import OnlineIdentifier
     from fieldsid.online.progress import Goal, Watch
-    from fieldsid.online.samples import MessageReader, Sample
 
 SOURCE, GOAL, BESIDE = "Where the samples come from", "What is to be reached", "What a second process works out"
 """The groups of its own options on the page of help."""
@@ -153,7 +148,7 @@ def command(
     Example: sysid live run7.csv --axis yaw --speed 10 --plan plan.yaml
     """
     _check_source(log, udp, follow=follow)
-    feed = _Feed(axis, log, speed if speed > 0.0 else inf, follow, udp, inf if idle is None else idle, mapping)
+    feed = Feed(axis, log, speed if speed > 0.0 else inf, follow, udp, inf if idle is None else idle, mapping)
     goals, goals_from = _goals(axis, plan, want)
     feed.keeps = diagnose
     beside = _beside(feed, (schedule, vehicle, depth) if gains or schedule else None, diagnose=diagnose)
@@ -196,69 +191,6 @@ def _check_source(log: Path | None, udp: int | None, *, follow: bool) -> None:
         )
 
 
-@dataclass
-class _Feed:
-    """Where the samples come from, and what is known of them once the first has come."""
-
-    axis: AxisOption
-    log: Path | None
-    factor: float
-    follow: bool
-    udp: int | None
-    idle_s: float
-    mapping: Path | None
-    reader: MessageReader | None = None
-    run: Run | None = None
-    keeps: bool = False
-
-    @property
-    def name(self) -> str:
-        """The source in words, which a saved state is of."""
-        return f"udp:{self.udp}" if self.log is None else str(self.log)
-
-    @property
-    def is_log(self) -> bool:
-        """Whether it is a file, whose samples that are known already are passed over."""
-        return self.log is not None and str(self.log) != "-"
-
-    @property
-    def unreadable(self) -> int:
-        """Lines that were no JSON objects with a time."""
-        return self.reader.unreadable if self.reader else 0
-
-    def then(self, *, usable: bool) -> str:
-        """Return the command that comes next: to look at a log that cannot be used as it is."""
-        if not self.is_log:
-            return ""
-        words = ["identify", str(self.log), "--axis", self.axis.value, "-o", "models/"] if usable else ["inspect", str(self.log)]
-        return shlex.join(["sysid", *words])
-
-    def flown(self, until: float) -> Run | Mapping[str, Any]:
-        """Return what was flown up to a time in s: a run, or the columns of what was said."""
-        from fieldsid.cli.inputs import read_run
-
-        if self.reader is not None:
-            return dict(self.reader.columns)
-        run = self.run or read_run(Path(str(self.log)), mapping=self.mapping)
-        return run if until >= float(run.time[-1]) else run.between(-inf, until)
-
-    def samples(self, after: float) -> Iterator[Sample | None]:
-        """Yield the samples after a time in s."""
-        from fieldsid.cli.inputs import mapping_of, read_run
-        from fieldsid.online.samples import MessageReader
-        from fieldsid.online.sources import datagrams, followed, lines_of, replayed
-
-        if not self.is_log:
-            self.reader = MessageReader(self.axis, keeps=self.keeps)
-            if self.udp is not None:
-                return datagrams(self.udp, self.reader, idle_s=self.idle_s)
-            return lines_of(cast("BufferedIOBase", sys.stdin.buffer), self.reader)
-        if self.log is None or not self.follow:
-            self.run = read_run(Path(str(self.log)), mapping=self.mapping)
-            return replayed(self.run, self.axis, self.factor, after)
-        return followed(self.log, mapping_of(self.mapping), self.axis, idle_s=self.idle_s, after=after)
-
-
 def _goals(axis: AxisOption, plan: Path | None, want: str | None) -> tuple[Callable[[float], Mapping[str, Goal]], str]:
     """Return the goals at a speed in m/s, and where they are from."""
     from fieldsid.online.goals import asked_goals, planned_goals
@@ -278,7 +210,7 @@ def _goals(axis: AxisOption, plan: Path | None, want: str | None) -> tuple[Calla
     return (lambda _speed: default_goals(axis)), f"{100.0 * DEFAULT_ACCURACY:.0f} % of each value"
 
 
-def _beside(feed: _Feed, gains: tuple[Path | None, Path | None, bool] | None, *, diagnose: bool) -> Beside | None:
+def _beside(feed: Feed, gains: tuple[Path | None, Path | None, bool] | None, *, diagnose: bool) -> Beside | None:
     """Return what works beside the estimate: gains of a schedule, a vehicle, with depth or not, and a diagnosis."""
     if gains is None and not diagnose:
         return None
@@ -289,7 +221,7 @@ def _beside(feed: _Feed, gains: tuple[Path | None, Path | None, bool] | None, *,
     return Beside(feed.axis, feed.flown if diagnose else None, wanted, waits=waits)
 
 
-def _begun(feed: _Feed, state: Path | None, watch: Watch, bandwidth: float, forgetting: float) -> tuple[OnlineIdentifier, float]:
+def _begun(feed: Feed, state: Path | None, watch: Watch, bandwidth: float, forgetting: float) -> tuple[OnlineIdentifier, float]:
     """Return the identifier, from its state where there is one, and the time up to which the source is known to it."""
     from fieldsid.online.identifier import OnlineIdentifier
     from fieldsid.online.state_file import load_state
@@ -307,7 +239,7 @@ def _begun(feed: _Feed, state: Path | None, watch: Watch, bandwidth: float, forg
 
 
 def _looks(
-    feed: _Feed,
+    feed: Feed,
     identifier: OnlineIdentifier,
     watch: Watch,
     goals: Callable[[float], Mapping[str, Goal]],

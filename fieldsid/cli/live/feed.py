@@ -1,0 +1,82 @@
+"""Where `sysid live` has its samples from: a log that is replayed or followed, standard input, or a port."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from fieldsid.cli.options import AxisOption
+
+if TYPE_CHECKING:
+    from io import BufferedIOBase
+
+    from fieldsid.logs.run import Run
+    from fieldsid.online.samples import MessageReader, Sample
+
+
+@dataclass
+class Feed:
+    """Where the samples come from, and what is known of them once the first has come."""
+
+    axis: AxisOption
+    log: Path | None
+    factor: float
+    follow: bool
+    udp: int | None
+    idle_s: float
+    mapping: Path | None
+    reader: MessageReader | None = None
+    run: Run | None = None
+    keeps: bool = False
+
+    @property
+    def name(self) -> str:
+        """The source in words, which a saved state is of."""
+        return f"udp:{self.udp}" if self.log is None else str(self.log)
+
+    @property
+    def is_log(self) -> bool:
+        """Whether it is a file, whose samples that are known already are passed over."""
+        return self.log is not None and str(self.log) != "-"
+
+    @property
+    def unreadable(self) -> int:
+        """Lines that were no JSON objects with a time."""
+        return self.reader.unreadable if self.reader else 0
+
+    def then(self, *, usable: bool) -> str:
+        """Return the command that comes next: to look at a log that cannot be used as it is."""
+        if not self.is_log:
+            return ""
+        words = ["identify", str(self.log), "--axis", self.axis.value, "-o", "models/"] if usable else ["inspect", str(self.log)]
+        return shlex.join(["sysid", *words])
+
+    def flown(self, until: float) -> Run | Mapping[str, Any]:
+        """Return what was flown up to a time in s: a run, or the columns of what was said."""
+        from fieldsid.cli.inputs import read_run
+
+        if self.reader is not None:
+            return dict(self.reader.columns)
+        run = self.run or read_run(Path(str(self.log)), mapping=self.mapping)
+        return run if until >= float(run.time[-1]) else run.between(-inf, until)
+
+    def samples(self, after: float) -> Iterator[Sample | None]:
+        """Yield the samples after a time in s."""
+        from fieldsid.cli.inputs import mapping_of, read_run
+        from fieldsid.online.samples import MessageReader
+        from fieldsid.online.sources import datagrams, followed, lines_of, replayed
+
+        if not self.is_log:
+            self.reader = MessageReader(self.axis, keeps=self.keeps)
+            if self.udp is not None:
+                return datagrams(self.udp, self.reader, idle_s=self.idle_s)
+            return lines_of(cast("BufferedIOBase", sys.stdin.buffer), self.reader)
+        if self.log is None or not self.follow:
+            self.run = read_run(Path(str(self.log)), mapping=self.mapping)
+            return replayed(self.run, self.axis, self.factor, after)
+        return followed(self.log, mapping_of(self.mapping), self.axis, idle_s=self.idle_s, after=after)
