@@ -42,12 +42,6 @@ def phases(numbers: tuple[int, ...]) -> FloatArray:
     return best
 
 
-def crest_factor(p: Parameters) -> float:
-    """Return the peak over the root mean square of one period."""
-    wave = _shape(p, np.arange(4096) / 4096 * p["period"])
-    return float(np.max(np.abs(wave)) / np.sqrt(np.mean(wave**2)))
-
-
 def _wave(index: np.ndarray, phase: FloatArray, size: int) -> FloatArray:
     spectrum = np.zeros(size // 2 + 1, dtype=np.complex128)
     spectrum[index] = np.exp(1j * phase)

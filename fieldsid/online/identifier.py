@@ -41,7 +41,7 @@ WAIT_FOR_RATE_S = 1.0
 """Time after which a vehicle that has sent no rate has none."""
 PRESENT_S = 10.0
 """Time over which the present speed is a mean."""
-STATE = 4
+STATE = 5
 """Version of the saved state."""
 _UPPER = np.triu_indices(4)
 

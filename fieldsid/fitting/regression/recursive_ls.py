@@ -8,9 +8,6 @@ Source: the paper, estimator 2 (recursive); Ljung 1999, section 11.2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import isfinite, remainder, tau
-
 import numpy as np
 
 from fieldsid.fitting.regression.bias_compensation import NoiseShare
@@ -28,10 +25,10 @@ MAX_VARIANCE_SHARE = 1e-2
 """Share of INITIAL below which all of P must be before the estimate is used for the curvature between samples."""
 EQUAL_STEP_SHARE = 1e-9
 """Share by which two sampling intervals may differ and still use the same filter weights."""
-MEMORY = 30
+MEMORY = 27
 (
     SAMPLES, TIME, FIRST_TIME, ANGLE, RATE, P1, P2, Y1, Y2, D1, D2, DECAY, START, SQUARES, WEIGHT, WEIGHT2,
-    LAST_ERROR, ERROR_POWER, ERROR_LAG, H, W0, W1, W2, W3, W4, A, K, B, C, NEXT_REFRESH,
+    H, W0, W1, W2, W3, W4, A, K, B, C, NEXT_REFRESH,
 ) = range(MEMORY)  # fmt: skip
 
 
@@ -145,12 +142,8 @@ def step(
     phi = row_of(m, order, lam, angle, rate)
     rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4] = phi
     error, left = update(s, phi, beta)
-    after = error * left
-    m[SQUARES] = beta * m[SQUARES] + error * after
+    m[SQUARES] = beta * m[SQUARES] + error * error * left
     m[WEIGHT], m[WEIGHT2] = beta * m[WEIGHT] + 1.0, beta * beta * m[WEIGHT2] + 1.0
-    m[ERROR_LAG] = beta * m[ERROR_LAG] + after * m[LAST_ERROR]
-    m[ERROR_POWER] = beta * m[ERROR_POWER] + after * after
-    m[LAST_ERROR] = after
     if m[SAMPLES] >= m[NEXT_REFRESH]:
         refresh_curvature(m, s)
     return True
@@ -192,87 +185,7 @@ def initial_memory(*, stiff: bool) -> FloatArray:
 def forget_filter(m: FloatArray) -> None:
     """Let the filter begin anew at the next sample, as after a gap: what was estimated, its weight and its errors stay."""
     m[:SQUARES] = 0.0
-    m[[LAST_ERROR, H, NEXT_REFRESH]] = 0.0
-
-
-def plain_update(
-    theta: FloatArray, big: FloatArray, phi: FloatArray, target: float, beta: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return Theta (p,) and P (p, p) after one row, as the equations are written: the oracle of the compiled one."""
-    gain = big @ phi
-    spread = beta + phi @ gain
-    theta = theta + gain * ((target - phi @ theta) / spread)
-    big = big - np.outer(gain, gain) / spread
-    if float(np.diag(big).max()) < beta * INITIAL_VARIANCE:
-        big = big / beta
-    return theta, big
-
-
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    """What is known after a sample: values (p,), standard errors (p,) allowing for colour, NaN before they exist."""
-
-    values: FloatArray
-    std_errors: FloatArray
-
-
-class Recursion:
-    """Recursive least squares fed one sample at a time; the same arithmetic as the sweep over a whole record.
-
-    stiff adds the angle's stiffness (pitch); by_rate takes the measured rate and a first-order filter, otherwise
-    the angle alone and a second-order one. bandwidth is lambda in rad/s, forgetting beta in (0, 1]. noise (5,), as of
-    `noise_of`, takes the bias of white sensor noise out; without it that bias stays.
-    """
-
-    __slots__ = ("_by_rate", "_fin", "_memory", "_noise", "_row", "_sample", "_settings", "_state", "_which")
-
-    def __init__(
-        self,
-        *,
-        stiff: bool,
-        by_rate: bool = True,
-        bandwidth: float = 4.0,
-        forgetting: float = 1.0,
-        noise: FloatArray | None = None,
-    ) -> None:
-        self._memory, self._state = np.zeros(MEMORY), initial_memory(stiff=stiff)
-        self._settings = (bandwidth, forgetting, 1 if by_rate else 2)
-        self._by_rate = by_rate
-        self._which = [0, 1, 2, 3] if stiff else [0, 2, 3]
-        self._sample, self._row = np.zeros((1, 6)), np.zeros((1, 5))
-        self._noise = np.zeros(5) if noise is None else noise
-        self._fin = 0.0
-
-    def update(self, time: float, fin: float, angle: float, rate: float) -> None:
-        """Take one sample: time s, fin command rad from this time on, angle rad, rate rad/s; NaN where not measured."""
-        sample, memory = self._sample[0], self._memory
-        fin = fin if isfinite(fin) else self._fin
-        if len(self._which) == 3 and isfinite(angle):
-            angle = memory[ANGLE] + remainder(angle - memory[ANGLE], tau)
-        wanted = isfinite(rate if self._by_rate else angle)
-        # a missing sample under a command that stays needs no step: the next one spans both intervals
-        if wanted or (memory[SAMPLES] and fin != self._fin):
-            sample[0], sample[1], sample[2], sample[5] = time, self._fin, self._fin, float(wanted)
-            sample[3] = angle if isfinite(angle) else memory[ANGLE]
-            sample[4] = rate if isfinite(rate) else memory[RATE]
-            if time > memory[TIME] or not memory[SAMPLES]:
-                step(memory, self._state, *self._settings, self._sample, self._row, 0)
-        self._fin = fin
-
-    @property
-    def values(self) -> FloatArray:
-        """The estimate now, (p,): damping, stiffness (pitch), authority, trim."""
-        return np.array(corrected(self._memory, self._state, self._noise))[self._which]
-
-    def estimate(self) -> Estimate:
-        """Return values and standard errors now; the colour of the errors enters by their lag-one correlation."""
-        memory = self._memory
-        scale = variance_scale(memory, len(self._which))
-        if not isfinite(scale) or memory[ERROR_POWER] == 0.0:
-            return Estimate(self.values, np.full(len(self._which), np.nan))
-        rho = float(np.clip(memory[ERROR_LAG] / memory[ERROR_POWER], 0.0, 0.99))
-        variance = self._state[[4, 8, 11, 13]][self._which] * scale * (1.0 + rho) / (1.0 - rho)
-        return Estimate(self.values, np.sqrt(np.maximum(variance, 0.0)))
+    m[[H, NEXT_REFRESH]] = 0.0
 
 
 def noise_of(share: NoiseShare) -> FloatArray:

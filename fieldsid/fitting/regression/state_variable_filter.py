@@ -62,21 +62,3 @@ def filtered(
     bow = np.zeros(steps.size) if curvature is None else curvature
     _fill(steps, np.ascontiguousarray(start), np.ascontiguousarray(end), np.ascontiguousarray(bow), bandwidth, out)
     return out
-
-
-def filtered_plain(
-    steps: FloatArray, start: FloatArray, end: FloatArray, bandwidth: float, curvature: FloatArray | None = None
-) -> FloatArray:
-    """Return the same as `filtered` by the matrix exponential of filter and input together: slow, and shares no formula."""
-    from scipy.linalg import expm
-
-    bow = np.zeros(steps.size) if curvature is None else curvature
-    system = np.zeros((5, 5))
-    system[:2, :2] = [[-bandwidth, 0.0], [1.0, -bandwidth]]
-    system[0, 2] = system[2, 3] = system[3, 4] = 1.0
-    out = np.zeros((steps.size + 1, 2))
-    for i, h in enumerate(steps):
-        slope = (end[i] - start[i]) / h - 0.5 * bow[i] * h
-        full = np.array([out[i, 0], out[i, 1], start[i], slope, bow[i]])
-        out[i + 1] = (expm(system * h) @ full)[:2]
-    return out

@@ -79,17 +79,6 @@ def angles_of_quaternion(xyzw: FloatArray, frame: Frame) -> tuple[FloatArray, Fl
     return yaw, pitch, np.arctan2(side_z, up_z)
 
 
-def quaternion_of_angles(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> FloatArray:
-    """Return body-to-world quaternions (n, 4), x y z w, of z-y-x angles (n,) in rad, both in one pair of frames."""
-    cy, sy = np.cos(yaw / 2), np.sin(yaw / 2)
-    cp, sp = np.cos(pitch / 2), np.sin(pitch / 2)
-    cr, sr = np.cos(roll / 2), np.sin(roll / 2)
-    return np.stack(
-        [sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy],
-        axis=-1,
-    )
-
-
 def unwrapped(angle_rad: FloatArray) -> FloatArray:
     """Return an angle (n,) without jumps of a turn, gaps left as NaN; steps below half a turn stay untouched."""
     seen = np.isfinite(angle_rad)

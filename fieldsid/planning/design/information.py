@@ -55,11 +55,6 @@ class Information:
             errors[shown] = np.where(hidden, np.inf, np.sqrt(variance)) / scale
         return dict(zip(self.names, errors.tolist(), strict=True))
 
-    def log_det(self) -> float:
-        """Return the log determinant of the information, minus infinity where it is singular."""
-        sign, value = np.linalg.slogdet(self.matrix)
-        return float(value) if sign > 0 else float("-inf")
-
 
 def problem_of(scene: OperatingPoint, record: Record) -> tuple[Problem, FloatArray]:
     """Return the estimation problem of a scene's model on one record, and its vector of true values (N,)."""

@@ -1,4 +1,4 @@
-"""Recursive least squares: the compiled update against its plain version, and one sample at a time against a sweep."""
+"""Recursive least squares: the compiled update against the equations as written, and single steps against a sweep."""
 
 from __future__ import annotations
 
@@ -9,10 +9,8 @@ from fieldsid.fitting.regression.bias_compensation import noise_share
 from fieldsid.fitting.regression.recursive_ls import (
     INITIAL_VARIANCE,
     MEMORY,
-    Recursion,
     initial_memory,
     noise_of,
-    plain_update,
     step,
     sweep,
     update,
@@ -20,6 +18,17 @@ from fieldsid.fitting.regression.recursive_ls import (
 
 RNG = np.random.default_rng(4)
 UPPER = np.triu_indices(4)
+
+
+def plain_update(theta, big, phi, target, beta):
+    """Theta (p,) and P (p, p) after one row, as the equations are written."""
+    gain = big @ phi
+    spread = beta + phi @ gain
+    theta = theta + gain * ((target - phi @ theta) / spread)
+    big = big - np.outer(gain, gain) / spread
+    if float(np.diag(big).max()) < beta * INITIAL_VARIANCE:
+        big = big / beta
+    return theta, big
 
 
 def unpacked(s):
@@ -77,42 +86,33 @@ def flown(n=600, h=0.05):
     return np.arange(n) * h, fin, angle, rate
 
 
+def samples_of(time, fin, angle, rate):
+    held = np.r_[0.0, fin[:-1]]
+    return np.column_stack([time, held, held, angle, rate, np.ones(time.size)])
+
+
+def swept(samples, *, by_rate=True, bandwidth=4.0, forgetting=1.0, noise=None):
+    """Damping, authority and trim after each sample (n, 3), and the rows (n, 5)."""
+    values, spread, rows = (np.empty((len(samples), size)) for size in (4, 4, 5))
+    order, noise = 1 if by_rate else 2, np.zeros(5) if noise is None else noise
+    memory, s = np.zeros(MEMORY), initial_memory(stiff=False)
+    sweep(memory, s, bandwidth, forgetting, order, 3, noise, samples, values, spread, rows)
+    return values[:, [0, 2, 3]], rows
+
+
 @pytest.mark.parametrize("by_rate", [True, False])
-def test_one_sample_at_a_time_finds_the_vehicle(by_rate):
-    online = Recursion(stiff=False, by_rate=by_rate)
-    for sample in zip(*flown(), strict=True):
-        online.update(*sample)
-    np.testing.assert_allclose(online.values, [1.2, -0.8, 0.02], rtol=1e-3)
-    assert (online.estimate().std_errors < 0.01).all()
-
-
-def test_a_heading_that_wraps_is_the_same_heading():
-    smooth, wrapped = Recursion(stiff=False, by_rate=False), Recursion(stiff=False, by_rate=False)
-    for time, fin, angle, rate in zip(*flown(), strict=True):
-        smooth.update(time, fin, angle * 20.0, rate)
-        wrapped.update(time, fin, (angle * 20.0 + np.pi) % (2.0 * np.pi) - np.pi, rate)
-    np.testing.assert_allclose(wrapped.values, smooth.values, rtol=1e-9)
-
-
-def test_missing_samples_and_time_that_stands_still_are_passed_over():
-    online = Recursion(stiff=False)
-    assert np.isnan(online.estimate().std_errors).all()
-    for i, (time, fin, angle, rate) in enumerate(zip(*flown(), strict=True)):
-        missing = i < 3 or i % 7 == 0
-        online.update(time, fin, angle, float("nan") if missing else rate)
-        online.update(time, fin, angle, float("nan") if missing else 99.0)
-    np.testing.assert_allclose(online.values, [1.2, -0.8, 0.02], rtol=2e-3)
+def test_a_sweep_finds_the_vehicle(by_rate):
+    found, _ = swept(samples_of(*flown()), by_rate=by_rate)
+    np.testing.assert_allclose(found[-1], [1.2, -0.8, 0.02], rtol=1e-3)
 
 
 def test_the_sweep_does_what_single_samples_do():
-    time, fin, angle, rate = flown()
-    samples = np.column_stack([time, np.r_[0.0, fin[:-1]], np.r_[0.0, fin[:-1]], angle, rate, np.ones(time.size)])
-    values, spread, rows = np.empty((600, 4)), np.empty((600, 4)), np.empty((600, 5))
-    sweep(np.zeros(MEMORY), initial_memory(stiff=False), 4.0, 0.999, 1, 3, np.zeros(5), samples, values, spread, rows)
-    online = Recursion(stiff=False, forgetting=0.999)
-    for i, sample in enumerate(zip(time, fin, angle, rate, strict=True)):
-        online.update(*sample)
-        np.testing.assert_array_equal(online.values, values[i, [0, 2, 3]])
+    samples = samples_of(*flown())
+    values, rows = swept(samples, forgetting=0.999)
+    memory, s, row = np.zeros(MEMORY), initial_memory(stiff=False), np.zeros((600, 5))
+    for i in range(600):
+        step(memory, s, 4.0, 0.999, 1, samples, row, i)
+        np.testing.assert_array_equal(s[[0, 2, 3]], values[i])
     used = np.isfinite(rows[:, 4])
     assert used.sum() == pytest.approx(600 - 15, abs=2)
 
@@ -122,15 +122,11 @@ def test_the_bias_of_sensor_noise_is_taken_out_when_the_noise_is_known(by_rate):
     time, fin, angle, rate = flown(20000)
     rng = np.random.default_rng(8)
     angle, rate = angle + 0.004 * rng.standard_normal(20000), rate + 0.05 * rng.standard_normal(20000)
-    share = noise_share(1 if by_rate else 2, 8.0, 0.05, angle=0.004, rate=0.05)
-    plain = Recursion(stiff=False, by_rate=by_rate, bandwidth=8.0)
-    mended = Recursion(stiff=False, by_rate=by_rate, bandwidth=8.0, noise=noise_of(share))
-    for sample in zip(time, fin, angle, rate, strict=True):
-        plain.update(*sample)
-        mended.update(*sample)
-    bias, left = (abs(r.values[0] / 1.2 - 1.0) for r in (plain, mended))
-    assert bias > 0.03
-    assert left < 0.01
+    noise = noise_of(noise_share(1 if by_rate else 2, 8.0, 0.05, angle=0.004, rate=0.05))
+    samples = samples_of(time, fin, angle, rate)
+    plain, mended = (swept(samples, by_rate=by_rate, bandwidth=8.0, noise=known)[0][-1] for known in (None, noise))
+    assert abs(plain[0] / 1.2 - 1.0) > 0.03
+    assert abs(mended[0] / 1.2 - 1.0) < 0.01
 
 
 def test_a_step_before_the_filter_has_forgotten_its_start_does_not_count():

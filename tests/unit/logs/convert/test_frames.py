@@ -13,7 +13,6 @@ from fieldsid.logs.convert.frames import (
     about_level,
     angles_of_quaternion,
     heading_of_enu,
-    quaternion_of_angles,
     to_ned_frd,
     unwrapped,
 )
@@ -23,6 +22,17 @@ FLU_TO_FRD = np.diag([1.0, -1.0, -1.0])
 ROS = Frame("ENU", "FLU")
 yaws = st.floats(-3.1, 3.1)
 pitches = st.floats(-1.5, 1.5)
+
+
+def quaternion_of_angles(yaw, pitch, roll):
+    """Body-to-world quaternions (n, 4), x y z w, of z-y-x angles (n,) in rad, both in one pair of frames."""
+    cy, sy = np.cos(yaw / 2), np.sin(yaw / 2)
+    cp, sp = np.cos(pitch / 2), np.sin(pitch / 2)
+    cr, sr = np.cos(roll / 2), np.sin(roll / 2)
+    return np.stack(
+        [sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy],
+        axis=-1,
+    )
 
 
 @given(yaws, pitches, yaws)
