@@ -43,7 +43,7 @@ from fieldsid.fitting.predict.predict import as_flown, predict
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.several.sifting import Refused
 from fieldsid.models.axis import Axis
-from fieldsid.models.definition import NONE, Definition
+from fieldsid.models.definition import NONE
 from fieldsid.models.effect import effect_held
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record, left_out
@@ -60,19 +60,19 @@ def diagnose(
     axis: Axis,
     validation: Sequence[Run] = (),
     *,
-    known: Sequence[str] = (),
-    own: Mapping[str, Definition] = NONE,
+    model: Model | None = None,
     report: Callable[[str], None] = lambda _text: None,
     thorough: bool = False,
     unfit: Refused[Run] | None = None,
 ) -> Diagnosis:
     """Return which catalogued effect the base model lacks, validated on runs it was not fitted to.
 
-    `known` names effects that are part of the base model; `own` defines those of them that are not built in. `report` is called
-    with the names of each model tried. `thorough` removes the evaluation budget (search/budget.py). `unfit` is called for each
-    run that cannot be fitted; without it, or where no training run or no validation run is left, the error is raised. Raises
-    DataError when a run cannot be fitted on the axis, EffectError when a user's effect fails.
+    `model` is one whose effects are known: the base has them, and is fitted from its values too. `report` is called with the
+    names of each model tried. `thorough` removes the evaluation budget (search/budget.py). `unfit` is called for each run that
+    cannot be fitted; without it, or where no training run or no validation run is left, the error is raised. Raises DataError
+    when a run cannot be fitted on the axis, EffectError when a user's effect fails.
     """
+    known, own = ((), NONE) if model is None else (model.effects, model.own)
     fitted, checked = records_of([training, validation], axis, unfit)
     records, unseen = [record for _, record in fitted], tuple(record for _, record in checked)
     learned, unseen, notes = (tuple(records), unseen, ()) if unseen else holdout_split(records)
@@ -85,7 +85,7 @@ def diagnose(
         raise DataError(f"`{missing[0]}` is in the model but cannot be simulated on these runs", found=unlogged[missing[0]])
     catalogue, narrow = shown_by_headings(catalogue, [*learned, *unseen], known)
     told = partial(_diagnosis, unlogged=unlogged, skipped=unlogged | narrow, notes=notes)
-    begin = partial(Search, learned, unseen, axis, catalogue, known, report, thorough=thorough)
+    begin = partial(Search, learned, unseen, axis, catalogue, known, report, thorough=thorough, given=model)
     work = begin()
     work.base()
     if not work.is_noiseless:

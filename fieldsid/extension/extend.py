@@ -10,15 +10,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
-import numpy as np
-
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.diagnosis.data.holdout_split import holdout_split
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
 from fieldsid.diagnosis.evidence.acceptance import common_own_moment, is_accepted
-from fieldsid.diagnosis.evidence.likelihood_fit import fit_maximum_likelihood, fit_output_error
 from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
-from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.diagnosis.report.final_model import final_model
 from fieldsid.diagnosis.search.search import Search
@@ -35,8 +32,6 @@ from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record, left_out
 from fieldsid.records.keys import Key
 
-EQUAL_LOG_LIKELIHOOD = 1e-3
-"""Log likelihoods that differ by less are one optimum."""
 FITTED_TO_ALL = Note(
     "fitted_to_all",
     "the runs to fit leave the addition's size open, and the unseen ones settle it: all were fitted, none is left to judge by",
@@ -151,13 +146,13 @@ def extend_in_steps(
     learned, judged, notes = (tuple(records), unseen, ()) if unseen else holdout_split(records)
     parts = _with_signals((*(effect_held(n, parent.own) for n in parent.effects), *new), [*learned, *judged])
     notes = (*notes, *left_out([run for run, _ in (*fitted, *checked)], parent.axis))
-    work = Search(learned, judged, parent.axis, parts, parent.effects, report, thorough=True)
-    line = _grown(work, parent, new)
+    work = Search(learned, judged, parent.axis, parts, parent.effects, report, thorough=True, given=parent)
+    line = _grown(work, new)
     steps = _steps(work, line, new, notes)
     if not judged or whole_of(steps).pays or not is_accepted(line[0], line[-1]):
         return steps
-    work = Search((*learned, *judged), (), parent.axis, parts, parent.effects, report, thorough=True)
-    return _steps(work, _grown(work, parent, new), new, (*notes, FITTED_TO_ALL))
+    work = Search((*learned, *judged), (), parent.axis, parts, parent.effects, report, thorough=True, given=parent)
+    return _steps(work, _grown(work, new), new, (*notes, FITTED_TO_ALL))
 
 
 def whole_of(steps: Sequence[Extension]) -> Extension:
@@ -168,13 +163,13 @@ def whole_of(steps: Sequence[Extension]) -> Extension:
     return replace(steps[-1], gain=gain, evidence=sum(s.evidence for s in steps), notes=notes)
 
 
-def _grown(work: Search, parent: Model, new: Sequence[Effect]) -> list[ScoredModel]:
+def _grown(work: Search, new: Sequence[Effect]) -> list[ScoredModel]:
     """Return the parent and what it becomes with each of the new effects after the other, refitted.
 
     The whole is grown from the best few sets of each size and from the first effects in their order; then the search goes on as
     that of `diagnose` does, with these effects alone, and keeps of each set the better optimum.
     """
-    base_from(work, parent)
+    work.base()
     line = [work.root | {e.name for e in new[:size]} for size in range(len(new) + 1)]
     front = {work.root}
     for ends in line[1:]:
@@ -231,27 +226,6 @@ def forms_taken(model: Model, new: Sequence[Effect]) -> tuple[Note, ...]:
             )
             notes.append(Note("form_taken", words, {"effect": effect.name, "coefficients": sorted(own)}))
     return tuple(notes)
-
-
-def base_from(work: Search, parent: Model) -> ScoredModel:
-    """Return the search's base, refitted from the parent's own values as well where that ends better.
-
-    Effects whose cost is not smooth have their scanned start in the parent, not in their declaration.
-    """
-    base = work.base()
-    problem = base.likelihood_fit.fitted.problem
-    layout, reference = problem.layout, problem.layout.groups.speeds[problem.layout.groups.reference]
-    given = {**parent.values, **parent.at_speed(reference)}
-    if not parent.effects or not all(np.isfinite(v) for v in given.values()):
-        return base
-    x = base.likelihood_fit.fitted.x.copy()
-    for i, name in enumerate(layout.names):
-        x[i] = given.get(name, x[i])
-    start = fit_output_error(problem, x, base.likelihood_fit.fitted.weights)
-    again = fit_maximum_likelihood(problem, start.x, base.likelihood_fit.noise, work.resolution_floor, work.noise_kind)
-    if again.log_likelihood > base.likelihood_fit.log_likelihood + EQUAL_LOG_LIKELIHOOD:
-        work.tried[work.root] = prefer_output_error(score_model(again, work.validation), work.floor)
-    return work.base()
 
 
 def new_effects(parent: Model, add: Sequence[str]) -> tuple[Effect, ...]:

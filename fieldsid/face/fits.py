@@ -105,7 +105,7 @@ def diagnose(
         raise UsageError(f"that is a {known.axis.value} model", found=f"axis {plane.value}", hint=f'write `"{known.axis.value}"`')
     learned, unseen = _both(runs, validate, mapping)
     plane = known.axis if known else plane or axis_excited(learned)
-    return diagnose_runs(learned, plane, unseen, known=() if known is None else known.effects, thorough=thorough)
+    return diagnose_runs(learned, plane, unseen, model=known, thorough=thorough)
 
 
 def extend(

@@ -73,14 +73,11 @@ def command(
     training, unseen = read_groups([runs, validate or []], mapping=mapping, check=held, meanwhile=ready, refused=skips.skip)
     axis = known.axis if known else axis or axis_excited(training)
     from fieldsid.diagnosis import diagnose
-    from fieldsid.models.definition import NONE
     from fieldsid.records.keys import body_of
     from fieldsid.results.diagnoses import Diagnosed
 
-    effects = known.effects if known else ()
     with compiling_first(context), trying("diagnosing") as report:
-        own = known.own if known else NONE
-        found = diagnose(training, axis, unseen, known=effects, own=own, report=report, thorough=thorough, unfit=skips.skip)
+        found = diagnose(training, axis, unseen, model=known, report=report, thorough=thorough, unfit=skips.skip)
     training, unseen = skips.left_of(training), skips.left_of(unseen)
     inputs = [*files_of([*training, *unseen]), *([model] if model else [])]
     told = Diagnosed(

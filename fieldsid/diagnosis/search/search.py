@@ -37,6 +37,7 @@ from fieldsid.diagnosis.moves.variant_search import VariantRequest, try_variants
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.search.accepted_sets import AcceptedSets, core_of
 from fieldsid.diagnosis.search.budget import Budget
+from fieldsid.diagnosis.search.given_model import refitted_from
 from fieldsid.diagnosis.search.whole_hull import whole_hull
 from fieldsid.diagnosis.thresholds import MAX_ERROR_RATIO, MIN_EXPLAINED_SHARE, MISSING_ERROR_RATIO, SUFFICIENT_ERROR_RATIO
 from fieldsid.fitting.covariance.noise_selection import residuals_of
@@ -44,7 +45,7 @@ from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
-from fieldsid.models.model import Noise
+from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
 from fieldsid.noise.white_floor import lowered_noise_floor, white_noise_floor
 from fieldsid.numerics.arrays import FloatArray
@@ -57,6 +58,8 @@ MAX_CANDIDATES = 8
 class Search:
     """A search on one set of runs. `known` effects are part of its base; `thorough` is one without a budget.
 
+    `given` is the model that has the known effects, where there is one: the base is fitted from its values too.
+
     `floor` is the sensors' noise as far as it has been seen, `is_noiseless` whether the base's error is more than a hundred times
     that in every measured channel.
     """
@@ -68,6 +71,7 @@ class Search:
     known: Sequence[str] = ()
     report: Callable[[str], None] = lambda _text: None
     thorough: bool = False
+    given: Model | None = None
     floor: Noise = field(init=False)
     resolution_floor: Noise = field(init=False)
     noise_kind: str = field(default="", init=False)
@@ -201,6 +205,8 @@ class Search:
             own, other = self.parallel.map(lambda way: way(), ways)
             self.tried[self.root] = own if other is None or not keeps_error(own, other) else other
             try_variants([VariantRequest(self.tried[self.root])], self.tried, self.grounds)
+            if self.given is not None:
+                self.tried[self.root] = refitted_from(self.given, self.tried[self.root], self.grounds)
         return self.tried[self.root]
 
     def _under_other_law(self, h: ScoredModel) -> ScoredModel | None:

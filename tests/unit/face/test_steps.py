@@ -133,7 +133,7 @@ def test_diagnose_and_extend_are_asked_what_the_commands_ask(inside, monkeypatch
     fs.extend(model, "pulses_*.parquet", "servo_lag+delay", validate="zigzag.parquet")
     (runs, axis, unseen), known = asked[0]
     assert ([r.name for r in runs], axis, [r.name for r in unseen]) == (["pulses_1.0", "pulses_1.4"], fs.Axis.YAW, ["zigzag"])
-    assert known == {"known": (), "thorough": True}
+    assert known == {"model": model, "thorough": True}
     (parent, add, runs, unseen), _ = asked[1]
     assert (parent, add) == (model, ("servo_lag", "delay"))
     assert ([r.name for r in runs], [r.name for r in unseen]) == (["pulses_1.0", "pulses_1.4"], ["zigzag"])

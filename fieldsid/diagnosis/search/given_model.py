@@ -1,0 +1,37 @@
+"""The base of a search that begins from a model in a file: its optimum is known, whatever a new search for it finds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.diagnosis.evidence.likelihood_fit import fit_output_error
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel
+from fieldsid.diagnosis.moves.grounds import Grounds
+from fieldsid.fitting.initial.effect_screen import carry_parameters
+from fieldsid.fitting.problem.parameters import group_name
+from fieldsid.models.axis import NAMES
+from fieldsid.models.effect import as_fitted
+from fieldsid.models.model import Model
+
+
+def refitted_from(given: Model, h: ScoredModel, grounds: Grounds) -> ScoredModel:
+    """Return a model of the same effects refitted from a given model's values, in its forms, where that has more evidence.
+
+    Effects whose cost is not smooth have their scanned start in the given model, not in their declaration; and an optimum that a
+    search has reached from below is not found again from the base.
+    """
+    fitted = h.likelihood_fit.fitted
+    groups = fitted.problem.layout.groups
+    authority = NAMES[given.axis].authority
+    speeds = enumerate(groups.speeds)
+    of_groups = {group_name(authority, groups, i): given.law.authority(u, given.values[authority]) for i, u in speeds}
+    values = {**given.values, **given.at_speed(groups.speeds[groups.reference]), **of_groups}
+    if not given.effects or not all(np.isfinite(v) for v in values.values()):
+        return h
+    problem = fitted.problem.with_effects([as_fitted(e.textbook or e, given.values) for e in h.effects])
+    x = carry_parameters(problem.layout, fitted.vector)
+    for i, name in enumerate(problem.layout.names):
+        x[i] = values.get(name, x[i])
+    start = fit_output_error(problem, x, fitted.weights)
+    found = grounds.better(h, grounds.fit(problem, start.x, h.likelihood_fit.noise))
+    return h if found is h else grounds.flown(found)
