@@ -12,7 +12,7 @@ COUNT = number(0.0, 1e15)
 RECENT = 256
 GATE: Shape = {"recent": times(RECENT, NOT_MEASURED), "seen": whole, "limit": maybe(number(0.0)), "spikes": whole}
 FILTER: Shape = {
-    "memory": times(30, ANY),
+    "memory": times(27, ANY),
     "packed": times(14, ANY),
     "late": [(ANY, NOT_MEASURED, flag, LINE)],
     "moves": [(ANY, ANY, LINE)],
