@@ -1,6 +1,6 @@
 """A model with one physical effect more, kept only where that pays, and the line of models it comes from."""
 
-from fieldsid.extension.extend import Extension, Gain, extend, extend_in_steps, whole_of
+from fieldsid.extension.extend import Extension, Gain, extend_in_steps, whole_of
 from fieldsid.extension.lineage import (
     CHANGED,
     INTACT,
@@ -25,7 +25,6 @@ __all__ = [
     "Loop",
     "LoopStep",
     "Step",
-    "extend",
     "extend_in_steps",
     "history_of",
     "kept_by",

@@ -107,19 +107,6 @@ class Extension(Plotted):
         return after < MAX_ERROR_RATIO * before and (self.gain.unseen or self.evidence > 0.0)
 
 
-def extend(
-    parent: Model,
-    add: Sequence[str],
-    training: Sequence[Run],
-    validation: Sequence[Run] = (),
-    *,
-    report: Callable[[str], None] = lambda _text: None,
-    unfit: Refused[Run] | None = None,
-) -> Extension:
-    """Return a model with effects added by name, as `extend_in_steps` finds it and raises, as one extension."""
-    return whole_of(extend_in_steps(parent, add, training, validation, report=report, unfit=unfit))
-
-
 def extend_in_steps(
     parent: Model,
     add: Sequence[str],
@@ -229,7 +216,7 @@ def forms_taken(model: Model, new: Sequence[Effect]) -> tuple[Note, ...]:
 
 
 def new_effects(parent: Model, add: Sequence[str]) -> tuple[Effect, ...]:
-    """Return the effects that are to be added to a model; raises UsageError or EffectError as `extend` does."""
+    """Return the effects that are to be added to a model; raises UsageError or EffectError as `extend_in_steps` does."""
     names = tuple(dict.fromkeys(add))
     if not names:
         raise UsageError("there is no effect to add", hint="name one: `--add servo_lag`; `sysid diagnose` says which is missing")

@@ -10,12 +10,17 @@ import pytest
 from cli.trial import vehicle
 
 from fieldsid.errors import DataError, UsageError
-from fieldsid.extension import extend
+from fieldsid.extension import extend_in_steps, whole_of
 from fieldsid.fitting.predict.predict import predict
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
 
 PLAIN = vehicle(Axis.YAW)
+
+
+def extend(*given):
+    """Return all steps of an extension as one."""
+    return whole_of(extend_in_steps(*given))
 
 
 @pytest.fixture(scope="module")
@@ -62,9 +67,7 @@ def test_an_effect_that_is_not_there_does_not_pay():
 
 
 def test_what_is_accepted_though_no_unseen_error_falls_is_fitted_to_all_runs(monkeypatch):
-    from fieldsid.extension import extend as module
-
-    monkeypatch.setattr(sys.modules[module.__module__], "is_accepted", lambda *_of: True)
+    monkeypatch.setattr(sys.modules[extend_in_steps.__module__], "is_accepted", lambda *_of: True)
     train, unseen = hidden_lag.runs(lag=0.0)
     found = extend(PLAIN, ["deadband"], train, [unseen])
     assert not found.gain.unseen

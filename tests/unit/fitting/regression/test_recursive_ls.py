@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from benchmarks.rls_speed import plain_update
 
 from fieldsid.fitting.regression.bias_compensation import noise_share
 from fieldsid.fitting.regression.recursive_ls import (
@@ -18,17 +19,6 @@ from fieldsid.fitting.regression.recursive_ls import (
 
 RNG = np.random.default_rng(4)
 UPPER = np.triu_indices(4)
-
-
-def plain_update(theta, big, phi, target, beta):
-    """Theta (p,) and P (p, p) after one row, as the equations are written."""
-    gain = big @ phi
-    spread = beta + phi @ gain
-    theta = theta + gain * ((target - phi @ theta) / spread)
-    big = big - np.outer(gain, gain) / spread
-    if float(np.diag(big).max()) < beta * INITIAL_VARIANCE:
-        big = big / beta
-    return theta, big
 
 
 def unpacked(s):
