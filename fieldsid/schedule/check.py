@@ -55,7 +55,7 @@ class StepCheck(Brief):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Check(Displayed):
-    """One speed under one set of gains: margins at the estimate (python-control) and the least over 95 % of the draws; steps.
+    """One speed under one set of gains: margins at the estimate and the least over 95 % of the draws; steps.
 
     `steps` are of the small, the standard and the large size; `unstable` how many of the draws are, `speed_least` (m/s) the
     least speed in the large step. `bent_error` is the steady error (rad) of a 3 deg fin offset that the feed-forward knows,

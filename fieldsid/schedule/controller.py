@@ -50,11 +50,6 @@ KINDS: Mapping[str, str] = MappingProxyType(
 )
 
 
-def loop(plant: LinearPlant, gains: Gains, omega: FloatArray) -> ComplexArray:
-    """Return the open loop (d, w), positive for negative feedback."""
-    return plant.response(omega) * gains.response(omega)[None, :]
-
-
 def closed_poles(plant: LinearPlant, gains: Gains) -> ComplexArray:
     """Return the closed loop's poles (d, n) of every draw, the delay by a second-order Pade approximation."""
     numerator, denominator = plant.polynomials()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
@@ -35,7 +36,7 @@ LONGEST_LAG_S = 10.0
 """No fin, link or autopilot that steers takes longer: what is above was meant in ms."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LinearPlant:
     """Coefficients (d,) over draws at one speed, the estimate first.
 
@@ -114,7 +115,7 @@ class LinearPlant:
             own = np.column_stack([np.ones_like(a), a + c, k + a * c + c_r, k * c] if coupled else [np.ones_like(a), a, k])
         return np.asarray(roots_of(own).real.max(axis=1))
 
-    @property
+    @cached_property
     def straight(self) -> FloatArray:
         """Return a, k, c, m c_r and m c_f of the equations above, (5, d): the derivative of the equations of motion."""
         out = straight_slopes(np.ascontiguousarray(self.core))

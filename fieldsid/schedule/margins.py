@@ -1,21 +1,16 @@
-"""Gain, phase and delay margins: over all draws at once on a frequency grid, and by python-control at the estimate."""
+"""Gain, phase and delay margins of all draws at once, on a frequency grid."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
-from typing import Any
 
 import numpy as np
 
-from fieldsid.errors import FieldsidError
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.schedule.controller import Gains, least_damping, loop
+from fieldsid.schedule.controller import Gains, least_damping
 from fieldsid.schedule.linear_plant import LinearPlant
 
 FREQUENCY_GRID_RAD_S = np.geomspace(1e-3, 200.0, 1500)
-CONTROL_GRID_RAD_S = FREQUENCY_GRID_RAD_S[::3]
-"""The grid that python-control lays a spline through, for which it takes time in proportion."""
 HELD_SHARE = 0.95
 """Share of the draws that a number of the identified set speaks for."""
 
@@ -105,27 +100,3 @@ def _read_off(size: FloatArray, phase: FloatArray, log_omega: FloatArray, dampin
         crossover,
         damping,
     )
-
-
-def python_control() -> Any:
-    """Return the module; raises FieldsidError where python-control is not installed."""
-    try:
-        return import_module("control")
-    except ImportError as error:
-        raise FieldsidError("python-control is not installed", found=str(error), hint="pip install control") from error
-
-
-def control_margins(plant: LinearPlant, gains: Gains) -> tuple[float, float, float]:
-    """Return phase (deg), gain (dB) and delay (s) margin of the estimate by python-control, from its frequency response.
-
-    Raises FieldsidError when python-control is not installed.
-    """
-    control = python_control()
-    response = loop(plant.one(), gains, CONTROL_GRID_RAD_S)[0]
-    system = control.FrequencyResponseData(response, CONTROL_GRID_RAD_S, smooth=True)
-    gain, phase, _, _, phase_crossing, _ = control.stability_margins(system)
-    delay = np.radians(phase) / phase_crossing if np.isfinite(phase_crossing) and phase_crossing > 0 else np.inf
-    gain_db = 20 * np.log10(gain) if gain > 1.0 else np.inf
-    if least_damping(plant.one(), gains)[0] < 0.0:
-        return -min(abs(float(phase)), 180.0), 0.0, 0.0
-    return float(phase), float(gain_db), float(delay)

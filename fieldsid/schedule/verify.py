@@ -32,7 +32,7 @@ from fieldsid.schedule.flown.response import (
 )
 from fieldsid.schedule.flown.straight_leg import straight_leg
 from fieldsid.schedule.linear_plant import PARTS, FinLimits, LinearPlant
-from fieldsid.schedule.margins import HELD_SHARE, control_margins, margins, worst_of
+from fieldsid.schedule.margins import HELD_SHARE, margins, worst_of
 from fieldsid.schedule.plants import Plants, models_plants, plants_of
 from fieldsid.schedule.record import Row, Schedule
 from fieldsid.schedule.rows import DESIGN_DRAWS, place_of
@@ -235,8 +235,8 @@ class _Flight:
 
 def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) -> tuple[Check, tuple[Steps, Steps, Steps], Steps]:
     plant, pace, schedule = flight.plant, flight.pace, flight.schedule
-    phase, gain, delay = control_margins(plant, row.gains)
     found = margins(plant, row.gains)
+    phase, gain, delay = (float(part[0]) for part in (found.phase_deg, found.gain_db, found.delay_s))
     least_phase, least_gain, least_delay = found.worst()
     sizes = steps_of(schedule)
     flights = [_flown_to_rest(plant, rows, size, pace) for size in sizes]

@@ -6,18 +6,27 @@ angle and rate, its output is the fin without the feed-forward. A delay is a Pad
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 
+from fieldsid.errors import FieldsidError
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
 from fieldsid.plant.parameter_source import source_of_models
 from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, plants_at
-from fieldsid.schedule.margins import python_control
 from fieldsid.schedule.record import Row
 
 PADE_ORDER = 4
+
+
+def python_control() -> Any:
+    """Return the module; raises FieldsidError where python-control is not installed."""
+    try:
+        return import_module("control")
+    except ImportError as error:
+        raise FieldsidError("python-control is not installed", found=str(error), hint="pip install control") from error
 
 
 def model_system(model: Model, speed: float | None) -> Any:

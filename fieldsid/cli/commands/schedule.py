@@ -237,7 +237,7 @@ def verify(
 ) -> Mapping[str, Any]:
     """Check a schedule at its knots and between, over the errors of the models, against the best one gain for all speeds.
 
-    The first line is the verdict, the second what it rests on. Margins by python-control; steps of three sizes flown with the
+    The first line is the verdict, the second what it rests on. Margins; steps of three sizes flown with the
     fin's limit, rate, lag and delay, the hull's drag in the turn and the speed lost in it; a straight leg in the disturbance of
     the models' runs. The least and the most are over 95 % of the draws. A gate that fails makes the exit code 1. With `-o FILE` a
     figure is drawn.
