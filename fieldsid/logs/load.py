@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from fieldsid.logs.mapping.certain import Certain
 
 MAPPING_FILE = "mapping.yaml"
+WANTED = frozenset({"yaw_rad", "yaw_rate_rad_s", "surge_m_s"})
+"""Signals that are looked for under other names too, where a log's own names give what an axis needs without them."""
 NEAR_SHOWN = 4
 """Columns of which a message says what they may be."""
 
@@ -112,11 +114,14 @@ def map_for(
         chosen = None if file is None else _loaded(file)
     complete = chosen_map(None, chosen, channels)
     is_open = mapping is None and not channels and (chosen is None or chosen.origin is None)
-    if complete is None or (recognise and is_open and not is_enough(complete.sources)):
+    told = frozenset[str]() if complete is None else frozenset(complete.sources)
+    if complete is None or (recognise and is_open and not (is_enough(told) and told >= WANTED)):
         found = reader.inventory(path, options, TableForm())
         certain = _recognised(found, reader, options) if recognise and is_open else None
-        if certain is not None and certain.mapping is not None and certain.note is not None:
-            return certain.mapping, [certain.note]
+        mapped = None if certain is None else certain.mapping
+        # what a log's own names tell is sure: where that is enough, others join it and replace none of it
+        if certain is not None and mapped is not None and (not is_enough(told) or told < mapped.sources.keys()):
+            return mapped, list(certain.notes)
         if complete is None:
             raise _unmapped(path, reader, options, found, {} if certain is None else certain.doubts)
     if complete.origin is not None:

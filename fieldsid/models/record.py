@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from fieldsid.display import Brief
 from fieldsid.errors import DataError, EffectError
+from fieldsid.logs.convert.faults.spikes import spikes_of
 from fieldsid.logs.doctor.angle_and_rate import refuse_contradiction
 from fieldsid.logs.doctor.fin_findings import refuse_no_angle
 from fieldsid.logs.doctor.holes import JITTER, hole_notes, is_usual, unbroken
-from fieldsid.logs.doctor.spikes import spikes_of
 from fieldsid.logs.run import STEP_LINES, Note, Run
 from fieldsid.logs.segments import no_fin
 from fieldsid.models.axis import NAMES, Axis

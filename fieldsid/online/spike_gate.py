@@ -1,4 +1,4 @@
-"""Spikes taken out of signals as their samples come, two samples late: the rule of `logs/doctor/spikes.py` on a window."""
+"""Spikes taken out of signals as their samples come, two samples late: the rule of `convert/faults/spikes.py` on a window."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from math import inf, isfinite, nan
 
 import numpy as np
 
-from fieldsid.logs.doctor.spikes import spike_limit
+from fieldsid.logs.convert.faults.spikes import spike_limit
 from fieldsid.numerics.arrays import FloatArray
 
 LOOKED_AT, EVERY = 256, 128

@@ -29,6 +29,40 @@ def test_identify_reads_what_is_clear_and_says_how_in_one_line(run_cli, tmp_path
     assert "read_as" not in {w["code"] for w in fit["warnings"]}
 
 
+def test_columns_that_are_no_names_of_ours_join_those_that_are(run_cli, tmp_path):
+    columns = {"time_s": TRUTH["time_s"], "yaw_rate_rad_s": TRUTH["yaw_rate_rad_s"], "rudder_rad": TRUTH["rudder_rad"],
+               "heading_deg": np.degrees(TRUTH["yaw_rad"]), "speed_mps": TRUTH["surge_m_s"]}  # fmt: skip
+    done = run_cli("identify", write_table(tmp_path / "boat.csv", columns), "--axis", "yaw", "--no-figures", "--json")
+    assert done.code == 0, done.err
+    assert done.json["fits"][0]["speed_m_s"] == pytest.approx(1.5, rel=0.01)
+    assert "yaw from heading_deg (deg)" in done.err
+    assert "ignored_columns" not in done.out
+
+
+def test_a_vehicle_that_turns_in_a_plane_may_send_a_quaternion(run_cli, tmp_path):
+    half = 0.5 * TRUTH["yaw_rad"]
+    nil = np.zeros_like(half)
+    columns = {"time": TRUTH["time_s"], "qw": np.cos(half), "qx": nil, "qy": nil, "qz": np.sin(half),
+               "RudderDeg": TRUTH["rudder_rad"] / DEG, "SpeedKts": TRUTH["surge_m_s"] * 3600 / 1852}  # fmt: skip
+    done = run_cli("identify", write_table(tmp_path / "boat.csv", columns), "--axis", "yaw", "--no-figures", "--json")
+    assert done.code == 0, done.err
+    assert done.json["fits"][0]["parameters"]["b2"]["value"] == pytest.approx(B2, rel=0.01)
+
+
+def test_numbers_that_stand_for_nothing_are_missing_and_not_fitted(run_cli, tmp_path):
+    odd = {"HeadDeg": (-999.25, 37), "GyroZ_dps": (0.0, 41), "SpeedKts": (9999.0, 51)}
+    columns = {name: TRUTH[signal] / factor for name, (signal, factor) in CLEAR.items()}
+    for name, (number, every) in odd.items():
+        columns[name] = columns[name].copy()
+        columns[name][5::every] = number
+    done = run_cli("identify", write_table(tmp_path / "boat.csv", columns), "--axis", "yaw", "--no-figures", "--json")
+    assert done.code == 0, done.err
+    fit = done.json["fits"][0]
+    assert fit["parameters"]["a22"]["value"] == pytest.approx(A22, rel=0.01)
+    assert fit["speed_m_s"] == pytest.approx(1.5, rel=0.01)
+    assert "are missing now" in next(w["message"] for w in fit["warnings"] if w["code"] == "dropouts")
+
+
 @pytest.mark.parametrize("command", ["diagnose", "live", "batch"])
 def test_the_other_commands_read_it_too(run_cli, tmp_path, command):
     more = {"live": ("--speed", "0"), "batch": ("-o", tmp_path / "out")}.get(command, ())

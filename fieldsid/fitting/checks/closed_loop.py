@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.errors import DataError
-from fieldsid.logs.doctor.spikes import last_digit
+from fieldsid.logs.convert.faults.spikes import last_digit
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import NAMES
 from fieldsid.models.record import Record

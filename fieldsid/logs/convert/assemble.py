@@ -13,9 +13,10 @@ from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, ChannelMap, Source
 from fieldsid.logs.convert.clock import Track, one_clock, summed
 from fieldsid.logs.convert.conditioning import MAX_GAP_S, in_order, possible, refuse_impossible_steps, refuse_long_gaps
+from fieldsid.logs.convert.faults.dropouts import SENSED, without_dropouts
+from fieldsid.logs.convert.faults.heading_fills import without_fills
 from fieldsid.logs.convert.frames import SWAPPED_BY_WORLD, about_level, angles_of_quaternion, to_ned_frd
 from fieldsid.logs.convert.geodetic import north_and_east
-from fieldsid.logs.convert.heading_fills import without_fills
 from fieldsid.logs.convert.heading_unwrap import unwrapped_over
 from fieldsid.logs.convert.readings import by_reading
 from fieldsid.logs.convert.servo_counts import counts_unit, turned_from_counts
@@ -64,6 +65,9 @@ def assemble(
         raise MappingError(
             f"{mapping.place} maps no signal", found="an empty `signals`", hint=f"map one of those that {_inspect(path)} shows"
         )
+    for name in [n for n in tracks if n in SENSED]:
+        values, fills = without_dropouts(name, tracks[name].values)
+        tracks[name], notes = replace(tracks[name], values=values), notes + fills
     if "yaw_rad" in tracks:
         tracks["yaw_rad"], fills = without_fills(tracks["yaw_rad"])
         tracks["yaw_rad"], lines = unwrapped_over(tracks["yaw_rad"], tracks.get("yaw_rate_rad_s"), mapping.gap_factor)

@@ -12,7 +12,7 @@ from collections.abc import Container
 import numpy as np
 
 from fieldsid.errors import DataError
-from fieldsid.logs.doctor.spikes import DIGITS, last_digit
+from fieldsid.logs.convert.faults.spikes import DIGITS, last_digit
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray

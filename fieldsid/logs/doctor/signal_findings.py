@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.logs.convert.faults.dropouts import dropout_findings
+from fieldsid.logs.convert.faults.spikes import spikes_of
 from fieldsid.logs.convert.servo_counts import FINS, servo_of
-from fieldsid.logs.doctor.dropouts import dropout_findings
 from fieldsid.logs.doctor.pair_findings import goes_with_way
-from fieldsid.logs.doctor.spikes import spikes_of
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import GOALS, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray

@@ -32,10 +32,10 @@ OF_ALL = frozenset({"rate_guessed", "time_guessed", "time_unit"})
 
 @dataclass(frozen=True, slots=True)
 class Certain:
-    """A mapping that is used unasked with the note that says it, or none; and why signals are in doubt."""
+    """A mapping that is used unasked with the notes that say so, or none; and why signals are in doubt."""
 
     mapping: ChannelMap | None
-    note: Note | None
+    notes: tuple[Note, ...]
     doubts: Mapping[str, str]
 
 
@@ -48,8 +48,8 @@ def certain_of(proposal: Proposal) -> Certain:
     doubts = _doubts(signals, notes)
     sure = {s: item for s, item in signals.items() if s not in doubts}
     if proposal.run is None or not is_enough(sure) or any(n.code in OF_ALL for n in notes):
-        return Certain(None, None, MappingProxyType(doubts))
-    return Certain(mapping_of(proposal.body | {"signals": sure}), _said(sure, doubts), MappingProxyType(doubts))
+        return Certain(None, (), MappingProxyType(doubts))
+    return Certain(mapping_of(proposal.body | {"signals": sure}), (_said(sure, doubts),), MappingProxyType(doubts))
 
 
 def _doubts(signals: Mapping[str, Any], notes: Iterable[Note]) -> dict[str, str]:
@@ -62,8 +62,10 @@ def _doubts(signals: Mapping[str, Any], notes: Iterable[Note]) -> dict[str, str]
             found[note.data["signal"]] = "only the numbers say so"
         elif note.code in SAID:
             found |= {s: SAID[note.code] for s in named if s in signals or s in ANGLES}
-    if ATTITUDE in signals and set(ANGLES) & found.keys():
-        found[ATTITUDE] = found[next(s for s in ANGLES if s in found)]
+    if ATTITUDE in signals and (angles := [s for s in ANGLES if s in found]):
+        # in a plane two of its angles never move
+        moves = [s for s in angles if found[s] != SAID["constant"]]
+        found |= {ATTITUDE: found[moves[0] if moves else angles[0]]} if moves or len(angles) == len(ANGLES) else {}
     return found
 
 

@@ -9,11 +9,12 @@ rests is one that many jumps end at.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.logs.doctor.spikes import DIGITS, OF_MEDIAN, SPREADS, last_digit
+from fieldsid.logs.convert.faults.spikes import DIGITS, OF_MEDIAN, SPREADS, last_digit
 from fieldsid.logs.run import GOALS, SIGNALS, Note
 from fieldsid.numerics.arrays import FloatArray
 
@@ -47,17 +48,53 @@ def _as_many(count: int, usual: float) -> float:
     return max(1.0 - sum(math.exp(-usual + i * math.log(usual) - math.lgamma(i + 1)) for i in range(count)), 0.0)
 
 
-@np.errstate(over="ignore", invalid="ignore")
+@dataclass(frozen=True, slots=True)
+class Dropout:
+    """A number that stands where a sensor had nothing: how often it was jumped to, and how many samples it has."""
+
+    number: float
+    count: int
+    samples: int
+
+    def note(self, name: str, now: str) -> Note:
+        """Return the finding that a signal jumps to one number and back, time and again; `now` says what is done about it."""
+        unit, number = SIGNALS[name], f"{self.number:.6g}"
+        if unit in ("rad", "rad/s"):  # most logs have it in degrees
+            number += f" {unit} ({math.degrees(self.number):.6g} {unit.replace('rad', 'deg')})"
+        message = (
+            f"{name} jumps to exactly {number} and back {self.count} times, {self.samples} samples in all (limit {FEWEST}): what "
+            f"its sensor or logger writes where it has nothing; {now}"
+        )
+        data = {"signal": name, "value": self.count, "limit": FEWEST, "number": self.number, "samples": self.samples}
+        return Note("dropouts", message, data)
+
+
+def without_dropouts(name: str, values: FloatArray) -> tuple[FloatArray, list[Note]]:
+    """Return a signal (n,) with its drop-outs missing, and the notes that say so."""
+    notes = list[Note]()
+    while (found := _dropout_of(name, values[np.isfinite(values)])) is not None:
+        notes.append(found.note(name, "they are missing now"))
+        values = np.where(values == found.number, np.nan, values)
+    return values, notes
+
+
 def dropout_findings(name: str, values: FloatArray) -> list[Note]:
     """Return the finding that a signal (n,) without gaps jumps to one number and back; none where it does not."""
+    found = _dropout_of(name, values)
+    return [] if found is None else [found.note(name, "leave those cells empty")]
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def _dropout_of(name: str, values: FloatArray) -> Dropout | None:
+    """Return the number to which a signal (n,) without gaps jumps and back time and again; None where it does not."""
     if name not in SENSED or values.size < 20:
-        return []
+        return None
     steps = np.diff(values)
     usual = float(np.median(np.abs(np.diff(values, 2))))
     limit = max(SPREADS * OF_MEDIAN * usual, DIGITS * last_digit(values), 1e-12)
     far = np.flatnonzero(np.abs(steps) > limit)
     if far.size < 2 * FEWEST:
-        return []
+        return None
     numbers, counts = np.unique(values[far + 1] + 0.0, return_counts=True)  # a zero has no sign
     k = int(np.argmax(counts))
     number, count = float(numbers[k]), int(counts[k])
@@ -65,9 +102,5 @@ def dropout_findings(name: str, values: FloatArray) -> list[Note]:
     samples = int(np.count_nonzero(values == number))
     chance = max(_chance(count, np.delete(counts, k)), _as_many(count, far.size * samples / values.size))
     if count < FEWEST or left < FEWEST - 1 or chance > MOST_CHANCE:
-        return []
-    message = (
-        f"{name} jumps to exactly {number:.6g} and back {count} times, {samples} samples in all (limit {FEWEST}): what its "
-        "sensor or logger writes where it has nothing; leave those cells empty"
-    )
-    return [Note("dropouts", message, {"signal": name, "value": count, "limit": FEWEST, "number": number, "samples": samples})]
+        return None
+    return Dropout(number, count, samples)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fieldsid.logs.doctor.dropouts import dropout_findings
+from fieldsid.logs.convert.faults.dropouts import dropout_findings
 
 
 def jumpy(seed: int, digit: float, count: int = 6000) -> np.ndarray:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fieldsid.logs.doctor.spikes import spikes_of
+from fieldsid.logs.convert.faults.spikes import spikes_of
 
 N = 1200
 TIME = 0.05 * np.arange(N)

@@ -7,7 +7,7 @@ from truth.commanded import Commanded, pulses
 from fieldsid.fitting.fit import fit
 from fieldsid.logs import Run
 from fieldsid.logs.convert.clock import Track
-from fieldsid.logs.convert.heading_fills import without_fills
+from fieldsid.logs.convert.faults.heading_fills import without_fills
 from fieldsid.logs.convert.heading_unwrap import unwrapped_over
 from fieldsid.logs.load import load_run
 from fieldsid.models.axis import Axis
