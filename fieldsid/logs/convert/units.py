@@ -61,6 +61,7 @@ _PLAIN: Mapping[str, Mapping[str, tuple[float, str]]] = {
         "Pa": (1.0, "pascal pascals"),
         "hPa": (1e2, "hectopascal hectopascals"),
         "kPa": (1e3, "kilopascal kilopascals"),
+        "MPa": (1e6, "megapascal megapascals"),
         "mbar": (1e2, "millibar millibars mb"),
         "dbar": (1e4, "decibar decibars"),
         "bar": (1e5, "bars"),

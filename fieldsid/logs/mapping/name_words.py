@@ -10,6 +10,7 @@ from fieldsid.logs.mapping.vocabulary import GLIDER, KNOWN
 
 _BRACKET = re.compile(r"[\[({]([^\])}]*)[\])}]")
 _WORD = re.compile(r"[A-Z]+[a-z]*|[a-z]+|\d+")
+_PASCALS = re.compile(r"[kMh]Pa(?![a-z])")
 _OF_GLIDER = re.compile(r"^[mc]_[a-z]")
 _DEGREE = re.compile("[°º]")
 _INVERSE = re.compile(r"(?<=[A-Za-z])\^?-1\b|⁻¹")
@@ -28,7 +29,7 @@ SHORTEST = 3
 def tokens_of(name: str) -> tuple[str, ...]:
     """Return the lower-case words of a name with those of its unit, but for a unit in brackets: `DepthFt` gives depth, ft."""
     bare = _BRACKET.sub(lambda m: " " if m[1] and find_unit(m[1]) is not None and not m[1].isdigit() else m[0], name.strip())
-    bare = _INVERSE.sub("", _DEGREE.sub("deg", bare))
+    bare = _INVERSE.sub("", _PASCALS.sub(lambda m: f" {m[0].lower()} ", _DEGREE.sub("deg", bare)))
     glider = _OF_GLIDER.match(name)
     words = [w for part in _WORD.findall(bare[2:] if glider else bare) for run in _by_case(part) for w in _unglued(run)]
     return (*((GLIDER[name[0]],) if glider else ()), *(w for w in words if w != "per"))
