@@ -34,6 +34,11 @@ class Unit:
     factor: float
 
 
+UNIT_LIMIT = 0.15
+"""By how much of itself a ratio may be off that of a unit, and the signal still be in it."""
+CLEARLY = 2.0
+"""How many times as near as the next a unit must be."""
+
 _PLAIN: Mapping[str, Mapping[str, tuple[float, str]]] = {
     "angle": {
         "rad": (1.0, "radian radians rads"),
@@ -193,3 +198,9 @@ def scaled(values: FloatArray, factor: float) -> FloatArray:
 def depth_of_pressure(pressure_pa: FloatArray, *, density: float, surface_pa: float, gravity: float = GRAVITY) -> FloatArray:
     """Return depth in m, positive down, of an absolute pressure (n,) in Pa: (p - p_surface) / (rho g)."""
     return np.asarray((pressure_pa - surface_pa) / (density * gravity))
+
+
+def unit_of_ratio(ratio: float, units: Mapping[str, float]) -> str | None:
+    """Return the unit whose factor the ratio of what is true to what is said is near to, and clearly nearer than to others'."""
+    off = sorted((abs(ratio / factor - 1.0), name) for name, factor in units.items())
+    return off[0][1] if off[0][0] < min(UNIT_LIMIT, off[1][0] / CLEARLY) else None

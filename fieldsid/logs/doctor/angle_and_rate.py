@@ -13,6 +13,7 @@ import numpy as np
 
 from fieldsid.errors import DataError
 from fieldsid.logs.convert.faults.spikes import DIGITS, last_digit
+from fieldsid.logs.convert.units import UNITS, unit_of_ratio
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
@@ -38,6 +39,8 @@ FITS_BETTER = 2.5
 ROUNDING = 1e-12
 """Circular variance below which there is none."""
 DEGREES = 180.0 / math.pi
+RATES = {u.name: u.factor for u in UNITS.values() if u.dimension == "angle rate"}
+"""Units in which a rate is logged, in rad/s."""
 LAG_S = 1.0
 """Longest clock offset looked for."""
 
@@ -257,13 +260,21 @@ def _of_slope(angle: str, rate: str, slope: float, stated: Stated) -> list[Note]
         found.append(
             Note("unit", f"{angle} changes {size:.3g} times as fast as {rate} says: {advice}", {**data, "signal": angle, **unit})
         )
-    elif 0.7 < size * DEGREES < 1.4:
-        advice, unit = _in_degrees(rate, "deg/s", angle, stated)
-        found.append(Note("unit", f"{rate} is {1 / size:.3g} times the change of {angle}: {advice}", {**data, **unit}))
+    elif goes_as := _unit_of_rate(rate, size, stated):
+        advice, unit = _in_degrees(rate, goes_as, angle, stated)
+        message = f"{rate} is {1 / size:.3g} times the change of {angle}, as numbers in {goes_as} are: {advice}"
+        found.append(Note("unit", message, {**data, "goes_as": goes_as, **unit}))
     elif abs(size - 1.0) > SLOPE_LIMIT:
         message = f"{angle} changes {size:.3g} times as fast as {rate} says (limit 1 +/- {SLOPE_LIMIT:g}): check both scales"
         found.append(Note("rate_scale", message, {**data, "limit": SLOPE_LIMIT}))
     return found
+
+
+def _unit_of_rate(rate: str, size: float, stated: Stated) -> str | None:
+    """Return the unit in which a rate goes with its angle, by how many times as fast that changes; None where it is its own."""
+    own = SIGNALS[rate] if stated.is_si(rate) else stated.units[rate]
+    unit = unit_of_ratio(size * RATES[own], RATES) if size > 0.0 and own in RATES else None
+    return None if unit == own else unit
 
 
 def _in_degrees(large: str, unit: str, small: str, stated: Stated) -> tuple[str, dict[str, str]]:

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.logs.convert.units import factor_to
+from fieldsid.logs.convert.units import UNIT_LIMIT, factor_to
 from fieldsid.logs.doctor.angle_and_rate import TRUSTED
-from fieldsid.logs.doctor.pair_findings import SPEEDS, UNIT_LIMIT, goes_with_way
+from fieldsid.logs.doctor.pair_findings import SPEEDS, goes_with_way
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from fieldsid.logs.convert.units import factor_to
+from fieldsid.logs.convert.units import factor_to, unit_of_ratio
 from fieldsid.logs.doctor.angle_and_rate import LAG_S, TRUSTED
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.shifted_correlation import lag_of, slope_of
 from fieldsid.numerics.trapezoid import trapezoid_integral
 
-UNIT_LIMIT = 0.15
-"""By how much of itself a ratio may be off that of a unit, and the signal still be in it."""
-CLEARLY = 2.0
-"""How many times as near as the next a unit must be."""
 SPEEDS = {unit: factor_to("surge_m_s", unit) for unit in ("kn", "mph", "km/h", "ft/s", "cm/s", "mm/s")}
 """Units in which a speed is logged, in m/s."""
 LEAST_WAY, MOST_WAY = 0.6, 1.5
@@ -59,12 +53,6 @@ def goes_with_way(run: Run) -> bool:
     """Whether the way made by x and y is that of the speed."""
     ratio = _way_by_speed(run)
     return ratio is not None and LEAST_WAY < ratio < MOST_WAY
-
-
-def unit_of_ratio(ratio: float, units: Mapping[str, float]) -> str | None:
-    """Return the unit whose factor the ratio of what is true to what is said is near to, and clearly nearer than to others'."""
-    off = sorted((abs(ratio / factor - 1.0), name) for name, factor in units.items())
-    return off[0][1] if off[0][0] < min(UNIT_LIMIT, off[1][0] / CLEARLY) else None
 
 
 def _way_by_speed(run: Run) -> float | None:

@@ -58,6 +58,10 @@ FAULTS = {
     "rate_sign": lambda r: (("rate_sign", "yaw_rate_rad_s"), {"yaw_rate_rad_s": -r["yaw_rate_rad_s"]}),
     "angle in degrees": lambda r: (("unit", "yaw_rad"), {"yaw_rad": np.degrees(r["yaw_rad"])}),
     "rate in degrees": lambda r: (("unit", "pitch_rate_rad_s"), {"pitch_rate_rad_s": np.degrees(r["pitch_rate_rad_s"])}),
+    "rate in degrees a minute": lambda r: (
+        ("unit", "yaw_rate_rad_s"),
+        {"yaw_rate_rad_s": 60.0 * np.degrees(r["yaw_rate_rad_s"])},
+    ),
     "rate scale": lambda r: (("rate_scale", "yaw_rate_rad_s"), {"yaw_rate_rad_s": 0.5 * r["yaw_rate_rad_s"]}),
     "late angle": lambda r: (("clock_offset", "yaw_rad"), {"yaw_rad": np.interp(r.time - 0.3, r.time, r["yaw_rad"])}),
     "knots": lambda r: (("speed_unit", "surge_m_s"), {"surge_m_s": r["surge_m_s"] / 0.5144}),
