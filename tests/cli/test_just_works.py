@@ -63,6 +63,17 @@ def test_numbers_that_stand_for_nothing_are_missing_and_not_fitted(run_cli, tmp_
     assert "are missing now" in next(w["message"] for w in fit["warnings"] if w["code"] == "dropouts")
 
 
+def test_a_compass_slower_than_the_rows_counts_once_for_each_of_its_numbers(run_cli, tmp_path):
+    columns = {name: TRUTH[signal] / factor for name, (signal, factor) in CLEAR.items()}
+    del columns["GyroZ_dps"]
+    columns["HeadDeg"] = columns["HeadDeg"][np.arange(TRUTH["time_s"].size) // 4 * 4]
+    done = run_cli("identify", write_table(tmp_path / "boat.csv", columns), "--axis", "yaw", "--no-figures", "--json")
+    assert done.code == 0, done.err
+    fit = done.json["fits"][0]
+    assert fit["parameters"]["a22"]["value"] == pytest.approx(A22, rel=0.01)
+    assert "repeated" in {w["code"] for w in fit["warnings"]}
+
+
 @pytest.mark.parametrize("command", ["diagnose", "live", "batch"])
 def test_the_other_commands_read_it_too(run_cli, tmp_path, command):
     more = {"live": ("--speed", "0"), "batch": ("-o", tmp_path / "out")}.get(command, ())

@@ -208,7 +208,7 @@ DAMAGES = (
     Damage("a gap of 5 s", gap, ("time_gap", "no samples for")),
     Damage("jitter of stamps", jittered, ("jitter",)),
     Damage("time in ms", scaled("time_s", 1e3), ("time_unit", "goes on by")),
-    Damage("heading at 1 Hz under the rest", held("yaw_rad", 1.0), ("coarse",)),
+    Damage("heading at 1 Hz under the rest", held("yaw_rad", 1.0), ("repeated",)),
     Damage("roll of 40 deg", rolled, ("rolled",)),
     Damage("fin 1 Hz under the rest", held("rudder_rad", 1.0), (), "the fin as it was measured, or the time of each command"),
     Damage("fin 0.3 s early", shifted("rudder_rad", -0.3), (), "the fin as it was measured: a servo may be as slow"),

@@ -15,6 +15,7 @@ from fieldsid.logs.convert.clock import Track, one_clock, summed
 from fieldsid.logs.convert.conditioning import MAX_GAP_S, in_order, possible, refuse_impossible_steps, refuse_long_gaps
 from fieldsid.logs.convert.faults.dropouts import SENSED, without_dropouts
 from fieldsid.logs.convert.faults.heading_fills import without_fills
+from fieldsid.logs.convert.faults.repeats import without_repeats
 from fieldsid.logs.convert.frames import SWAPPED_BY_WORLD, about_level, angles_of_quaternion, to_ned_frd
 from fieldsid.logs.convert.geodetic import north_and_east
 from fieldsid.logs.convert.heading_unwrap import unwrapped_over
@@ -66,8 +67,9 @@ def assemble(
             f"{mapping.place} maps no signal", found="an empty `signals`", hint=f"map one of those that {_inspect(path)} shows"
         )
     for name in [n for n in tracks if n in SENSED]:
-        values, fills = without_dropouts(name, tracks[name].values)
-        tracks[name], notes = replace(tracks[name], values=values), notes + fills
+        values, held = without_repeats(name, tracks[name].values)
+        values, fills = without_dropouts(name, values)
+        tracks[name], notes = replace(tracks[name], values=values), notes + held + fills
     if "yaw_rad" in tracks:
         tracks["yaw_rad"], fills = without_fills(tracks["yaw_rad"])
         tracks["yaw_rad"], lines = unwrapped_over(tracks["yaw_rad"], tracks.get("yaw_rate_rad_s"), mapping.gap_factor)

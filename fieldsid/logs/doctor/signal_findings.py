@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.logs.convert.faults.dropouts import dropout_findings
+from fieldsid.logs.convert.faults.repeats import held_for
 from fieldsid.logs.convert.faults.spikes import spikes_of
 from fieldsid.logs.convert.servo_counts import FINS, servo_of
 from fieldsid.logs.doctor.pair_findings import goes_with_way
@@ -115,7 +116,7 @@ def _coarse(name: str, values: FloatArray) -> list[Note]:
     share = float(np.mean(steps == 0.0))
     moved = steps[steps > 0.0]
     levels = float(np.ptp(values)) / float(moved.min()) if moved.size else 0.0
-    every = _held_for(steps)
+    every = held_for(np.flatnonzero(steps > 0.0))
     if every > 1:
         message = (
             f"{name} changes at every {every}th sample only ({moved.size} times): it was taken at a lower rate and repeated; log "
@@ -129,19 +130,6 @@ def _coarse(name: str, values: FloatArray) -> list[Note]:
         f"one (limit {100 * COARSE_LIMIT:.0f} %); log it with more digits or at its own rate"
     )
     return [Note("coarse", message, {"signal": name, "value": share, "limit": COARSE_LIMIT, "step": float(moved.min())})]
-
-
-def _held_for(steps: FloatArray) -> int:
-    """Return for how many samples each value of a signal with such steps (n,) is held, where it is for always as many; else 1.
-
-    That n changes fall on every m-th sample by chance has the probability m^(1-n): ten are no chance.
-    """
-    places = np.flatnonzero(steps > 0.0)
-    if places.size < 10:
-        return 1
-    apart = np.diff(places)
-    every = int(np.gcd.reduce(apart))
-    return every if every == int(np.median(apart)) else 1
 
 
 def _spikes(name: str, time: FloatArray, values: FloatArray) -> list[Note]:

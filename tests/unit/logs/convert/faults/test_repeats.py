@@ -1,0 +1,39 @@
+"""What a slower sensor's number is repeated by is missing; what moves at its own rate, or in coarse steps, stays."""
+
+import numpy as np
+import pytest
+
+from fieldsid.logs.convert.faults.repeats import without_repeats
+
+RANDOM = np.random.default_rng(4)
+MOVING = np.sin(0.02 * np.arange(600)) + 0.003 * RANDOM.standard_normal(600)
+
+
+@pytest.mark.parametrize("phase", [0, 1])
+@pytest.mark.parametrize("every", [2, 5])
+def test_of_each_number_the_first_sample_stays(every, phase):
+    at = (np.arange(600) - phase) // every * every + phase
+    held = MOVING[at.clip(0)]
+    own, (note,) = without_repeats("yaw_rad", held)
+    fresh = np.arange(phase, 600, every)
+    assert np.flatnonzero(np.isfinite(own)).tolist() == fresh.tolist()
+    assert (own[fresh] == MOVING[fresh]).all()
+    assert note.code == "repeated"
+    assert note.data["value"] == every
+
+
+def test_a_number_that_comes_twice_is_a_sample_of_its_own():
+    held = np.repeat(np.round(MOVING[::5], 1), 5)
+    own, notes = without_repeats("yaw_rad", held)
+    assert notes
+    assert np.isfinite(own).sum() == held.size // 5
+
+
+OWN = (MOVING, np.round(MOVING, 1), np.repeat(MOVING[:40], 15)[::7], np.zeros(600), np.full(600, np.nan))
+
+
+@pytest.mark.parametrize("values", OWN)
+def test_a_signal_of_its_own_rate_is_left_as_it_is(values):
+    own, notes = without_repeats("yaw_rad", values)
+    assert not notes
+    assert own is values
