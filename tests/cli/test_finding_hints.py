@@ -13,8 +13,8 @@ from fieldsid.logs.run import EXPLAINING
 
 LINE = re.compile(r"`(\w+): ([^`]+)`(?: at ((?:\w+ (?:or|and) )*\w+))?")
 OPTIONS = re.compile(r"`(--(?:from|to) [^`]+)`")
-TOLD_IN_WORDS = {"spikes", "disagree", "dropouts", "repeated", "coarse", "constant", "missing", "jitter", "swapped",
-                 "unrelated", "clock_offset", "fin_late", "course_slope", "course_offset", "rate_scale", "wrap_interpolated"}  # fmt: skip
+TOLD_IN_WORDS = {"spikes", "disagree", "dropouts", "repeated", "coarse", "constant", "missing", "jitter", "swapped", "unrelated",
+                 "clock_offset", "fin_late", "course_slope", "course_offset", "rate_scale", "wrap_interpolated"}  # fmt: skip
 """Findings whose remedy is no line and no option: a sensor, a logger, or another column."""
 
 

@@ -145,7 +145,13 @@ def _tried(columns: Columns, source: Source) -> Clock | None:
 
 
 def _by_numbers(columns: Columns) -> Clock | None:
-    """Return the first column that goes on by even steps, and is not named as something else."""
+    """Return the first column that goes on by even steps, and is named as nothing else: a row number as the last."""
+    clocks = list(_even_clocks(columns))
+    return next((c for c in clocks if not _counts_rows(columns, c.source)), clocks[0] if clocks else None)
+
+
+def _even_clocks(columns: Columns) -> Iterator[Clock]:
+    """Yield the clock of each column that goes on by even steps, and is not named as something else."""
     for i in range(columns.width):
         cells = columns.take(i)
         name = columns.names[i] if columns.names else ""
@@ -160,8 +166,13 @@ def _by_numbers(columns: Columns) -> Clock | None:
         # seconds since 1970 are a time however long the logger paused
         is_epoch = cells.dtype.kind in "iuf" and bool(((cells > YEARS_S[0]) & (cells < YEARS_S[1])).all())
         if is_epoch or float(np.std(steps)) < REGULAR * float(np.mean(steps)):
-            return replace(clock, notes=_guessed(name, clock.source.unit)) if name else clock
-    return None
+            yield replace(clock, notes=_guessed(name, clock.source.unit)) if name else clock
+
+
+def _counts_rows(columns: Columns, source: Source) -> bool:
+    """Whether a column is the number of the row, from nought or one."""
+    cells = columns.take(columns.index(source.places[0], TIME))
+    return cells.dtype.kind in "iuf" and cells[0] in (0, 1) and bool((np.diff(cells) == 1).all())
 
 
 def _guessed(name: str, unit: str | None) -> tuple[Note, ...]:

@@ -191,3 +191,9 @@ def test_a_row_that_lost_its_time_counts_among_even_steps(tmp_path):
     found = inspect_log(path)
     run = load_run(path, write_proposal(found, tmp_path / "proposed.yaml"), salvage=True)
     np.testing.assert_allclose(run.time, np.delete(T, 600), atol=1e-9)
+
+
+def test_the_number_of_the_row_is_no_time_where_another_column_goes_on_by_even_steps(tmp_path):
+    path = tmp_path / "rows.txt"
+    path.write_text(table("", map(str, range(N)), text(T + 1000.0), H, text(np.degrees(F["rate"]), 3), R).lstrip("\n"))
+    assert inspect_log(path).proposal.body["time"]["column"] == 1
