@@ -120,18 +120,17 @@ def test_rivals_get_a_leg_at_every_speed_inside_the_default_limits_and_circles_w
         assert {"signal": "yaw_rad", "kind": "deviation"}.items() <= next(a for a in leg["abort"] if "yaw" in a["signal"]).items()
 
 
-def test_every_leg_is_written_as_fins_in_every_format_rules_and_circles_too(run_cli, tmp_path):
-    for axis, more in (("pitch", ("--depth-band", "1:8")), ("yaw", ("--radius",))):
-        folder = tmp_path / axis
-        body = run_cli(
-            "plan", "--axis", axis, "--speeds", "1.4", "--window", "22", *more, "--course", "30deg", "-o", folder, "--json"
-        ).json
-        for i, leg in enumerate(body["legs"], 1):
-            assert leg.get("replay_break_probability") is None or leg["replay_break_probability"] <= 0.05
-            events, _ = script(next(folder.glob(f"leg{i:02d}*timer_script.moos")).read_text())
-            assert max(abs(float(v)) for _, n, v in events if n.startswith("DESIRED")) > 5.0
-            assert next(folder.glob(f"leg{i:02d}*dune.ini")).read_text().count(",") > 10
-            assert ", false }" in next(folder.glob(f"leg{i:02d}*ardupilot.lua")).read_text()
+@pytest.mark.parametrize(
+    ("axis", "more"), [("yaw", ("--radius",)), pytest.param("pitch", ("--depth-band", "1:8"), marks=pytest.mark.slow)]
+)
+def test_every_leg_is_written_as_fins_in_every_format_rules_and_circles_too(run_cli, tmp_path, axis, more):
+    body = run_cli(*QUICK, "--axis", axis, *more, "--course", "30deg", "-o", tmp_path / "p", "--json").json
+    for i, leg in enumerate(body["legs"], 1):
+        assert leg.get("replay_break_probability") is None or leg["replay_break_probability"] <= 0.05
+        events, _ = script(next((tmp_path / "p").glob(f"leg{i:02d}*timer_script.moos")).read_text())
+        assert max(abs(float(v)) for _, n, v in events if n.startswith("DESIRED")) > 5.0
+        assert next((tmp_path / "p").glob(f"leg{i:02d}*dune.ini")).read_text().count(",") > 10
+        assert ", false }" in next((tmp_path / "p").glob(f"leg{i:02d}*ardupilot.lua")).read_text()
 
 
 def test_what_a_maneuver_does_not_show_is_no_number(run_cli):
@@ -156,7 +155,7 @@ def test_every_limit_is_printed_and_what_has_none_is_named(run_cli):
     [
         (("--want", "a22=0.02%"), "--want a22="),
         (("--want", "a22=2%", "--minutes", "0.5"), "--minutes"),
-        (("--want", "a22=0.4%", "--minutes", "3"), "--want a22="),
+        pytest.param(("--want", "a22=0.4%", "--minutes", "3"), "--want a22=", marks=pytest.mark.slow),
         (("--want", "d2=5%"), "b2"),
         (("--area", "20x10"), "--area"),
         (("--area", "wide"), "200x60"),
@@ -174,10 +173,10 @@ def test_every_limit_is_printed_and_what_has_none_is_named(run_cli):
         (("--max-heading", "400deg"), "at most `--max-heading 360deg`, or write `--max-heading none` to let circles in"),
         (("--radius", "--max-heading", "90deg"), "--max-heading"),
         (("--radius", "--open-loop"), "--open-loop"),
-        (("--radius", "--max-track", "5"), "--max-track"),
+        pytest.param(("--radius", "--max-track", "5"), "--max-track", marks=pytest.mark.slow),
         (("--model", "a.yaml", "--prior", "torpedo"), "give one"),
         (("--separate", "delay,servo_lag", "--want", "a22=5%"), "--want"),
-        (("--separate", "delay,servo_lag", "--minutes", "0.5"), "--minutes"),
+        pytest.param(("--separate", "delay,servo_lag", "--minutes", "0.5"), "--minutes", marks=pytest.mark.slow),
         (("--from", "a.yaml", "--prior", "torpedo"), "leave the latter out"),
         (("--write", "csv"), "-o DIR"),
         (("--write", "cvs", "-o", "/dev/null/new"), "csv"),

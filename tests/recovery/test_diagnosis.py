@@ -206,6 +206,7 @@ def test_a_dead_zone_is_named_beside_a_lag_of_more_evidence_that_lowers_no_error
     assert set(found.effects) == {"deadband", "servo_lag"}
 
 
+@pytest.mark.slow
 @pytest.mark.forks
 def test_a_second_core_changes_no_digit(monkeypatch: pytest.MonkeyPatch) -> None:
     case = visible_case("pair", 41)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from fieldsid.diagnosis.residual_tests.residual_tests import Innovations, _breusch_pagan, _homoscedasticity, _other_signals
 from fieldsid.dynamics.free_run import command_record
