@@ -31,7 +31,7 @@ def test_identify_reads_what_is_clear_and_says_how_in_one_line(run_cli, tmp_path
 
 @pytest.mark.parametrize("command", ["diagnose", "live", "batch"])
 def test_the_other_commands_read_it_too(run_cli, tmp_path, command):
-    more = {"live": ("--speed", "0"), "batch": ("-o", tmp_path / "out")}.get(command, ())
+    more = {"live": ("--speed", "0"), "batch": ("-o", tmp_path / "out", "--no-diagnose", "--workers", "1")}.get(command, ())
     done = run_cli(command, written(tmp_path), "--axis", "yaw", *more, "--json")
     assert done.code == 0, done.err
 

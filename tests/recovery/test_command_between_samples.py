@@ -73,9 +73,12 @@ def test_the_damping_does_not_depend_on_the_phase_sample_by_sample(runs):
     np.testing.assert_allclose([e.values["a22"] for e in found], DAMPING, rtol=WITHIN)
 
 
-@pytest.mark.parametrize("rate", RATES)
-def test_nor_where_commands_and_measurements_come_as_messages_of_their_own(rate):
-    for phase in PHASES:
+@pytest.mark.parametrize(
+    ("rate", "phases"),
+    [(5, PHASES), (20, PHASES[::3]), *(pytest.param(rate, PHASES, marks=pytest.mark.slow) for rate in (10, 20, 50))],
+)
+def test_nor_where_commands_and_measurements_come_as_messages_of_their_own(rate, phases):
+    for phase in phases:
         commands, time, motion = flown(rate, phase)
         told = [(t, 0, fin, nan, nan) for t, fin in zip(*commands, strict=True)]
         seen = [(t, 1, nan, *values) for t, *values in zip(time, *motion, strict=True)]
