@@ -376,7 +376,7 @@ def test_turn_radius_takes_the_circles_that_were_flown_and_counts_each_once(run_
 
 
 def test_live_takes_the_newest_run_and_what_the_plan_of_its_axis_promised(run_cli, folder):
-    assert run_cli("plan", "--axis", "yaw", "--speeds", "1.4", "--no-figures", "-o", "plan").code == 0
+    assert run_cli("plan", "--axis", "yaw", "--speeds", "1.4", "--window", "22", "--no-figures", "-o", "plan").code == 0
     answer = run_cli("live", "--axis", "yaw", "--speed", "0")
     assert answer.code == 0, answer.err
     assert "taken from the trial folder: --plan plan/plan.yaml runs/pulses_1.4.parquet" in answer.err
