@@ -20,7 +20,7 @@ DEAR_OF_SECOND = [
 ]
 SHORT = (("own", 1, 77), ("own", 7, 501), ("hard", 3, 501), ("own", 60, 2614), *DEAR)
 """A delay of 0.6 s that a fit with too few weightings missed, two that came at random, a hull that heaves so that its own damping
-is a tenth of what pitch alone says; a drag along the hull, missed as the delay, a trim that changes once in runs of three speeds."""
+is a tenth of what pitch alone says; a drag along the hull, missed as the delay, and a trim that changes once."""
 SHORT_OF_SECOND = (("second", 72, 501), *DEAR_OF_SECOND)
 """A fin that is lost within a pulse, anew in each run: its times lie between the grid's, twice beside an edge of the fin where no
 step of all parameters leads on."""
