@@ -58,12 +58,16 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     return min(cores, MOST_WORKERS) if whole and cores > 1 else 0
 
 
+OF_THE_GUIDE = ("tests/contract/test_schemas.py", "tests/cli/test_demo.py")
+"""Files elsewhere that look at what the guide's command lines gave."""
+
+
 class FilesTogether(LoadScopeScheduling):
     """Gives out a file at a time, for its fixtures; those that compare with what the guide's command lines gave are one."""
 
     def _split_scope(self, nodeid: str) -> str:
         file = nodeid.partition("::")[0]
-        return "guide" if file.startswith("tests/guide/") or file == "tests/contract/test_schemas.py" else file
+        return "guide" if file.startswith("tests/guide/") or file in OF_THE_GUIDE else file
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> FilesTogether:

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from cli import trial
 from cli.test_fit import table
+from truth.paper import YAW
 
 
 @pytest.fixture
 def asked(tmp_path):
     """Every option that takes an angle, as the words before its value."""
-    made = table(tmp_path)
+    made = table(tmp_path, rows=YAW[1:4:2])
     model = trial.model_file(tmp_path)
     plan = ("plan", "--speeds", "1.4", "--window", "22")
     return {

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from contextlib import redirect_stdout
-from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+from guide.session import TOUR
 
-from fieldsid.cli.app import main
 from fieldsid.cli.commands import demo
 from fieldsid.demo import steps, vehicle
 from fieldsid.demo.steps import PLAN, STEPS, Step
@@ -24,21 +21,23 @@ from fieldsid.rounding import number
 
 
 @pytest.fixture(scope="module")
-def tour(tmp_path_factory):
-    """The tour taken once, as its JSON object."""
-    folder = tmp_path_factory.mktemp("tour") / "demo"
-    told = StringIO()
-    with redirect_stdout(told):
-        assert main(["demo", "-o", str(folder), "--json"]) == 0
-    return json.loads(told.getvalue())
+def tour(guide_session):
+    """The tour taken once, as its JSON object; the guide's pages show the same."""
+    return guide_session.bodies[TOUR]
 
 
-def test_the_tour_is_told_on_one_screen_and_ends_with_the_report(tour):
+@pytest.fixture(scope="module")
+def folder(guide_session, tour):
+    """The folder that the tour filled."""
+    return guide_session.folder / tour["folder"]
+
+
+def test_the_tour_is_told_on_one_screen_and_ends_with_the_report(tour, folder):
     pairs = zip((PLAN, *STEPS), tour["steps"], strict=True)
     told = "".join(f"{i:2d}. {step.title} {step.brief(s['result'])}\n" for i, (step, s) in enumerate(pairs, 1))
     assert sum(1 + len(line) // 80 for line in told.splitlines()) <= 30
     assert tour["steps"][-1]["command"] == f"sysid report {tour['folder']}"
-    assert Path(tour["folder"], "report.html").is_file()
+    assert (folder / "report.html").is_file()
     assert "servo_lag, probability 0.99" in told
 
 
@@ -52,6 +51,8 @@ def test_briefly_each_command_is_a_line_and_verbosely_all_that_it_says(run_cli, 
     verbose = run_cli("demo", "-o", tmp_path / "b", "--verbose")
     assert f"\n3. From log to run\n$ sysid import {tmp_path}/b/trial/*.csv" in verbose.out
     assert "=> Each log is now a run" in verbose.out
+    body = run_cli("demo", "-o", tmp_path / "c", "--json").json
+    assert body["steps"][-1]["means"] in " ".join(verbose.out.split())
 
 
 def results_of(tour, command):
@@ -66,12 +67,11 @@ def test_every_step_runs_and_leaves_files_and_figures(tour):
     assert {"plan.yaml", "plan.png", "diagnosis.png", "history.png", "turn_radius.png", "gains.png", "heading_ros2.yaml"} <= names
 
 
-def test_the_tour_begins_with_a_plan_that_says_what_it_buys_and_the_vehicle_flies_it(tour):
+def test_the_tour_begins_with_a_plan_that_says_what_it_buys_and_the_vehicle_flies_it(tour, folder):
     first = tour["steps"][0]
     (leg,) = first["result"]["legs"]
     assert leg["expected"]["a22"]["relative"] < 0.05
     assert f"a22 to {100 * leg['expected']['a22']['relative']:.1f} %" in first["means"]
-    folder = Path(tour["folder"])
     plan = load_plan(folder / "plan" / "plan.yaml")
     run = load_run(folder / "runs" / f"learn_{PLANNED_SPEED:.1f}.parquet")
     _, fin, autopilot = commands_of(plan.legs[0], plan.envelope)

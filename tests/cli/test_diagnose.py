@@ -41,11 +41,12 @@ def test_the_hidden_effect_is_named_first_and_kept_and_drawn(run_cli, logs, tmp_
     assert rivals_from(kept, ("servo_lag", "delay"))[0].effects == ("servo_lag",)
 
 
-def test_the_axis_is_that_of_the_model_or_of_what_the_runs_excite(run_cli, logs, tmp_path):
+@pytest.mark.parametrize("of_model", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_the_axis_is_that_of_the_model_or_of_what_the_runs_excite(run_cli, logs, tmp_path, of_model):
     run_cli("identify", *logs.train, "--joint", "--no-figures", "-o", tmp_path)
-    for known in ((), ("--model", tmp_path / "joint_yaw.yaml")):
-        body = run_cli("diagnose", *logs.train, *known, "--validate", logs.unseen, "--json").json
-        assert (body["axis"], body["effects"]) == ("yaw", ["servo_lag"])
+    known = ("--model", tmp_path / "joint_yaw.yaml") if of_model else ()
+    body = run_cli("diagnose", *logs.train, *known, "--validate", logs.unseen, "--json").json
+    assert (body["axis"], body["effects"]) == ("yaw", ["servo_lag"])
 
 
 def test_text_says_verdict_candidates_place_what_was_skipped_and_what_to_do(run_cli, logs):

@@ -8,7 +8,6 @@ import os
 import pytest
 from cli import trial
 
-from fieldsid.cli.commands.identify import MOST_DRAWN
 from fieldsid.comparison.sufficient import over_noise
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import load_model
@@ -168,15 +167,17 @@ def test_it_says_why_auto_took_its_method_where_it_had_to_choose(run_cli, tmp_pa
     assert fit["method_reason"] is None
 
 
-def test_of_many_runs_those_that_the_model_follows_least_are_drawn(run_cli, tmp_path):
-    runs = [trial.flown(tmp_path, seed=i, name=f"n{i}") for i in range(MOST_DRAWN + 2)]
+def test_of_many_runs_those_that_the_model_follows_least_are_drawn(run_cli, tmp_path, monkeypatch):
+    most = 2
+    monkeypatch.setattr("fieldsid.cli.commands.identify.MOST_DRAWN", most)
+    runs = [trial.flown(tmp_path, seed=i, name=f"n{i}") for i in range(most + 2)]
     bent = trial.flown(tmp_path, speed=1.9, seed=77, name="bent")
     answer = run_cli("identify", *runs, bent, "--axis", "yaw", "--joint", "-o", tmp_path / "models")
     assert answer.code == 0
     drawn = {p.name for p in (tmp_path / "models").glob("*.png")}
-    assert len(drawn) == 2 * MOST_DRAWN
-    assert f"of the {MOST_DRAWN} runs it follows least" in answer.out
+    assert len(drawn) == 2 * most
+    assert f"of the {most} runs it follows least" in answer.out
     body = run_cli("identify", *runs, bent, "--axis", "yaw", "--joint", "--json").json["fits"][0]
     over = {r["run"]: over_noise(r, body["noise_floor"]) for r in body["runs"]}
-    least = sorted(over, key=lambda run: -over[run])[:MOST_DRAWN]
+    least = sorted(over, key=lambda run: -over[run])[:most]
     assert {f"joint_yaw_{run}.png" for run in least} < drawn

@@ -76,7 +76,7 @@ def test_a_compass_slower_than_the_rows_counts_once_for_each_of_its_numbers(run_
 
 @pytest.mark.parametrize("command", ["diagnose", "live", "batch"])
 def test_the_other_commands_read_it_too(run_cli, tmp_path, command):
-    more = {"live": ("--speed", "0"), "batch": ("-o", tmp_path / "out")}.get(command, ())
+    more = {"live": ("--speed", "0"), "batch": ("-o", tmp_path / "out", "--no-diagnose", "--workers", "1")}.get(command, ())
     done = run_cli(command, written(tmp_path), "--axis", "yaw", *more, "--json")
     assert done.code == 0, done.err
 

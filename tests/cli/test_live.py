@@ -100,7 +100,7 @@ def test_what_cannot_be_read_is_counted_where_nothing_follows_it(run_cli, monkey
 
 
 def test_the_goal_is_what_a_plan_promised(run_cli, tmp_path):
-    plan = run_cli("plan", "--axis", "yaw", "--speeds", "1.4", "-o", tmp_path, "--json").json
+    plan = run_cli("plan", "--axis", "yaw", "--speeds", "1.4", "--window", "22", "--no-figures", "-o", tmp_path, "--json").json
     file = next(tmp_path.glob("*.yaml"))
     last = looks(run_cli("live", trial.flown(tmp_path), "--axis", "yaw", "--speed", "0", "--plan", file, "--json"))[-1]
     promised = plan["legs"][0]["expected"]["a22"]["std_error_high"]

@@ -50,7 +50,10 @@ def test_json_before_the_command_is_json(run_cli, tmp_path, monkeypatch):
     assert run_cli("--quiet", "status").out == run_cli("status", "--quiet").out
 
 
-@pytest.mark.parametrize(("suffix", "begins"), [(".pdf", b"%PDF"), (".svg", b"<?xml"), (".PNG", b"\x89PNG")])
+@pytest.mark.parametrize(
+    ("suffix", "begins"),
+    [(".PNG", b"\x89PNG"), *(pytest.param(*of, marks=pytest.mark.slow) for of in ((".pdf", b"%PDF"), (".svg", b"<?xml")))],
+)
 def test_a_figures_name_is_a_figure_for_one_run_and_for_several_models(run_cli, tmp_path, suffix, begins):
     log, model = trial.flown(tmp_path, spec="zigzag"), trial.model_file(tmp_path)
     drawn = tmp_path / f"x{suffix}"

@@ -144,6 +144,7 @@ def test_a_warning_comes_after_the_headline_and_not_among_the_data(said):
     assert "warning: " not in out
 
 
+@pytest.mark.slow
 def test_a_day_is_pasted_from_one_next_line_to_the_other(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     fly(tmp_path / "logs")

@@ -9,6 +9,7 @@ from dataclasses import replace
 import pytest
 from cli import trial
 from cli.test_fit import table
+from truth.paper import YAW
 
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import save_model
@@ -18,8 +19,8 @@ from fieldsid.rounding import number
 
 @pytest.fixture
 def gains(run_cli, tmp_path):
-    path = tmp_path / "gains.yaml"
-    answer = run_cli("schedule", "design", table(tmp_path), "--fin-limit", "0.26", "--fin-lag", "0.2", "-o", path)
+    path, of = tmp_path / "gains.yaml", table(tmp_path, rows=YAW[1:4:2])
+    answer = run_cli("schedule", "design", of, "--fin-limit", "0.26", "--fin-lag", "0.2", "-o", path)
     assert answer.code == 0, answer.err
     return path
 

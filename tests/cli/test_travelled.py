@@ -101,7 +101,7 @@ def test_models_that_differ_in_an_effect_of_one_name_each_keep_their_own(run_cli
         save_model(trial.vehicle(Axis.YAW, "pull", pull_k=0.8), elsewhere / "twice.yaml")
     forget_effects()
     ends = [
-        run_cli("simulate", m, "--maneuver", "turning_circle", "--json").json["signals"]["yaw_rad"]["end"]
+        run_cli("simulate", m, "--maneuver", "doublet", "--json").json["signals"]["yaw_rad"]["end"]
         for m in ("m1.8.yaml", "twice.yaml", "m1.8.yaml")
     ]
     assert ends[0] == ends[2] != ends[1]

@@ -364,18 +364,19 @@ def test_turn_radius_takes_the_circles_that_were_flown_and_counts_each_once(run_
     with_track(trial.flown(folder / "runs", spec="turning_circle", name="circle"))
     with_track(folder / "runs/pulses_1.0.parquet")  # a track alone is no circle
     assert run_cli("identify", "--axis", "yaw", "--joint", "--effects", "servo_lag", "--no-figures").code == 0
-    answer = run_cli("turn-radius", "--speeds", "1.4", "--rudder-max", "0.35", "--json")
+    asked = ("turn-radius", "--speeds", "1.4", "--rudder-max", "0.35", "--method", "steady", "--json")
+    answer = run_cli(*asked)
     assert "joint_yaw.yaml -o turning --measured runs/circle.parquet\n" in answer.err
     (circle,) = answer.json["measured"]
     assert circle["run"] == "circle"
     others = ("runs/pulses_1.0.parquet", "runs/pulses_1.4.parquet")
     line = [w for run in others for w in ("--runs", run)]
-    apart = run_cli("turn-radius", "--speeds", "1.4", "--rudder-max", "0.35", *line, "--json").json["measured"]
+    apart = run_cli(*asked, *line).json["measured"]
     assert apart == answer.json["measured"]
 
 
 def test_live_takes_the_newest_run_and_what_the_plan_of_its_axis_promised(run_cli, folder):
-    assert run_cli("plan", "--axis", "yaw", "--speeds", "1.4", "--no-figures", "-o", "plan").code == 0
+    assert run_cli("plan", "--axis", "yaw", "--speeds", "1.4", "--window", "22", "--no-figures", "-o", "plan").code == 0
     answer = run_cli("live", "--axis", "yaw", "--speed", "0")
     assert answer.code == 0, answer.err
     assert "taken from the trial folder: --plan plan/plan.yaml runs/pulses_1.4.parquet" in answer.err

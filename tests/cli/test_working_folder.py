@@ -113,16 +113,22 @@ def test_a_cache_folder_is_none_of_the_working_folder(folder, monkeypatch, home)
     assert cache_folder() == ""
 
 
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    """The figures that are drawn of the folder's run where there are no settings."""
+    place = tmp_path_factory.mktemp("plain")
+    trial.flown(place)
+    assert started("identify", "run7.parquet", "--axis", "yaw", "-o", "drawn", cwd=place).returncode == 0
+    return {p.name: p.read_bytes() for p in (place / "drawn").glob("*.png")}
+
+
 @pytest.mark.parametrize("settings", ["text.usetex: True\n", "figure.dpi: 7\nsavefig.dpi: 7\n", "\xff"])
-def test_matplotlib_takes_no_settings_from_the_folder(folder, settings):
-    drawn = folder / "drawn"
-    assert started("identify", "run7.parquet", "--axis", "yaw", "-o", "plain").returncode == 0
+def test_matplotlib_takes_no_settings_from_the_folder(folder, plain, settings):
     (folder / "matplotlibrc").write_bytes(settings.encode("latin-1"))
-    done = started("identify", "run7.parquet", "--axis", "yaw", "-o", drawn)
+    done = started("identify", "run7.parquet", "--axis", "yaw", "-o", "drawn")
     assert (done.returncode, "matplotlibrc" in done.stderr) == (0, False)
-    plain, with_file = ({p.name: p.read_bytes() for p in Path(place).glob("*.png")} for place in ("plain", drawn))
     assert plain
-    assert plain == with_file
+    assert plain == {p.name: p.read_bytes() for p in (folder / "drawn").glob("*.png")}
 
 
 def test_what_draws_is_new_enough_to_run_nothing_in_its_settings():

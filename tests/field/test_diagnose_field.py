@@ -14,6 +14,7 @@ def lauv(shared_data):
     return shared_data / "lauv"
 
 
+@pytest.mark.slow
 def test_a_vehicle_with_a_fin_lag_sway_and_nonlinear_damping_is_not_called_sufficient(run_cli, lauv):
     asked = ("diagnose", lauv / "rudder_v1.50.csv.gz", "--axis", "yaw", "--validate", lauv / "zigzag_v1.50.csv.gz")
     body = run_cli(*asked, "--json").json
@@ -25,6 +26,7 @@ def test_a_vehicle_with_a_fin_lag_sway_and_nonlinear_damping_is_not_called_suffi
     assert body["candidates"][0]["explained"] > 0.5
 
 
+@pytest.mark.slow
 def test_the_error_on_zigzags_falls_with_each_of_the_effects_that_are_there(run_cli, lauv, tmp_path):
     runs = [lauv / f"rudder_v{v}.csv.gz" for v in ("1.00", "1.50", "1.90")]
     unseen = [part for v in ("1.00", "1.90") for part in ("--validate", lauv / f"zigzag_v{v}.csv.gz")]

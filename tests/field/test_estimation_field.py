@@ -33,6 +33,7 @@ def unseen(ship, effects):
     return goodness_of_fit([predict(found.model, ship["15_05"])]).rate_fit
 
 
+@pytest.mark.slow
 def test_a_zigzag_is_predicted_better_with_every_effect_that_is_there(ship):
     first, drag, sway = (unseen(ship, e) for e in ((), ("quadratic_damping",), ("quadratic_damping", "sway_coupling")))
     assert first > 68.0

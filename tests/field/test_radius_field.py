@@ -34,6 +34,7 @@ def models(folder, shared_data, kinds, effects):
     return load_parameter_source(paths), runs
 
 
+@pytest.mark.slow
 def test_pulses_and_zigzag_predict_full_rudder_within_five_percent_both_sides(tmp_path, shared_data, truth):
     source, runs = models(tmp_path, shared_data, ("rudder", "zigzag"), EFFECTS)
     prediction = turn_radius(source, [float(v) for v in SPEEDS], truth["delta_max_rad"], runs=runs)
@@ -77,6 +78,7 @@ def test_a_u_turn_at_one_speed_helps_the_others_and_is_no_settled_circle(tmp_pat
         assert row.interval95[1] - row.interval95[0] < 0.6 * (before.interval95[1] - before.interval95[0])
 
 
+@pytest.mark.slow
 def test_a_circle_at_half_rudder_counts_as_a_run(tmp_path, shared_data, truth):
     source, runs = models(tmp_path, shared_data, ("rudder",), EFFECTS)
     half = load_run(shared_data / "lauv" / "circle_half_stbd_v1.50.csv.gz")

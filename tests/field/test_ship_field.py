@@ -18,6 +18,7 @@ signals:
 """
 
 
+@pytest.mark.slow
 def test_the_missing_sway_of_a_tanker_is_found_and_its_zig_zags_are_predicted(run_cli, shared_data, tmp_path):
     (tmp_path / "mapping.yaml").write_text(MAPPING, encoding="utf-8")
     logs = {n: shared_data / "kvlcc2" / f"HSVA_CPMC_KVLCC2_Z_{n}.dat" for n in ("10_05", "20_05", "30_05", "15_05")}

@@ -135,9 +135,14 @@ def test_a_commands_page_is_what_the_command_says(name, guide_session):
     assert same(was, now), difference(was, now)
 
 
+@pytest.fixture(scope="module")
+def reference():
+    return reference_pages.pages()
+
+
 @pytest.mark.parametrize("name", ["mapping.md", "codes.md", "parameters.md"])
-def test_a_page_of_reference_is_what_the_code_says(name):
-    was, now = (GUIDE / name).read_text(), reference_pages.pages()[name]
+def test_a_page_of_reference_is_what_the_code_says(name, reference):
+    was, now = (GUIDE / name).read_text(), reference[name]
     assert was == now, difference(was, now)
 
 

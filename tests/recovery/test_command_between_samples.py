@@ -26,7 +26,8 @@ DAMPING, AUTHORITY, TRIM = 1.0, 0.85, 0.01
 WITHIN = 5e-3
 """Share of the truth within which a22 comes back."""
 NOISE = 3e-4
-RATES, PHASES = (5, 10, 20, 50), np.arange(0.05, 1.0, 0.1)
+PHASES = np.arange(0.05, 1.0, 0.1)
+RATES = (5, pytest.param(10, marks=pytest.mark.slow), 20, pytest.param(50, marks=pytest.mark.slow))
 TOPICS = {"yaw_rad": "h", "yaw_rate_rad_s": "r", "rudder_rad": "c"}
 
 
@@ -72,9 +73,12 @@ def test_the_damping_does_not_depend_on_the_phase_sample_by_sample(runs):
     np.testing.assert_allclose([e.values["a22"] for e in found], DAMPING, rtol=WITHIN)
 
 
-@pytest.mark.parametrize("rate", RATES)
-def test_nor_where_commands_and_measurements_come_as_messages_of_their_own(rate):
-    for phase in PHASES:
+@pytest.mark.parametrize(
+    ("rate", "phases"),
+    [(5, PHASES), (20, PHASES[::3]), *(pytest.param(rate, PHASES, marks=pytest.mark.slow) for rate in (10, 20, 50))],
+)
+def test_nor_where_commands_and_measurements_come_as_messages_of_their_own(rate, phases):
+    for phase in phases:
         commands, time, motion = flown(rate, phase)
         told = [(t, 0, fin, nan, nan) for t, fin in zip(*commands, strict=True)]
         seen = [(t, 1, nan, *values) for t, *values in zip(time, *motion, strict=True)]

@@ -61,7 +61,7 @@ def errors(row, case: str, method: str, seeds: range) -> np.ndarray:
     return np.array(out)
 
 
-@pytest.mark.parametrize("method", ["auto", "pem"])
+@pytest.mark.parametrize("method", ["auto", pytest.param("pem", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("case", CASES)
 def test_few_seeds_stay_within_their_intervals(case, method):
     z = np.concatenate([scores(row, case, method, range(12)).ravel() for row in ROWS])

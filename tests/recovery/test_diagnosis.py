@@ -1,5 +1,6 @@
 """A small blind bank: hidden effects named, nothing named where nothing is hidden, strangers called unexplained.
 
+The quick suite has one case of each kind; the cases that once went wrong are slow, as each takes a search of its own.
 The whole bank of 200 cases is `python tests/benchmarks/hidden_effects.py --cases 200`.
 """
 
@@ -52,7 +53,7 @@ def diagnosed(case: Case) -> Diagnosis:
     return diagnose(runs_of(case.training, "train"), Axis(case.axis), runs_of(case.validation, "unseen"))
 
 
-@pytest.mark.parametrize("first", [0, 10, 20, 30])
+@pytest.mark.parametrize("first", [10, *(pytest.param(first, marks=pytest.mark.slow) for first in (0, 20, 30))])
 def test_a_single_hidden_effect_is_among_the_first_three_and_its_error_falls(first: int) -> None:
     case = visible_case("single", first)
     found = diagnosed(case)
@@ -62,7 +63,7 @@ def test_a_single_hidden_effect_is_among_the_first_three_and_its_error_falls(fir
     assert found.final.validation.rate_rms_rad_s <= found.base.validation.rate_rms_rad_s * 1.001
 
 
-@pytest.mark.parametrize("first", [0, 10])
+@pytest.mark.parametrize("first", [0, pytest.param(10, marks=pytest.mark.slow)])
 def test_nothing_is_named_where_nothing_is_hidden(first: int) -> None:
     found = diagnosed(visible_case("none", first))
     assert found.verdict in ("sufficient", "disturbed")
@@ -70,6 +71,7 @@ def test_nothing_is_named_where_nothing_is_hidden(first: int) -> None:
     assert found.final == found.base
 
 
+@pytest.mark.slow
 def test_sensors_that_wander_are_noise_and_nothing_is_missing() -> None:
     """The floor that is printed is the one that decides: over the white part alone the error is 1.7 times the noise."""
     case = make_case(WANDERING, 701, kind="none")
@@ -99,6 +101,7 @@ def test_a_cause_that_no_catalogue_has_is_not_given_a_name() -> None:
     assert "no effect of the catalogue" in found.says
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "index"), [(126, 114), (126, 119), (126, 38), (126, 44)], ids=("servo", "fin", "roll", "wave"))
 def test_an_effect_of_another_shape_is_followed_down_to_the_floor(seed: int, index: int) -> None:
     case = make_case(index, seed)
@@ -126,7 +129,7 @@ def test_an_effect_of_another_shape_is_followed_down_to_the_floor(seed: int, ind
         ),
         pytest.param(132, 84, "ar1", id="many ends", marks=pytest.mark.slow),
         pytest.param(136, 100, None, id="play behind a slow fin"),
-        pytest.param(138, 102, None, id="another trim for one than for both"),
+        pytest.param(138, 102, None, id="another trim for one than for both", marks=pytest.mark.slow),
     ],
 )
 def test_a_pair_of_which_neither_alone_looks_like_itself_is_found(seed: int, index: int, colour: str | None) -> None:
@@ -138,6 +141,7 @@ def test_a_pair_of_which_neither_alone_looks_like_itself_is_found(seed: int, ind
     assert over < 1.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("index", [131, 8], ids=("linear", "square"))
 def test_a_propeller_trimmed_away_beside_a_moment_that_stays_is_named(index: int) -> None:
     """Neither law of the trim holds then: a part goes with the square of the speed, and one does not."""
@@ -149,12 +153,13 @@ def test_a_propeller_trimmed_away_beside_a_moment_that_stays_is_named(index: int
     assert found.final.validation.angle_rms_rad < 1.15 * case.floor["angle_rad"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "index"),
     [
         pytest.param(136, 15, id="no better yet"),
-        pytest.param(136, 50, id="stands in", marks=pytest.mark.slow),
-        pytest.param(136, 29, id="another end", marks=pytest.mark.slow),
+        pytest.param(136, 50, id="stands in"),
+        pytest.param(136, 29, id="another end"),
         pytest.param(171, 62, id="other times of an event"),
     ],
 )
@@ -165,6 +170,7 @@ def test_a_single_effect_is_found_whatever_law_of_the_trim_or_end_of_the_fit_hid
     assert found.final.validation.angle_rms_rad < 1.06 * case.floor["angle_rad"]
 
 
+@pytest.mark.slow
 def test_an_effect_that_promises_nothing_in_the_textbooks_form_is_found_in_another() -> None:
     case = make_case(91, 157)
     assert case.effects == ("prop_moment",)
@@ -173,6 +179,7 @@ def test_an_effect_that_promises_nothing_in_the_textbooks_form_is_found_in_anoth
     assert found.final.validation.angle_rms_rad < 1.15 * case.floor["angle_rad"]
 
 
+@pytest.mark.slow
 def test_a_current_is_found_from_runs_of_several_speeds_and_none_is_moved_to_another() -> None:
     case = make_case(131, 142)
     found = diagnosed(case)
@@ -181,6 +188,7 @@ def test_a_current_is_found_from_runs_of_several_speeds_and_none_is_moved_to_ano
     assert "own_speed" not in {n.code for n in found.notes}
 
 
+@pytest.mark.slow
 def test_a_dead_zone_is_named_beside_a_lag_of_more_evidence_that_lowers_no_error() -> None:
     """The lag of a servo has more evidence than the dead zone, which has the error: neither hides the other."""
     physics, clock = Physics(damping=0.95, authority=-1.7, deadband_width=0.011, servo_tau=0.06), Clock(0.05, 1500)
@@ -198,6 +206,7 @@ def test_a_dead_zone_is_named_beside_a_lag_of_more_evidence_that_lowers_no_error
     assert set(found.effects) == {"deadband", "servo_lag"}
 
 
+@pytest.mark.slow
 @pytest.mark.forks
 def test_a_second_core_changes_no_digit(monkeypatch: pytest.MonkeyPatch) -> None:
     case = visible_case("pair", 41)

@@ -128,6 +128,7 @@ def strips_of(runs: Sequence[Run]) -> dict[str, float]:
     return dict(zip(problem.layout.names, best.x.tolist(), strict=False))
 
 
+@pytest.mark.slow
 def test_a_hull_that_only_the_cross_flow_holds_is_told_by_it_and_its_strips_come_back():
     """No sway is measured. What turns the path into drift, the drag and the inertia's share are those that were put in.
 
@@ -153,12 +154,10 @@ def test_a_hull_that_only_the_cross_flow_holds_is_told_by_it_and_its_strips_come
     assert abs(values["cross_rate"]) == pytest.approx(1.0 / 1.6, rel=0.15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "path"),
-    [
-        ("backlash", {"servo_tau": 0.15, "backlash_gap": 0.03}),
-        pytest.param("deadband", {"servo_tau": 0.2, "deadband_width": 0.03}, marks=pytest.mark.slow),
-    ],
+    [("backlash", {"servo_tau": 0.15, "backlash_gap": 0.03}), ("deadband", {"servo_tau": 0.2, "deadband_width": 0.03})],
 )
 def test_behind_a_slow_and_worn_fin_such_a_hull_is_found_and_the_wear_too(name, path):
     """The drift by its strips shows beside the servo only, and the wear beside both: a lag alone takes up a part of each."""
@@ -182,6 +181,7 @@ def test_behind_a_slow_and_worn_fin_such_a_hull_is_found_and_the_wear_too(name, 
 CROSS_FLOW = {"damping": 0.9, "authority": -1.4, "fin_bend": -0.01, "crossflow": 6.0, "length": 1.8}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drift", [0.5, -0.5], ids=["outwards", "inwards"])
 def test_drag_of_a_cross_flow_is_told_beside_a_sway_sensor_whose_noise_is_half_of_what_it_measures(drift):
     """The sensor shows the drift's law, from which the fit starts; its noise is in no moment."""
@@ -209,6 +209,7 @@ def test_drag_of_a_cross_flow_is_told_beside_a_sway_sensor_whose_noise_is_half_o
     assert values["flow_fin"] == pytest.approx(0.0, abs=0.15)
 
 
+@pytest.mark.slow
 def test_damping_that_does_not_grow_with_the_speed_is_told_from_that_of_lift():
     rng, time = np.random.default_rng(6), CLOCK.time
     physics = Physics(damping=1.1, authority=-0.9, fin_bend=-0.01, speed_varying=1.0, damping_power=0.0, surge_loss=8.0)
@@ -227,6 +228,7 @@ def test_damping_that_does_not_grow_with_the_speed_is_told_from_that_of_lift():
     assert values["damping_share"] == pytest.approx(0.0, abs=0.25)
 
 
+@pytest.mark.slow
 def test_a_current_is_told_by_a_log_whose_speed_is_over_ground():
     """Through the water the hull is as fast on every heading; the fin's authority goes with that, and not with what is logged."""
     rng, time, north, east = np.random.default_rng(4), CLOCK.time, 0.3, -0.2

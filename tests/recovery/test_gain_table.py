@@ -14,8 +14,8 @@ from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.wish import Wish
 
 SEED = 7
-LONG = ("slim torpedo", "unstable")
-"""Kinds whose gains take as long as those of all others together."""
+QUICK = "flat"
+"""The kind that the quick suite has."""
 
 
 def at_one_speed(number: int) -> Hull:
@@ -41,7 +41,7 @@ def test_the_table_counts_what_was_said_never_to_settle_and_what_was_refused():
 
 @pytest.mark.parametrize(
     "number",
-    [pytest.param(i, id=kind, marks=pytest.mark.slow if kind in LONG else ()) for i, kind in enumerate(KINDS)],
+    [pytest.param(i, id=kind, marks=() if kind == QUICK else pytest.mark.slow) for i, kind in enumerate(KINDS)],
 )
 def test_hulls_of_every_kind_settle_within_what_was_said_and_none_hunts(number):
     rows = evaluate(at_one_speed(number), number, SEED, "pd", "pulses")
@@ -60,6 +60,7 @@ def test_hulls_of_every_kind_settle_within_what_was_said_and_none_hunts(number):
         assert row.as_said or row.said_high > 1.25 * row.said
 
 
+@pytest.mark.slow
 def test_an_unstable_hull_gets_no_proportional_gain_and_is_told_what_holds_it():
     number = list(KINDS).index("unstable")
     hull = at_one_speed(number)

@@ -94,7 +94,9 @@ def test_a_stronger_fin_angle_buys_errors_in_proportion():
     ("axis", "envelope"),
     [
         (Axis.YAW, Envelope(FIN, heading=float(np.radians(40)), track=15.0, roll=0.3)),
-        (Axis.PITCH, Envelope(FIN, pitch=float(np.radians(25)), depth_low=1.0, depth_high=7.0)),
+        pytest.param(
+            Axis.PITCH, Envelope(FIN, pitch=float(np.radians(25)), depth_low=1.0, depth_high=7.0), marks=pytest.mark.slow
+        ),
     ],
 )
 def test_no_plan_leaves_the_envelope_in_more_than_the_stated_share_of_five_hundred_new_draws(axis, envelope):
@@ -147,6 +149,7 @@ def test_a_maneuver_is_stretched_in_time_inside_the_bounds_of_its_parameters():
     assert chirp.parameters["duration"] == 20.0
 
 
+@pytest.mark.slow
 def test_a_wish_is_bought_with_as_many_passes_as_it_needs():
     model = named_prior("torpedo", Axis.YAW)
     once = make_plan(model, Request(Axis.YAW, (1.4,), Envelope(FIN, heading=1.0), {})).legs[0]

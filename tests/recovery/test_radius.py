@@ -50,7 +50,7 @@ def source_of(folder, runs, effects):
     return load_parameter_source([save_model(fit.model, folder / "model.yaml", force=True)])
 
 
-@pytest.mark.parametrize("rudder", [0.2, 0.3])
+@pytest.mark.parametrize("rudder", [pytest.param(0.2, marks=pytest.mark.slow), 0.3])
 def test_pulses_and_zigzag_with_drag_predict_the_circle_within_five_percent_and_the_band_holds_it(
     tmp_path, pulses, zigzag, rudder
 ):
@@ -104,6 +104,7 @@ def test_a_sway_that_this_hull_hardly_shows_costs_accuracy_but_the_band_holds_th
         assert row.radius == pytest.approx(truth, rel=0.25)
 
 
+@pytest.mark.slow
 def test_an_unstable_hull_at_one_speed_of_which_no_fit_knows_which_way_the_fin_turns_has_its_circle_by_all_runs():
     whole = draw_hull(62, 47)
     hull = replace(whole, speeds=whole.speeds[:2])

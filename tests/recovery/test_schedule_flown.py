@@ -35,7 +35,7 @@ class Trial:
     source: ParameterSource
 
 
-@pytest.fixture(scope="module", params=list(HULLS))
+@pytest.fixture(scope="module")
 def trial(request):
     hull = HULLS[request.param]
     flights = [
@@ -74,6 +74,11 @@ def flown(schedule, hull, speed, step):
     return truth["time_s"][after] - LEAD_S, truth["yaw_rad"][after][:, None], truth["surge_m_s"][after]
 
 
+@pytest.mark.parametrize(
+    "trial",
+    ["hardly stable", *(pytest.param(hull, marks=pytest.mark.slow) for hull in ("stable", "unstable"))],
+    indirect=True,
+)
 def test_steps_settle_as_said_and_nothing_hunts(trial):
     limits = FinLimits(lag=FINS.lag)
     assert usual_controller(trial.source) == "pd"
@@ -95,11 +100,11 @@ def test_steps_settle_as_said_and_nothing_hunts(trial):
         assert check.speed_least == pytest.approx(kept.min(), rel=0.05)
 
 
+@pytest.mark.parametrize("trial", ["hardly stable", pytest.param("unstable", marks=pytest.mark.slow)], indirect=True)
 @pytest.mark.parametrize("with_runs", [False, True])
 def test_what_p_cannot_hold_is_refused_with_what_can(trial, with_runs):
     growth = float(np.linalg.eigvals(yaw_plane(trial.hull, 2.0)[0]).real.max())
-    if growth < 0.0:
-        pytest.skip("this hull is stable")
+    assert growth > 0.0
     with pytest.raises(ModelError, match="unstable") as caught:
         design_schedule(
             trial.source, 0.26, speeds=[2.0], wish=Wish("p"), limits=FinLimits(lag=FINS.lag), runs=trial.runs if with_runs else ()

@@ -46,7 +46,7 @@ def test_runs_at_other_speeds_are_carried_to_one():
     np.testing.assert_allclose(b2.values, -1.2, atol=0.15)
 
 
-@pytest.mark.parametrize("scatter", [0.0, 0.06])
+@pytest.mark.parametrize("scatter", [pytest.param(0.0, marks=pytest.mark.slow), 0.06])
 def test_false_alarms_are_rare_with_and_without_scatter_of_the_runs(scatter):
     alarms = 0
     for seed in range(200):

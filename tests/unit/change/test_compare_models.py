@@ -105,6 +105,7 @@ def test_few_data_say_that_more_are_needed_and_not_that_nothing_changed():
     assert "takes more runs to say" in found.line
 
 
+@pytest.mark.slow
 def test_false_alarms_stay_below_one_comparison_in_ten():
     models = [state(Axis.YAW, YAW, 100 * i, joint=False, speeds=(1.4,)) for i in range(1, 41)]
     pairs = list(zip(models[::2], models[1::2], strict=True))

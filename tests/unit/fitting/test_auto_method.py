@@ -71,15 +71,17 @@ def test_a_disturbance_is_fitted_by_prediction_error_whose_numbers_are_nearer_th
     assert (np.std(off["auto"], axis=0) < 0.7 * np.std(off["output_error"], axis=0)).all()
 
 
-def test_a_missing_effect_is_not_taken_for_a_disturbance():
+@pytest.mark.parametrize("flights", [3, pytest.param(9, marks=pytest.mark.slow)])
+def test_a_missing_effect_is_not_taken_for_a_disturbance(flights):
     for hidden in (LAG, SWAY):
-        for seed in range(20, 29):
+        for seed in range(20, 20 + flights):
             found = fit([record(seed, hidden, 0.0)], Axis.YAW)
             assert found.model.method == "output_error"
             (why,) = reason(found)
             assert "follows fin and motion" in why or "the motion's own mean" in why
 
 
+@pytest.mark.slow
 def test_a_missing_lag_at_sea_leaves_prediction_error_only_with_a_free_run_nearly_as_good():
     taken = []
     for seed in range(20, 29):

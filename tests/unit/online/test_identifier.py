@@ -42,24 +42,27 @@ def test_at_the_end_of_a_log_it_is_the_block_estimate_within_its_error(axis, wit
         assert 0.6 < now.std_errors[name] / block[name].std_error < most
 
 
-@pytest.mark.parametrize("colour", [0.0, 0.9])
-def test_intervals_hold_the_truth_as_often_as_they_say(colour):
-    z = np.array([far(fed(OnlineIdentifier("yaw"), flown(seed=s, colour=colour)).estimate()) for s in range(60)])
+@pytest.mark.parametrize(
+    ("colour", "flights", "least"),
+    [(0.9, 10, 0.7), *(pytest.param(colour, 60, 0.85, marks=pytest.mark.slow) for colour in (0.0, 0.9))],
+)
+def test_intervals_hold_the_truth_as_often_as_they_say(colour, flights, least):
+    z = np.array([far(fed(OnlineIdentifier("yaw"), flown(seed=s, colour=colour)).estimate()) for s in range(flights)])
     held = (np.abs(z) < 1.96).mean(axis=0)
-    # 60 flights of true coverage 0.95 give less than 0.85 once in 500
-    assert (held >= 0.85).all(), held
+    # 60 flights of true coverage 0.95 give less than 0.85 once in 500, 10 less than 0.7 once in 1000
+    assert (held >= least).all(), held
     assert (np.sqrt((z**2).mean(axis=0)) > 0.6).all()
 
 
 def test_its_memory_does_not_grow():
     online = OnlineIdentifier("yaw")
-    samples = list(zip(*(s.tolist() for s in flown(count=6000)), strict=True))
-    for sample in samples[:2000]:
+    samples = list(zip(*(s.tolist() for s in flown(count=3900)), strict=True))
+    for sample in samples[:1300]:
         online.update(*sample)
     size = len(json.dumps(online.state()))
     tracemalloc.start()
     held = []
-    for part in (samples[2000:4000], samples[4000:]):  # the first replaces all that a minute keeps
+    for part in (samples[1300:2600], samples[2600:]):  # the first replaces all that a minute keeps
         for sample in part:
             online.update(*sample)
         held.append(tracemalloc.get_traced_memory()[0])

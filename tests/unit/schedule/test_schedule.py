@@ -176,7 +176,7 @@ def test_lag_and_delay_slow_the_gain_until_damping_and_margin_hold():
     assert margins(late, found.gains).phase_deg[0] >= 50.0 - 0.1
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [pytest.param(k, marks=pytest.mark.slow) if k == "pid" else k for k in KINDS])
 def test_every_controller_is_stable_and_keeps_its_margin(kind, yaw, pitch):
     for source in (yaw, pitch):
         schedule = design_schedule(source, 0.26, wish=Wish(kind=kind), limits=FinLimits(0.2, 0.1, 0.6))

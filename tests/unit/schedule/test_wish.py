@@ -44,7 +44,7 @@ def settled(source, schedule):
 
 
 @pytest.mark.parametrize("settling", [None, QUICKEST], ids=["one answer", "quickest"])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 def test_no_constant_gain_is_better_in_any_row(seed, settling):
     draw = np.random.default_rng(seed)
     a22, b2, lag = draw.uniform(-0.1, 1.5), draw.choice([-1.0, 1.0]) * draw.uniform(0.4, 3.0), draw.uniform(0.05, 0.4)
@@ -90,7 +90,11 @@ def test_an_answer_that_is_asked_is_the_answer_and_a_quicker_one_is_refused_with
 
 
 @pytest.mark.parametrize(
-    ("latency", "step", "bound"), [(0.0, None, "fin at 20.0 deg; .*"), (0.6, 0.03, "(damping|phase margin) .*delay 0.6 s")]
+    ("latency", "step", "bound"),
+    [
+        (0.0, None, "fin at 20.0 deg; .*"),
+        pytest.param(0.6, 0.03, "(damping|phase margin) .*delay 0.6 s", marks=pytest.mark.slow),
+    ],
 )
 def test_a_bandwidth_is_kept_and_one_beyond_fin_or_latency_is_refused_with_what_is_possible(latency, step, bound):
     source, limits = source_of(), FinLimits(latency=latency)

@@ -37,6 +37,7 @@ def said(verdict, effects, floor):
     )
 
 
+@pytest.mark.slow
 def test_an_oracle_gets_every_case_right(runner, monkeypatch, capsys):
     truths = {c.validation[0]["surge_m_s"][0]: c for c in (make_case(i, 6) for i in range(6))}
 

@@ -61,6 +61,7 @@ def test_a_noise_of_one_kind_is_left_as_it_is(wander, gust, family):
     assert joint_noise_fit(h.likelihood_fit, BESIDE) is h.likelihood_fit
 
 
+@pytest.mark.slow
 def test_nothing_is_missing_where_sensors_wander_in_a_sea():
     case = make_case(61, 155, kind="none")
     assert case.details["colour"] == "both"

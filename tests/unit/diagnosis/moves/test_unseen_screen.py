@@ -49,6 +49,7 @@ def test_it_proposes_what_only_the_unseen_runs_show(logs):
     assert values["current_sin"] == pytest.approx(HULL.current_sin, rel=0.3)
 
 
+@pytest.mark.slow
 def test_a_current_along_one_heading_is_found_by_the_runs_across(logs):
     fitted, unseen = logs
     found = diagnose(fitted, Axis.YAW, unseen)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from fieldsid.diagnosis.residual_tests.residual_tests import Innovations, _breusch_pagan, _homoscedasticity, _other_signals
 from fieldsid.dynamics.free_run import command_record
@@ -49,6 +50,7 @@ def uneven(rng, burst):
     return Innovations(run.record, run.white * size, run.rate)
 
 
+@pytest.mark.slow
 def test_a_steady_disturbance_is_seldom_said_to_be_uneven():
     rng = np.random.default_rng(4)
     p = np.array([_homoscedasticity([left(rng, 0.0) for _ in range(3)]) for _ in range(1000)])
@@ -79,6 +81,7 @@ def rolling(rng, follows):
     return Innovations(replace(run.record, signals={"roll": roll}), white, run.rate)
 
 
+@pytest.mark.slow
 def test_innovations_are_seldom_said_to_follow_another_signal():
     rng = np.random.default_rng(7)
     p = np.array([_other_signals([rolling(rng, 0.0) for _ in range(3)])[0] for _ in range(400)])
