@@ -29,8 +29,8 @@ from fieldsid.records.kinds import ANY, KINDS
 
 LARGEST_TEXT = 4 << 20
 """Bytes of a file of text: a hundred times the largest that this program writes, the state of a live estimate."""
-MOST_VALUES = 100_000
-"""Keys and values of a YAML file, those behind an alias as often as it is used: more take seconds to read."""
+MOST_VALUES = 30_000
+"""Keys and values of a YAML file, those behind an alias as often as it is used: ten times those of a law of many speeds."""
 DEEPEST = 60
 """Mappings and lists inside one another."""
 LARGEST_INTEGER = 2**64
