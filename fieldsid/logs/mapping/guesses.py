@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fieldsid.logs.channels import ANGLES, ATTITUDE
 from fieldsid.logs.convert.units import dimension_of
-from fieldsid.logs.mapping.canonical_names import canonical, stated_unit, unit_in_name, unit_of_field
+from fieldsid.logs.mapping.canonical_names import unit_in_name, unit_of_field
 from fieldsid.logs.mapping.name_words import words_of
-from fieldsid.logs.mapping.vocabulary import COMMANDED, LATITUDE, LONGITUDE, TIME, word_set
+from fieldsid.logs.mapping.vocabulary import COMMANDED, COMPASS, LATITUDE, LONGITUDE, TIME, word_set
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import DEFINED, TABLE, ChannelInfo, FieldInfo
 from fieldsid.numerics.arrays import FloatArray
@@ -64,17 +64,18 @@ class Guess:
 
 def of_column(channel: ChannelInfo, place: str | int) -> Iterator[Guess]:
     """Yield what a column may be; one of words is no signal."""
-    name, span = channel.name, channel.fields[0].span
+    if channel.kind == "number":
+        yield from _of_number(channel, channel.fields[0], {"column": place}, channel.name)
+
+
+def _of_number(channel: ChannelInfo, info: FieldInfo, item: dict[str, Any], name: str) -> Iterator[Guess]:
+    """Yield what the numbers of a column may be, by its name, or as a part of a standard message that was written to a table."""
     vector = None if COMMANDED & set(words_of(name)) else _part_of_vector(name)
-    found = (vector, STANDARD) if vector is not None else meaning_of(name, span)
-    if found is None or channel.count == 0 or channel.kind != "number" or found[0] == TIME:
-        return
-    signal, sure = found
-    said = canonical(name)
-    unit = said.unit if said is not None else unit_in_name(name, signal)
-    unit = stated_unit(channel.unit, signal) if unit is None and channel.unit else unit
-    item = {"column": place} | ({"unit": unit} if unit not in (None, "1") else {})
-    yield Guess(signal, sure if span is None or span[0] < span[1] else NOTHING, item, channel.count)
+    signal, sure = (vector, STANDARD) if vector is not None else meaning_of(name, info.span) or (TIME, 0.0)
+    if signal != TIME and channel.count:
+        unit = unit_in_name(name, signal, channel.unit)
+        moves = info.span is None or info.span[0] < info.span[1]
+        yield Guess(signal, sure if moves else NOTHING, item | ({} if unit is None else {"unit": unit}), channel.count)
 
 
 def _part_of_vector(path: str, more: Mapping[str, tuple[str, ...]] = _VECTORS) -> str | None:
@@ -127,13 +128,11 @@ def _of_table(channel: ChannelInfo, info: FieldInfo) -> Iterator[Guess]:
     is_nameless = set(words) <= NAMELESS or (len(words) == len("".join(words)) == 1)
     of_both = f"{info.path} {channel.name.partition('[')[0]}"
     name = of_both if is_nameless and (found := meaning_of(of_both)) is not None and found[1] > 1 else info.path
-    column = ChannelInfo(name, info.kind, channel.count, channel.rate_hz, (replace(info, path=""),))
-    for guess in of_column(column, info.path):
+    for guess in _of_number(channel, info, {"topic": channel.name, "field": info.path}, name) if info.kind == "number" else ():
         # a unit in brackets in which a signal cannot be says that it is another one
         has_other = _IN_BRACKETS.search(name) is not None and unit_in_name(name, guess.signal) is None
         if not (has_other and dimension_of(guess.signal) is not None):
-            item = {k: v for k, v in guess.item.items() if k != "column"}
-            yield replace(guess, item={"topic": channel.name, "field": info.path, **item})
+            yield guess
 
 
 def _of_field(channel: ChannelInfo, info: FieldInfo) -> Guess | None:
@@ -174,8 +173,7 @@ def _of_scalar(channel: ChannelInfo, info: FieldInfo, item: dict[str, Any]) -> G
     found = meaning_of(f"{channel.name} {name}".strip(), seen)
     if found is None or found[0] in (TIME, LATITUDE, LONGITUDE):
         return None
-    unit = unit_of_field(channel.name, info.path, found[0])
-    unit = stated_unit(channel.unit, found[0]) if unit is None and channel.unit else unit
-    named = {"heading", "compass", "hdg"} & set(words_of(f"{channel.name} {info.path}"))
+    unit = unit_of_field(channel.name, info.path, found[0], channel.unit)
+    named = COMPASS & set(words_of(f"{channel.name} {info.path}"))
     frame = {"frame": "NED/FRD"} if named and found[0] in ("yaw_rad", "yaw_goal_rad") else {}
     return Guess(*found, item | ({"unit": unit} if unit is not None else {}) | frame, channel.count)

@@ -31,6 +31,8 @@ OF_ANOTHER = word_set(
     "wind ws air variation status mode enabled count id"
 )
 """Words that make a name one of something else than the signal it also names."""
+COMPASS = word_set("heading hdg compass")
+"""Words of a heading that is one by its name: from north, clockwise."""
 OVER_GROUND = word_set("gps gnss course cog sog vtg ground track")
 """Words of a course or a speed over ground, which current and sideslip keep from being the vehicle's own; and of a receiver
 that hears nothing under water, beside a position that was estimated."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from fieldsid.logs.doctor.angle_and_rate import PAIRS
 from fieldsid.logs.mapping.canonical_names import canonical
 from fieldsid.logs.mapping.name_words import unit_said, words_of
 from fieldsid.logs.mapping.vocabulary import (
@@ -22,7 +23,7 @@ from fieldsid.logs.mapping.vocabulary import (
 )
 from fieldsid.logs.run import GOALS
 
-RATES = {"yaw_rad": "yaw_rate_rad_s", "pitch_rad": "pitch_rate_rad_s", "roll_rad": "roll_rate_rad_s"}
+RATES = dict(PAIRS)
 """What an angle's name means beside the unit of a rate, as `yaw_deg_s`."""
 CANONICAL = 9
 """What a canonical name is as sure as."""
