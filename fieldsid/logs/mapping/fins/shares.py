@@ -50,14 +50,12 @@ def moved_by(
     Where the angle (n,) alone was logged its change is the rate, and all goes by the means; `rights` says that its moment rights
     the hull. None where there is too little to tell, or nothing moves.
     """
-    if time.size < 2 * width + FEWEST:
-        return None
     righting = angle if rights else None
-    if rate is None and angle is not None:
+    if rate is None and angle is not None and time.size > width:
         rate = (angle[width:] - angle[:-width]) / (time[width:] - time[:-width])
         fins, righting = [window_mean(time, v, width) for v in fins], window_mean(time, angle, width) if rights else None
         time = time[:-width]
-    if rate is None:
+    if rate is None or time.size < width + FEWEST:
         return None
     grows = (rate[width:] - rate[:-width]) / (time[width:] - time[:-width])
     beside = [window_mean(time, v, width) for v in (rate, righting) if v is not None]
@@ -77,13 +75,11 @@ def fin_shares(left: FloatArray, moved: FloatArray, width: int) -> FinShares:
     answer, _, _, length = np.linalg.lstsq(moved, left, rcond=TOGETHER)
     fitted = answer.astype(np.float64)
     shares, patterns = _shares(fitted), int((length > TOGETHER * length[0]).sum())
-    # as many patterns explain so much of noise: windows that share samples say the same
-    chance = min(patterns * width / left.size, 1.0 - 1e-9)
     return FinShares(
         shares,
         fitted / float(np.sum(np.abs(fitted))),
-        (_explained(left, moved @ shares) - chance) / (1.0 - chance),
-        max(_explained(left, column) for column in moved.T),
+        explained(left, moved @ shares, patterns * width),
+        max(explained(left, column, width) for column in moved.T),
         patterns,
     )
 
@@ -108,9 +104,14 @@ def beyond(base: FloatArray, values: FloatArray) -> FloatArray:
     return np.asarray(values - base @ np.linalg.lstsq(base, values, rcond=None)[0])
 
 
-def _explained(left: FloatArray, along: FloatArray) -> float:
-    power = float(along @ along) * float(left @ left)
-    return float(left @ along) ** 2 / power if power > 0.0 else 0.0
+def explained(left: FloatArray, along: FloatArray, chance: int) -> float:
+    """Return the share of what is left (n,) that goes along some numbers (n,), beyond that of noise.
+
+    Windows that share samples say the same, so that of so many rows as `chance` a pattern explains all.
+    """
+    power, of_noise = float(along @ along) * float(left @ left), min(chance / left.size, 1.0 - 1e-9)
+    share = float(left @ along) ** 2 / power if power > 0.0 else 0.0
+    return (share - of_noise) / (1.0 - of_noise)
 
 
 def _shares(fitted: FloatArray) -> FloatArray:

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from fieldsid.logs.convert.geodetic import north_and_east
 from fieldsid.logs.convert.units import UNITS
 from fieldsid.logs.doctor.angle_and_rate import PAIRS
-from fieldsid.logs.mapping.fins.shares import EXPLAINS, beyond, explains, moved_by
+from fieldsid.logs.mapping.fins.shares import EXPLAINS, beyond, explained, explains, moved_by
 from fieldsid.logs.mapping.fins.shares import WINDOWS_S as SHORT_S
 from fieldsid.logs.mapping.numbers.units_told import Reading, fin_reading, in_radians
 from fieldsid.logs.mapping.numbers.windows import change, width_of
@@ -39,13 +39,13 @@ MOST_SLIP = 3.0
 MOST_WAYS = 30
 BEYOND_TILTS_DEG = 90.0
 CLEARLY = 2.0
-"""How many times as much as any other column a fin must explain that the others do not: 4.8 to 18 on five ships' zigzags."""
+"""How many times as much as any other column a fin must explain that the others do not: 4.8 to 20 on six zigzags of ships."""
 ALIKE = 0.95
 """Correlation of two columns that are one signal twice."""
 ONE_SIDED = 0.2
 """How far a fin goes to one side at least, against the other."""
-WITHIN = 0.2
-"""Share by which a column may miss what it should make, in the mean: a few digits and a current do so much."""
+WITHIN = 0.3
+"""Share by which a column may miss what it should make, in the mean: noise of half a degree, few digits, a current do so much."""
 GLOBE = (90.0, 180.0)
 """Largest latitude and longitude in degrees."""
 AT_REST = 1e-3
@@ -53,7 +53,6 @@ AT_REST = 1e-3
 MOST_COLUMNS, FEWEST = 40, 50
 PLACE = ("x_m", "y_m")
 """Of degrees too, which `is_geographic` tells."""
-TURNING = ("yaw_rad", *(rate for _, rate in PAIRS))
 Column = str | int
 ComplexArray = npt.NDArray[np.complex128]
 
@@ -66,7 +65,7 @@ class Recognised:
     column: Column
     item: Mapping[str, Any]
     why: str
-    trust: float = 0.0
+    trust: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,8 +161,8 @@ TIES = (
 def recognised(samples: Samples, known: Mapping[str, Column], free: list[Column]) -> tuple[Recognised, ...]:
     """Return signals among the columns that nobody named (`free`), beside those that are known by name.
 
-    Of what several ways and windows would give, that in which the most columns find their place among the others is taken, and
-    of those the one in which the rate is the heading's derivative best: that is exact, while a course is off by the sideslip.
+    Of what several ways and windows would give, that in which the most columns find their place among the others, and fit there
+    best, is taken.
     """
     best: tuple[Recognised, ...] = ()
     moving = [c for c in free if _moves(samples.columns[c])] if len(free) <= MOST_COLUMNS else []
@@ -181,8 +180,8 @@ def _scenes(samples: Samples, known: Mapping[str, Column], free: list[Column]) -
     yield from (_Scene(samples, width, known, free) for width in widths if samples.time.size > width + FEWEST)
 
 
-def _worth(found: tuple[Recognised, ...]) -> tuple[int, float]:
-    return len(found), round(max((r.trust for r in found if r.signal in TURNING), default=0.0), ndigits=3)
+def _worth(found: tuple[Recognised, ...]) -> float:
+    return sum(r.trust for r in found)
 
 
 def _moves(values: FloatArray) -> bool:
@@ -250,45 +249,51 @@ def _pointing(
         if trust > TURNS_ALONG and 1.0 / MOST_SLIP < slope < MOST_SLIP:
             why = f"{100 * along:.1f} % of the way that columns {' and '.join(map(str, place))} make is made along it"
             same = f"the way made in it is along the heading in column {heading}"
-            of_place = [Recognised(s, c, item, same) for s, c in zip(PLACE, place, strict=True) if s not in scene.known]
+            of_place = [Recognised(s, c, item, same, along) for s, c in zip(PLACE, place, strict=True) if s not in scene.known]
             yield [Recognised("yaw_rad", heading, {"unit": unit}, f"{why}, correlation {trust:.3f}", trust), *of_place]
 
 
-def _fin(scene: _Scene) -> Iterator[Recognised]:
-    """Yield the rudder: of the columns about zero that which the change of the yaw rate follows beside the rate itself."""
-    known, columns = scene.known, scene.samples.columns
-    fins = {c: fin for c in scene.free if (fin := _deflected(columns[c])) is not None}
+def _fin(scene: _Scene) -> list[Recognised]:
+    """Return the rudder: of the columns about zero that which the change of the yaw rate follows beside the rate itself.
+
+    The shortest window counts that tells it: over a long one a ship's roll goes with the yaw rate's change as its rudder does.
+    """
+    known, fins = scene.known, {c: fin for c in scene.free if (fin := _deflected(scene.values(c))) is not None}
     if {"rudder_rad", "rudder_measured_rad"} & known.keys() or not {"yaw_rad", "yaw_rate_rad_s"} & known.keys() or not fins:
-        return
-    rate = np.nan_to_num(columns[known["yaw_rate_rad_s"]]) if "yaw_rate_rad_s" in known else None
+        return []
+    rate = np.nan_to_num(scene.values(known["yaw_rate_rad_s"])) if "yaw_rate_rad_s" in known else None
     angle = scene.angle("yaw_rad") if "yaw_rad" in known else None
-    means = [np.nan_to_num(columns[c]) - fin.centre for c, fin in fins.items()]
-    told = moved_by(means, scene.samples.time, rate, angle, scene.width, rights=False)
-    if told is None:
-        return
-    grows, moved = told
+    angles = [np.nan_to_num(scene.values(c)) - fin.centre for c, fin in fins.items()]
+    for width in (width_of(scene.samples.time, window) for window in WINDOWS_S):
+        told = moved_by(angles, scene.samples.time, rate, angle, width, rights=False)
+        best = _moving(list(fins), angles, *told, width) if told is not None else None
+        if best is not None:
+            column, why, trust = best
+            return [Recognised("rudder_rad", column, fins[column].item, why, trust)]
+    return []
+
+
+def _moving(
+    names: list[Column], angles: list[FloatArray], grows: FloatArray, moved: FloatArray, width: int
+) -> tuple[Column, str, float] | None:
+    """Return which of some columns (n,) moves a rate by what `moved_by` gives of them, why, and how well; None for none."""
 
     def left(of: list[int]) -> float:
         """Return the share of the rate's change that some columns leave."""
         return float(np.sum(beyond(moved[:, of], grows) ** 2) / np.sum(grows**2))
 
-    alone = [1.0 - left([i]) for i in range(len(fins))]
+    alone = [explained(grows, column, width) for column in moved.T]
     best = int(np.argmax(alone))
-    if alone[best] < EXPLAINS:
-        return
     # sway and roll follow the fin too: what counts is what the others do not explain as well
-    every = [best, *(i for i in range(len(fins)) if i != best and slope_of(moved[:, i], moved[:, best])[1] < ALIKE)]
+    every = [best, *(i for i in range(len(names)) if i != best and slope_of(angles[i], angles[best])[1] < ALIKE)]
     own = {i: left([o for o in every if o != i]) - left(every) for i in every if len(every) > 1}
     rival = max(every[1:], key=lambda i: own[i], default=None)
-    if rival is not None and own[best] < CLEARLY * own[rival]:
-        return
-    names = list(fins)
-    adds = (
-        ""
-        if rival is None
-        else f", and adds {100 * own[best]:.0f} % to the others, column {names[rival]} {100 * own[rival]:.0f} %"
-    )
-    yield Recognised("rudder_rad", names[best], fins[names[best]].item, f"it explains {explains(alone[best], 'yaw_rate')}{adds}")
+    if alone[best] < EXPLAINS or (rival is not None and own[best] < CLEARLY * own[rival]):
+        return None
+    why = f"it explains {explains(alone[best], 'yaw_rate')}"
+    if rival is not None:
+        why += f", and adds {100 * own[best]:.0f} % to the others, column {names[rival]} {100 * own[rival]:.0f} %"
+    return names[best], why, alone[best]
 
 
 def _deflected(values: FloatArray) -> Reading | None:
