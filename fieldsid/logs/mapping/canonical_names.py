@@ -49,11 +49,6 @@ def canonical(column: str) -> Canonical | None:
     return None
 
 
-def canonical_names() -> tuple[str, ...]:
-    """Return the names that are read with no mapping, time first."""
-    return (TIME, *SIGNALS)
-
-
 def fitting(signal: str) -> tuple[str, ...]:
     """Return the dimensions that a signal's numbers may have: a depth may be a pressure; none where any unit may be meant."""
     dimension = {TIME: "time", POSITION: "angle", LATITUDE: "angle", LONGITUDE: "angle"}.get(signal, dimension_of(signal))

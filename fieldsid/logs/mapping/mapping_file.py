@@ -24,7 +24,6 @@ from fieldsid.logs.run import PART, SIGNALS, signal_of
 from fieldsid.registry import near
 from fieldsid.strict import StrictModel, read_model, validated
 
-SCHEMA = "fieldsid/mapping/1"
 Column = Annotated[int, Field(ge=0)] | str
 OF_FINS = "; `us` for a servo's pulses, `1` where -1 .. 1 is the whole range, `counts` for others"
 Finite = Annotated[float, Field(allow_inf_nan=False)]

@@ -13,6 +13,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from fieldsid.logs.mapping.numbers.windows import FEWEST
 from fieldsid.numerics.arrays import FloatArray
 
 TOGETHER = 0.05
@@ -27,7 +28,6 @@ EXPLAINS = 0.3
 """Share of a rate's change beside the rate's own that a fin must explain."""
 WINDOWS_S = (1.0, 2.0)
 """Times over which changes are taken: a fin shows best in a short one."""
-FEWEST = 50
 MOST_ROWS = 100_000
 
 

@@ -23,7 +23,7 @@ from fieldsid.logs.doctor.angle_and_rate import PAIRS
 from fieldsid.logs.mapping.fins.shares import EXPLAINS, beyond, explained, explains, moved_by
 from fieldsid.logs.mapping.fins.shares import WINDOWS_S as SHORT_S
 from fieldsid.logs.mapping.numbers.units_told import Reading, fin_reading, in_radians
-from fieldsid.logs.mapping.numbers.windows import change, width_of
+from fieldsid.logs.mapping.numbers.windows import FEWEST, change, width_of
 from fieldsid.logs.reader import Samples
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.shifted_correlation import slope_of
@@ -50,7 +50,7 @@ GLOBE = (90.0, 180.0)
 """Largest latitude and longitude in degrees."""
 AT_REST = 1e-3
 """A way of less than this in a second is no vehicle's in m, and every vehicle's in degrees of latitude and longitude."""
-MOST_COLUMNS, FEWEST = 40, 50
+MOST_COLUMNS = 40
 PLACE = ("x_m", "y_m")
 """Of degrees too, which `is_geographic` tells."""
 Column = str | int

@@ -18,7 +18,7 @@ from fieldsid.logs.doctor.course_findings import AGREES, TURNED, WINDOW_S
 from fieldsid.logs.mapping.canonical_names import unit_in_name
 from fieldsid.logs.mapping.name_words import words_of
 from fieldsid.logs.mapping.numbers.units_told import in_radians
-from fieldsid.logs.mapping.numbers.windows import change, width_of
+from fieldsid.logs.mapping.numbers.windows import FEWEST, change, width_of
 from fieldsid.logs.mapping.vocabulary import COMMANDED, COMPASS, LATITUDE, LONGITUDE, OF_ANOTHER, OVER_GROUND
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import Samples
@@ -27,7 +27,6 @@ from fieldsid.numerics.arrays import FloatArray
 
 NEAR = math.pi / 4
 """How far the angle between them may be from what it should be: sideslip, a current and a compass' error lie in it."""
-FEWEST = 50
 ENU = "ENU"
 GEOGRAPHIC = frozenset({"north", "northing", "east", "easting", "n", "e", "utm"})
 """Words of a column of metres that say which way it counts."""

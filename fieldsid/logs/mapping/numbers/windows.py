@@ -9,6 +9,8 @@ import numpy.typing as npt
 
 from fieldsid.numerics.arrays import FloatArray
 
+FEWEST = 50
+"""Windows from which on columns are compared."""
 Number = TypeVar("Number", np.float64, np.complex128)
 
 
