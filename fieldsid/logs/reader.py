@@ -133,6 +133,11 @@ class Inventory(Brief):
         """Whether its signals are fields of topics, each on a clock of its own, and not columns of a table."""
         return self.form.endswith("bag") or self.frame is not None
 
+    @property
+    def is_named(self) -> bool:
+        """Whether its columns have names: a text table may have none."""
+        return self.table is None or bool(self.table.header)
+
 
 def _unseen(share: float) -> None:
     """Show the progress to nobody."""

@@ -28,6 +28,27 @@ TANK = {
 }
 
 
+def columns_of(log):
+    return {s: item["column"] for s, item in inspect_log(log).proposal.body["signals"].items()}
+
+
+def test_the_tanks_columns_are_known_by_their_numbers_the_rudder_beside_a_roll_that_goes_with_it(shared_data):
+    wanted = {s: item if isinstance(item, int) else item["column"] for s, item in TANK["signals"].items()}
+    for log in sorted((shared_data / "kvlcc2").glob("*.dat")):
+        found = columns_of(log)
+        assert found.items() <= wanted.items()
+        assert wanted.keys() - found.keys() <= {"sway_m_s"}
+
+
+@pytest.mark.parametrize("flight", ["zigzag_v1.00", "zigzag_v1.90", "rudder_v1.50"])
+def test_a_vehicles_noisy_columns_without_names_are_told_apart(shared_data, tmp_path, flight):
+    table = pd.read_csv(shared_data / "lauv" / f"{flight}.csv.gz")
+    table.to_csv(tmp_path / "log.dat", header=False, index=False, sep=" ")
+    found = columns_of(tmp_path / "log.dat")
+    assert {s: table.columns[c] for s, c in found.items()} == {s: s for s in found}
+    assert {"yaw_rad", "yaw_rate_rad_s", "surge_m_s", "x_m", "y_m", "rudder_rad"} <= found.keys()
+
+
 def test_the_tanks_tables_come_in_by_index(shared_data):
     logs = sorted((shared_data / "kvlcc2").glob("*.dat"))
     assert len(logs) == 5

@@ -33,8 +33,10 @@ LEAST_DIVE, MOST_DIVE = 0.7, 1.4
 """How many times what speed and pitch say a depth may change: a heave lies between."""
 DEPTHS = {unit: factor_to("depth_m", unit) for unit in ("ft", "fathom", "cm", "mm")}
 """Units in which a depth is logged, in m."""
-LEAST_WAY_M = 0.3
-"""Way made in a window below which it is the sensors' noise."""
+HEADINGS = {"deg": math.degrees(1.0), "rad": math.radians(1.0)}
+"""Units in which a heading is that was taken for the other one, by how many times as far it turns."""
+SLOWEST_M_S = 0.1
+"""Speed below which the way made is the sensors' noise."""
 SPREADS = 4.0
 """Standard deviations by which a correlation must be off zero, by Fisher's z = atanh(r) over windows that share no sample."""
 
@@ -45,24 +47,26 @@ def course_findings(run: Run, stated: Stated | None = None) -> list[Note]:
     return [*found, *(_dive(run, stated or Stated()) if all(run.has(s) for s in ("depth_m", "pitch_rad", "surge_m_s")) else [])]
 
 
-def _windows(run: Run, *signals: str) -> tuple[FloatArray, int, list[FloatArray]] | None:
+def _windows(run: Run, *signals: str, window_s: float = WINDOW_S) -> tuple[FloatArray, int, list[FloatArray]] | None:
     """Return the times (n,) at which all signals are there, the samples of a window, and the signals; None where too few."""
     good = np.all([np.isfinite(run[s]) for s in signals], axis=0)
     if good.sum() < 50:
         return None
     time = run.time[good]
-    width = max(1, round(WINDOW_S / float(np.median(np.diff(time)))))
+    width = max(1, round(window_s / float(np.median(np.diff(time)))))
     return (time, width, [run[s][good] for s in signals]) if time.size > 4 * width else None
 
 
 @dataclass(frozen=True, slots=True)
-class _Course:
-    """The course made (m,) over windows in which a vehicle moved, the heading in them, their way, and the share they are."""
+class Course:
+    """The course made (m,) over windows of `width` samples in which a vehicle moved, what goes with it, and their share."""
 
     course: FloatArray
     heading: FloatArray
+    rate: FloatArray
     way: FloatArray
     moved: float
+    width: int
 
     @property
     def slope(self) -> float | None:
@@ -74,22 +78,23 @@ class _Course:
         return math.sqrt(float(c @ c) / float(h @ h))
 
 
-def _course_of(run: Run) -> _Course | None:
-    """Return the course that a run makes; None where it makes none."""
-    found = _windows(run, "x_m", "y_m", "yaw_rad")
+def course_of(run: Run, window_s: float = WINDOW_S) -> Course | None:
+    """Return the course that a run makes over windows in s; None where it makes none."""
+    found = _windows(run, "x_m", "y_m", "yaw_rad", window_s=window_s)
     if found is None:
         return None
     time, width, (x, y, yaw) = found
     dx, dy = x[width:] - x[:-width], y[width:] - y[:-width]
     way = np.hypot(dx, dy)
-    moved = way > LEAST_WAY_M
+    moved = way > SLOWEST_M_S * window_s
     heading = trapezoid_integral(time, yaw)
-    mean = (heading[width:] - heading[:-width]) / (time[width:] - time[:-width])
-    return None if moved.sum() < FEWEST else _Course(np.arctan2(dy, dx)[moved], mean[moved], way[moved], float(moved.mean()))
+    mean, rate = ((v[width:] - v[:-width]) / (time[width:] - time[:-width]) for v in (heading, yaw))
+    share = float(moved.mean())
+    return None if moved.sum() < FEWEST else Course(np.arctan2(dy, dx)[moved], mean[moved], rate[moved], way[moved], share, width)
 
 
 def _course(run: Run) -> list[Note]:
-    found = _course_of(run)
+    found = course_of(run)
     if found is None:
         return []
     # by the way made: a course of little more than the sensors' noise says little
@@ -109,7 +114,9 @@ def _course(run: Run) -> list[Note]:
             f"the course made from x_m and y_m turns {slope:.3g} times as far as yaw_rad (limits {1 / RATIO:g} and {RATIO:g}): "
             "a degree is 0.01745 rad; check the unit of the heading"
         )
-        return [Note("course_slope", message, {"signal": "yaw_rad", "value": slope, "limit": RATIO})]
+        unit = next((u for u, factor in HEADINGS.items() if 1.0 / RATIO < slope * factor < RATIO), None)
+        data = {"signal": "yaw_rad", "value": slope, "limit": RATIO} | ({} if unit is None else {"unit": unit})
+        return [Note("course_slope", message, data)]
     off = math.remainder(float(np.angle(along)), math.tau)
     if abs(along) > AGREES and abs(off) > math.pi / 4:
         message = (
@@ -122,7 +129,7 @@ def _course(run: Run) -> list[Note]:
 
 def goes_along_course(run: Run) -> bool:
     """Whether the course made turns as far as the heading does, and turns at all: so it is in the unit it is taken in."""
-    found = _course_of(run)
+    found = course_of(run)
     return found is not None and found.slope is not None and 1.0 / RATIO < found.slope < RATIO
 
 

@@ -49,11 +49,6 @@ def canonical(column: str) -> Canonical | None:
     return None
 
 
-def canonical_names() -> tuple[str, ...]:
-    """Return the names that are read with no mapping, time first."""
-    return (TIME, *SIGNALS)
-
-
 def fitting(signal: str) -> tuple[str, ...]:
     """Return the dimensions that a signal's numbers may have: a depth may be a pressure; none where any unit may be meant."""
     dimension = {TIME: "time", POSITION: "angle", LATITUDE: "angle", LONGITUDE: "angle"}.get(signal, dimension_of(signal))
@@ -67,21 +62,24 @@ def stated_unit(text: str, signal: str) -> str | None:
     return next((u.name for u in units if u is not None and u.dimension in fitting(signal)), None)
 
 
-def unit_in_name(name: str, signal: str) -> str | None:
-    """Return the unit a name states for a signal: `heading [deg]`, `r (deg/s)`, `DepthFt`; None when it states none that fits.
+def unit_in_name(name: str, signal: str, beside: str | None = None) -> str | None:
+    """Return the unit a name, or what stands beside it, states for a signal: `heading [deg]`, `r (deg/s)`, `DepthFt`; else None.
 
     A rate named with the unit of its angle, or a speed with that of its way, is one by a second.
     """
-    dimensions = fitting(signal)
+    said, dimensions = canonical(name), fitting(signal)
+    if said is not None and said.signal == signal and said.unit != "1":
+        return said.unit
     found = unit_said(name, dimensions) or (unit_said(name, ("time", "ratio")) if signal in FINS else None)
     if found is not None and (found.dimension in dimensions or found.name in BY_UNIT):
         return "rad/s" if found.name == "rev/s" and signal != "propeller_rpm" else found.name
     whole = unit_said(name, (OF_CHANGES[dimensions[0]],)) if dimensions and dimensions[0] in OF_CHANGES else None
     by_second = None if whole is None else find_unit(f"{whole.name}/s")
-    return None if by_second is None else by_second.name
+    return by_second.name if by_second is not None else stated_unit(beside, signal) if beside else None
 
 
-def unit_of_field(topic: str, field: str, signal: str) -> str | None:
+def unit_of_field(topic: str, field: str, signal: str, beside: str | None = None) -> str | None:
     """Return the unit that a field of a topic states by its name, or where that says nothing, as `data`, the topic's."""
     last = field.rpartition(".")[2]
-    return unit_in_name(last, signal) or (unit_in_name(topic.rpartition("/")[2], signal) if last in OF_TOPIC else None)
+    of_topic = unit_in_name(topic.rpartition("/")[2], signal) if last in OF_TOPIC else None
+    return of_topic or unit_in_name(last, signal, beside)

@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, Source
-from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, servo_of
-from fieldsid.logs.doctor.signal_findings import LARGEST
 from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion_of
 from fieldsid.logs.mapping.name_words import words_of
-from fieldsid.logs.mapping.numbers.recognise import PLACES, recognised, unit_of_heading
+from fieldsid.logs.mapping.numbers.recognise import PLACE, recognised
 from fieldsid.logs.mapping.numbers.true_north import true_north
+from fieldsid.logs.mapping.numbers.units_told import set_by_size
 from fieldsid.logs.mapping.vocabulary import LATITUDE, LONGITUDE
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import TABLE, Inventory, Samples
@@ -31,7 +30,6 @@ NORTH_EAST_DOWN = frozenset({"ned", "px"})
 """Words of topics whose frames are others: of one called so, and of PX4's."""
 OTHER_HEADINGS, OTHERS_SHOWN = 4, 3
 """Headings beside the surest that are tried, and others of any signal that are named."""
-TURN = 6.4
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,36 +42,24 @@ class Draft:
     headings: tuple[dict[str, Any], ...] = ()
 
 
-def label_of(item: Mapping[str, Any]) -> str:
-    """Return where a line of a mapping reads a signal, in words."""
-    return f"topic `{item['topic']}`" if "topic" in item else f"column `{item.get('column', item.get('columns'))}`"
-
-
 def place_of(item: Mapping[str, Any]) -> str:
     """Return where a mapping's line says that a signal is: its column, its topic and field, or those of its sum."""
     if "sum" in item:
         return " + ".join(map(place_of, item["sum"]))
     if "topic" in item:
         return f"{item['topic']} {item['field']}".strip() if item.get("field") not in (None, "", "data") else str(item["topic"])
-    return ", ".join(map(str, item["columns"])) if "columns" in item else str(item.get("column", ""))
-
-
-def unit_by_size(signal: str, largest: float) -> str | None:
-    """Return degrees where numbers of such a size are none of an angle or a rate in rad."""
-    limit, unit = (TURN, "deg") if signal in ("yaw_rad", "yaw_goal_rad") else LARGEST.get(signal, (np.inf, ""))
-    return unit if largest > limit and unit.startswith("deg") else None
+    column = item.get("column", "")
+    return (
+        ", ".join(map(str, item["columns"])) if "columns" in item else f"column {column}" if isinstance(column, int) else column
+    )
 
 
 def with_units_by_span(draft: Draft, inventory: Inventory) -> None:
     """Set the units that the least and largest of a column say, in a log that cannot be read as it is."""
-    spans = {
-        c.name: np.array(c.fields[0].span) for c in inventory.channels if len(c.fields) == 1 and c.fields[0].span is not None
-    }
-    _as_counts(spans, draft.body["signals"])
-    for signal, item in draft.body["signals"].items():
-        span = spans.get(item.get("column", ""))
-        unit = None if span is None or "unit" in item else unit_by_size(signal, float(np.abs(span).max()))
-        item.update({} if unit is None else {"unit": unit})
+    spans = {c.name: c.fields[0].span for c in inventory.channels if len(c.fields) == 1}
+    signals = draft.body["signals"]
+    seen = {s: np.array(span) for s, item in signals.items() if (span := spans.get(item.get("column", ""))) is not None}
+    set_by_size(signals, seen, {})
 
 
 def draft_of(inventory: Inventory) -> Draft:
@@ -89,12 +75,11 @@ def draft_of(inventory: Inventory) -> Draft:
         body["frame"] = _frame_of_topics(inventory)
     else:
         source = samples.source if samples is not None else inventory.no_clock[0] if inventory.no_clock is not None else None
-        body |= {} if source is None else {"time": _time(inventory, source)}
+        body |= {} if source is None else {"time": _time(source)}
         body |= {"frame": REP103} if any(_MESSAGE_PATH.search(name) for name in names) else {}
     if samples is not None:
-        notes += _by_numbers(samples, signals, inventory)
+        notes += _by_numbers(samples, signals)
         notes += [] if "frame" in body else true_north(samples, names, signals)
-        _as_counts(samples.columns, signals)
     body["signals"] = {s: signals[s] for s in (ATTITUDE, POSITION, *SIGNALS) if s in signals}
     defined = {s for s, guess in best.items() if guess.defined}
     defined |= {*(ANGLES if ATTITUDE in signals else ()), *(("x_m", "y_m") if POSITION in signals else ())}
@@ -103,11 +88,10 @@ def draft_of(inventory: Inventory) -> Draft:
 
 def _of_columns(inventory: Inventory, names: list[str]) -> list[Guess]:
     """Return what the columns of a table may be; a name that several have, or none, says nothing of which one is meant."""
-    is_named = inventory.table is None or bool(inventory.table.header)
     starts = GLIDER_SENSORS if GLIDER_CLOCK in names else ("",)
     return [
         guess
-        for i, channel in enumerate(inventory.channels if is_named else ())
+        for i, channel in enumerate(inventory.channels if inventory.is_named else ())
         if channel.name.startswith(starts)
         for guess in of_column(channel, channel.name if names.count(channel.name) == 1 else i)
     ]
@@ -121,19 +105,11 @@ def _frame_of_topics(inventory: Inventory) -> str:
     return inventory.frame or (NED if NORTH_EAST_DOWN & set(named) else REP103)
 
 
-def _time(inventory: Inventory, source: Source) -> dict[str, Any]:
+def _time(source: Source) -> dict[str, Any]:
     """Return a time as a mapping has it: one column or several, its unit, and the columns of its days or weeks."""
-    # without a header a column goes by its place
-    of = int if inventory.table is not None and not inventory.table.header else lambda column: column
-    date = [of(c) for c in source.date]
-    keys = {
-        "column": None if source.column is None else of(source.column),
-        "columns": [of(c) for c in source.columns] or None,
-        "unit": source.unit,
-        "date": date[0] if len(date) == 1 else date or None,
-        "week": None if source.week is None else of(source.week),
-    }
-    return {key: value for key, value in keys.items() if value is not None}
+    date = source.date[0] if len(source.date) == 1 else list(source.date)
+    line = {"column": source.column, "columns": list(source.columns), "unit": source.unit, "date": date, "week": source.week}
+    return {key: value for key, value in line.items() if value not in (None, [])}
 
 
 def _combined(best: dict[str, Guess], attitude: dict[str, Any] | None) -> dict[str, Any]:
@@ -182,50 +158,27 @@ def _best(guesses: Iterable[Guess]) -> tuple[dict[str, Guess], list[Note]]:
         first = best[signal] = ordered[0]
         # of two that a format defines to be one signal both are it
         near = [g for g in ordered[1 : 1 + OTHERS_SHOWN] if g.sure > 0.5 * first.sure and not (g.defined and first.defined)]
-        others = [label_of(g.item) for g in near]
+        others = [f"`{place_of(g.item)}`" for g in near]
         if others and signal in SIGNALS:
-            message = f"{signal} is taken from {label_of(first.item)}; it may also be {', '.join(others)}"
+            message = f"{signal} is taken from `{place_of(first.item)}`; it may also be {', '.join(others)}"
             notes.append(Note("alternatives", message, {"signal": signal, "others": others}))
     return best, notes
 
 
-def _by_numbers(samples: Samples, signals: dict[str, Any], inventory: Inventory) -> list[Note]:
+def _by_numbers(samples: Samples, signals: dict[str, Any]) -> list[Note]:
     """Add what the numbers of columns without a known name say, and return the reasons."""
     columns = samples.columns
-    known = {s: i["column"] if i["column"] in columns else str(i["column"]) for s, i in signals.items() if "column" in i}
-    used = {*known.values(), *samples.source.places, *(c for i in signals.values() for c in i.get("columns", ()))}
-    named = inventory.table is None or inventory.table.header
-    free = [c for c in columns if c not in used and not (named and isinstance(c, str) and meaning_of(c) is not None)]
+    known = {s: i["column"] for s, i in signals.items() if "column" in i}
     if "unit" not in signals.get(POSITION, {"unit": ""}):
-        known |= dict(zip((LATITUDE, LONGITUDE), signals[POSITION]["columns"], strict=True))
-    known = {s: c for s, c in known.items() if c in columns}
-    where = [known[s] for s in PLACES if s in known]
-    if "yaw_rad" in known and len(where) == 2:
-        unit = unit_of_heading(samples, known["yaw_rad"], (where[0], where[1]))
-        signals["yaw_rad"] |= {} if unit is None or "unit" in signals["yaw_rad"] else {"unit": unit}
+        known |= dict(zip(PLACE, signals[POSITION]["columns"], strict=True))
+    used = {*known.values(), *samples.source.places, *(c for i in signals.values() for c in i.get("columns", ()))}
+    free = [c for c in columns if c not in used and not (isinstance(c, str) and meaning_of(c) is not None)]
     notes = []
-    for found in recognised(samples, known, free):
-        place = found.column if named else int(found.column)
-        if found.signal == LONGITUDE:
-            signals[POSITION] = {"columns": [signals.pop(LATITUDE)["column"], place]}
+    for found in recognised(samples, {s: c for s, c in known.items() if c in columns}, free):
+        signal, place = POSITION if found.signal in PLACE and found.item else found.signal, found.column
+        if signal == POSITION:
+            signals[POSITION] = {"columns": [*signals.get(POSITION, {"columns": []})["columns"], place]}
         else:
-            signals[found.signal] = {"column": place, **found.item}
-        data = {"signal": found.signal, "column": place}
-        notes.append(Note("evidence", f"{found.signal} is column {found.column}: {found.why}", data))
+            signals[signal] = {"column": place, **found.item}
+        notes.append(Note("evidence", f"{signal} is column {place}: {found.why}", {"signal": signal, "column": place}))
     return notes
-
-
-def _as_counts(columns: Mapping[Any, Any], signals: dict[str, Any]) -> None:
-    """Write the centre of fins and motors that are logged in a servo's counts, by the numbers (n,) of their columns.
-
-    One that never moves far tells no kind of counts itself, and is in that of the fins where its numbers fit it.
-    """
-    seen = {s: columns.get(signals[s].get("column", "")) for s in COUNTED if s in signals and "unit" not in signals[s]}
-    values = {s: v[np.isfinite(v)] for s, v in seen.items() if v is not None and np.isfinite(v).any()}
-    kinds = {s: servo_of(v) for s, v in values.items()}
-    for signal, v in values.items():
-        whole = bool((v == np.round(v)).all())
-        others = (k for s in FINS if (k := kinds.get(s)) is not None and whole and k.least <= v.min() and v.max() <= k.largest)
-        servo = kinds[signal] or next(others, None)
-        if servo is not None:
-            signals[signal] |= {"unit": COUNTS, "centre": round(servo.centre)}

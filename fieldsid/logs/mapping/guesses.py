@@ -4,30 +4,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fieldsid.logs.channels import ANGLES, ATTITUDE
 from fieldsid.logs.convert.units import dimension_of
-from fieldsid.logs.mapping.canonical_names import canonical, stated_unit, unit_in_name, unit_of_field
+from fieldsid.logs.mapping.canonical_names import unit_in_name, unit_of_field
 from fieldsid.logs.mapping.name_words import words_of
-from fieldsid.logs.mapping.vocabulary import COMMANDED, LATITUDE, LONGITUDE, TIME, word_set
-from fieldsid.logs.mapping.word_meaning import meaning_of
+from fieldsid.logs.mapping.vocabulary import COMMANDED, COMPASS, LATITUDE, LONGITUDE, TIME, word_set
+from fieldsid.logs.mapping.word_meaning import STANDARD, meaning_of, part_of
 from fieldsid.logs.reader import DEFINED, TABLE, ChannelInfo, FieldInfo
 from fieldsid.numerics.arrays import FloatArray
 
-_TURNS = ("roll_rate_rad_s", "pitch_rate_rad_s", "yaw_rate_rad_s")
-_VECTORS: Mapping[str, tuple[str, ...]] = {
-    "angular_velocity": _TURNS,
-    "angular": _TURNS,
-    "linear": ("surge_m_s", "sway_m_s", "heave_m_s"),
-    "position": ("x_m", "y_m", "depth_m"),
-}
-"""Vectors of the standard messages: the signals of their x, y and z."""
-_EULER_VECTOR: Mapping[str, tuple[str, ...]] = {"vector": ANGLES[::-1]}
-_EULER = word_set("rpy euler attitude orientation angles")
 _COUNTERS = word_set("seq sec nanosec secs nsecs")
 NAMELESS = word_set("field data value val")
 """Words of a column that is called by its table's name."""
@@ -36,10 +26,12 @@ _PLANAR = {
     "theta": "yaw_rad", "angular_velocity": "yaw_rate_rad_s", "linear_velocity": "surge_m_s", "x": "x_m", "y": "y_m",
 }  # fmt: skip
 """Fields of a pose in the plane, which has an x, a y and one angle."""
+FRAMES = {"enu": "ENU/FLU", "flu": "ENU/FLU", "ned": "NED/FRD", "frd": "NED/FRD"}
+"""Words of a name that say in which frames its numbers are."""
 _FRAMED = word_set("ned enu local")
 """Words of a pose whose x and y are metres: others are in degrees of latitude and longitude."""
-FORMAT, STANDARD, EULER, PRESSURE, PLANE = 9.0, 8.0, 6.0, 6.0, 5.0
-"""What is as sure as that: a field that its format defines, a part of a standard message, which is in SI, an angle, and so on."""
+FORMAT, PRESSURE, PLANE = 9.0, 6.0, 5.0
+"""What is as sure as that: a field that its format defines, a pressure, a part of a pose in the plane."""
 NOTHING = 0.1
 """What a column that never changes is as sure as, beside one that does."""
 _PARTS_OF_QUATERNION = (
@@ -64,24 +56,28 @@ class Guess:
 
 def of_column(channel: ChannelInfo, place: str | int) -> Iterator[Guess]:
     """Yield what a column may be; one of words is no signal."""
-    name, span = channel.name, channel.fields[0].span
-    vector = None if COMMANDED & set(words_of(name)) else _part_of_vector(name)
-    found = (vector, STANDARD) if vector is not None else meaning_of(name, span)
-    if found is None or channel.count == 0 or channel.kind != "number" or found[0] == TIME:
+    if channel.kind == "number":
+        yield from _of_number(channel, channel.fields[0], {"column": place}, channel.name)
+
+
+def _of_number(
+    channel: ChannelInfo, info: FieldInfo, item: dict[str, Any], name: str, *, of_message: bool = False
+) -> Iterator[Guess]:
+    """Yield what the numbers of a column, or of a field of messages, may be by a name."""
+    first = [float(v) for v in info.first if isinstance(v, (int, float))]
+    span = info.span or ((min(first), max(first)) if first else None)
+    signal, sure = meaning_of(name, span) or (TIME, 0)
+    if signal == TIME or not channel.count or (of_message and signal in (LATITUDE, LONGITUDE)):
         return
-    signal, sure = found
-    said = canonical(name)
-    unit = said.unit if said is not None else unit_in_name(name, signal)
-    unit = stated_unit(channel.unit, signal) if unit is None and channel.unit else unit
-    item = {"column": place} | ({"unit": unit} if unit not in (None, "1") else {})
-    yield Guess(signal, sure if span is None or span[0] < span[1] else NOTHING, item, channel.count)
-
-
-def _part_of_vector(path: str, more: Mapping[str, tuple[str, ...]] = _VECTORS) -> str | None:
-    """Return the signal of one part of a standard message's vector, as in `twist.twist.angular.z`; None of any other."""
-    parent, _, last = path.rpartition(".")
-    vector = {**_VECTORS, **more}.get(parent.rpartition(".")[2])
-    return None if vector is None or last not in ("x", "y", "z") else vector["xyz".index(last)]
+    beside = channel.unit
+    unit = unit_of_field(channel.name, info.path, signal, beside) if of_message else unit_in_name(name, signal, beside)
+    is_compass = of_message and signal in ("yaw_rad", "yaw_goal_rad") and COMPASS & set(words_of(f"{channel.name} {info.path}"))
+    framed = next((frame for word, frame in FRAMES.items() if word in words_of(name)), "NED/FRD" if is_compass else None)
+    how = ({} if unit is None else {"unit": unit}) | ({} if framed is None else {"frame": framed})
+    moves = info.span is None or info.span[0] < info.span[1]
+    is_defined = of_message and sure == STANDARD and signal not in ANGLES
+    sure += is_defined and channel.kind.endswith("Imu")
+    yield Guess(signal, sure if moves else NOTHING, item | how, channel.count, defined=is_defined)
 
 
 def quaternion_of(names: Sequence[str], columns: Mapping[str | int, FloatArray]) -> dict[str, Any] | None:
@@ -117,8 +113,7 @@ def of_topic(channel: ChannelInfo) -> Iterator[Guess]:
         elif channel.kind == TABLE:
             yield from _of_table(channel, info)
         elif channel.kind != DEFINED:
-            guess = _of_field(channel, info)
-            yield from () if guess is None else (guess,)
+            yield from _of_field(channel, info)
 
 
 def _of_table(channel: ChannelInfo, info: FieldInfo) -> Iterator[Guess]:
@@ -127,55 +122,34 @@ def _of_table(channel: ChannelInfo, info: FieldInfo) -> Iterator[Guess]:
     is_nameless = set(words) <= NAMELESS or (len(words) == len("".join(words)) == 1)
     of_both = f"{info.path} {channel.name.partition('[')[0]}"
     name = of_both if is_nameless and (found := meaning_of(of_both)) is not None and found[1] > 1 else info.path
-    column = ChannelInfo(name, info.kind, channel.count, channel.rate_hz, (replace(info, path=""),))
-    for guess in of_column(column, info.path):
+    for guess in _of_number(channel, info, {"topic": channel.name, "field": info.path}, name) if info.kind == "number" else ():
         # a unit in brackets in which a signal cannot be says that it is another one
         has_other = _IN_BRACKETS.search(name) is not None and unit_in_name(name, guess.signal) is None
         if not (has_other and dimension_of(guess.signal) is not None):
-            item = {k: v for k, v in guess.item.items() if k != "column"}
-            yield replace(guess, item={"topic": channel.name, "field": info.path, **item})
+            yield guess
 
 
-def _of_field(channel: ChannelInfo, info: FieldInfo) -> Guess | None:
-    """Return what a field of a message may be: a part of a standard one, of a pose in the plane, or by its name."""
+def _of_field(channel: ChannelInfo, info: FieldInfo) -> Iterator[Guess]:
+    """Yield what a field of a message may be: a part of a quaternion, of a pose in the plane, or by its name."""
     parent, _, last = info.path.rpartition(".")
-    if last in _COUNTERS or "covariance" in info.path or "[" in parent:
-        return None
+    if last in _COUNTERS or "covariance" in info.path or "[" in parent or info.path.startswith(("velocity[", "effort[")):
+        return
     words, paths, count = set(words_of(channel.name)), {f.path for f in channel.fields}, channel.count
     is_wanted, item = bool(COMMANDED & words), {"topic": channel.name, "field": info.path}
-    beside = {f.path.rpartition(".")[2] for f in channel.fields if f.path.rpartition(".")[0] == parent}
-    preferred = float(channel.kind.endswith("Imu"))
-    if info.path == "q[0]" and {"q[1]", "q[2]", "q[3]"} <= paths and not is_wanted:
-        # the messages of PX4 have the real part first
-        return Guess(ATTITUDE, STANDARD, {**item, "field": "q", "order": "wxyz"}, count, defined=True)
+    of_four = [f for f in channel.fields if f.path.rpartition(".")[0] == parent]
     if {"x", "y", "theta"} <= paths and "z" not in paths and info.path in _PLANAR:
         # of a commanded pose the angle alone is a signal, the heading wanted
         signal = "yaw_goal_rad" if is_wanted else _PLANAR[info.path]
-        return None if is_wanted and last != "theta" else Guess(signal, PLANE + bool(_FRAMED & words), item, count)
-    if not is_wanted and last == "w" and {"x", "y", "z"} <= beside:
-        of_four = [f for f in channel.fields if f.path.rpartition(".")[0] == parent]
-        is_there = any(f.first and f.first[0] for f in of_four)  # a driver without an attitude writes zeros
-        return Guess(ATTITUDE, STANDARD + preferred, {**item, "field": parent}, count, defined=True) if is_there else None
-    vector = None if is_wanted else _part_of_vector(info.path, _EULER_VECTOR if _EULER & words else {})
-    if vector is not None:
-        sure = STANDARD if vector not in ANGLES else EULER
-        return Guess(vector, sure + preferred, item, count, defined=vector not in ANGLES)
-    return _of_scalar(channel, info, item)
-
-
-def _of_scalar(channel: ChannelInfo, info: FieldInfo, item: dict[str, Any]) -> Guess | None:
-    if info.path == "fluid_pressure":
-        return Guess("depth_m", PRESSURE, {**item, "unit": "Pa"}, channel.count)
-    if info.path.startswith(("velocity[", "effort[")) or info.path.rpartition(".")[2] in ("x", "y", "z", "w"):
-        return None
-    name = info.path if info.path not in ("data", "vector", "position[0]") else ""
-    first = [float(v) for v in info.first if isinstance(v, (int, float))]
-    seen = info.span or ((min(first), max(first)) if first else None)
-    found = meaning_of(f"{channel.name} {name}".strip(), seen)
-    if found is None or found[0] in (TIME, LATITUDE, LONGITUDE):
-        return None
-    unit = unit_of_field(channel.name, info.path, found[0])
-    unit = stated_unit(channel.unit, found[0]) if unit is None and channel.unit else unit
-    named = {"heading", "compass", "hdg"} & set(words_of(f"{channel.name} {info.path}"))
-    frame = {"frame": "NED/FRD"} if named and found[0] in ("yaw_rad", "yaw_goal_rad") else {}
-    return Guess(*found, item | ({"unit": unit} if unit is not None else {}) | frame, channel.count)
+        if not is_wanted or last == "theta":
+            yield Guess(signal, PLANE + bool(_FRAMED & words), item, count)
+    elif info.path == "q[0]" and {"q[1]", "q[2]", "q[3]"} <= paths and not is_wanted:
+        # the messages of PX4 have the real part first
+        yield Guess(ATTITUDE, STANDARD, {**item, "field": "q", "order": "wxyz"}, count, defined=True)
+    elif last == "w" and {"x", "y", "z"} <= {f.path.rpartition(".")[2] for f in of_four} and not is_wanted:
+        if any(f.first and f.first[0] for f in of_four):  # a driver without an attitude writes zeros
+            yield Guess(ATTITUDE, STANDARD + channel.kind.endswith("Imu"), {**item, "field": parent}, count, defined=True)
+    elif info.path == "fluid_pressure":
+        yield Guess("depth_m", PRESSURE, {**item, "unit": "Pa"}, count)
+    elif last not in ("x", "y", "z", "w") or (part_of(info.path) is not None and not is_wanted):
+        name = info.path if info.path not in ("data", "vector", "position[0]") else ""
+        yield from _of_number(channel, info, item, f"{channel.name} {name}".strip(), of_message=True)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, Field
 
@@ -23,7 +24,6 @@ from fieldsid.logs.run import PART, SIGNALS, signal_of
 from fieldsid.registry import near
 from fieldsid.strict import StrictModel, read_model, validated
 
-SCHEMA = "fieldsid/mapping/1"
 Column = Annotated[int, Field(ge=0)] | str
 OF_FINS = "; `us` for a servo's pulses, `1` where -1 .. 1 is the whole range, `counts` for others"
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -154,18 +154,11 @@ def frame_of(text: str | None, place: str) -> Frame | None:
     """Return the frames a text names: `ENU/FLU`, `NED`, `FLU`; raises MappingError."""
     if text is None:
         return None
-    world: World = "NED"
-    body: Body = "FRD"
-    for part in text.upper().replace("-", "/").replace(",", "/").split("/"):
-        match part.strip():
-            case "NED" | "ENU" as named_world:
-                world = named_world
-            case "FRD" | "FLU" as named_body:
-                body = named_body
-            case _:
-                hint = "write the world's and the body's: `NED/FRD` or `ENU/FLU`"
-                raise MappingError(f"{place}: there is no frame {part!r}", found=repr(text), hint=hint)
-    return Frame(world, body)
+    named = [part.strip() for part in re.split("[-,/]", text.upper())]
+    strange = next((part for part in named if part not in get_args(World) + get_args(Body)), None)
+    hint = "write the world's and the body's: `NED/FRD` or `ENU/FLU`"
+    _refuse(f"{place}:", (strange is not None, f"there is no frame {strange!r}", repr(text), hint))
+    return Frame("ENU" if "ENU" in named else "NED", "FLU" if "FLU" in named else "FRD")
 
 
 def channel_of(text: str) -> tuple[str, Source]:
@@ -202,14 +195,12 @@ def _channel_map(file: _File, place: str, origin: Path | None) -> ChannelMap:
     _refuse(f"{place}:", (unmapped, "`clock` names a signal that is not mapped", file.clock, near(file.clock or "", signals)))
     return ChannelMap(
         sources,
-        time=_time(file.time, place) if file.time else None,
-        frame=frame or Frame(),
-        stamp=file.stamp,
-        clock=file.clock,
-        gap_factor=file.gap_factor,
-        pressure=Pressure(file.pressure.density, file.pressure.surface_pa),
+        _time(file.time, place) if file.time else None,
+        frame or Frame(),
+        pressure=Pressure(**file.pressure.model_dump()),
         table=TableForm(**file.table.model_dump()),
         origin=origin,
+        **file.model_dump(include={"stamp", "clock", "gap_factor"}),
     )
 
 
@@ -236,14 +227,8 @@ def _time(time: _Time, place: str) -> Source:
         known = ", ".join([u.name for u in UNITS.values() if u.dimension == "time"] + list(FORMS))
         is_none = found is None or found.dimension != "time"
         _refuse(f"{place}:", (is_none, f"time cannot be in {time.unit!r}", time.unit, f"use one of: {known}"))
-    return Source(
-        column=time.column,
-        columns=columns,
-        unit=time.unit,
-        date=() if time.date is None else tuple(time.date) if isinstance(time.date, list) else (time.date,),
-        week=time.week,
-        scale=1.0 / rate if rate else None,
-    )
+    date = () if time.date is None else tuple(time.date) if isinstance(time.date, list) else (time.date,)
+    return Source(time.column, columns, unit=time.unit, date=date, week=time.week, scale=1.0 / rate if rate else None)
 
 
 def _sources(signal: str, item: _Source | str | int, place: str) -> list[tuple[str, Source]]:
@@ -277,20 +262,9 @@ def _source(signal: str, item: _Source | _Entry, place: str) -> Source:
     is_turned = isinstance(item, _Entry) and item.scale is not None and find_unit(item.unit or "") is not None
     if item.unit is not None and not is_turned:
         _check_unit(signal, item.unit, place)
-    return Source(
-        column=item.column,
-        columns=tuple(item.columns or ()),
-        order=item.order,
-        topic=item.topic,
-        path=item.field,
-        unit=item.unit,
-        sign=item.sign,
-        offset=item.offset,
-        frame=frame_of(item.frame, f"{place}, `{signal}`"),
-        stamp=item.stamp,
-        centre=item.centre,
-        scale=item.scale,
-    )
+    as_written = item.model_dump(exclude={"sum", "field", "columns", "frame"})
+    frame = frame_of(item.frame, f"{place}, `{signal}`")
+    return Source(columns=tuple(item.columns or ()), path=item.field, frame=frame, **as_written)
 
 
 def _check_place(signal: str, item: _Source | _Entry, place: str) -> None:

@@ -28,14 +28,13 @@ def mended(body: dict[str, Any], run: Run, findings: Iterable[Note], by_size: Co
     """
     signals, done = body["signals"], list[Note]()
     for note in findings:
-        if (
-            note.code == "unit"
-            and note.data["signal"] == "yaw_rate_rad_s"
-            and "yaw_rad" in by_size
-            and _counts_turns(signals, run)
-        ):
+        if "yaw_rad" in by_size and _counts_turns(note, signals, run):
             del signals["yaw_rad"]["unit"]
             done.append(_evidence(["yaw_rad"], "no unit, as rad that count turns", note))
+            continue
+        if (goes_as := note.data.get("goes_as")) is not None and note.data["signal"] in by_size:
+            signals[note.data["signal"]]["unit"] = goes_as
+            done.append(_evidence([note.data["signal"]], f"`unit: {goes_as}`", note))
             continue
         wrong, key, value = _remedy(note, body, run)
         if wrong and not any(key in signals.get(s, {key: 0}) for s in wrong):
@@ -47,7 +46,7 @@ def mended(body: dict[str, Any], run: Run, findings: Iterable[Note], by_size: Co
 
 def _remedy(note: Note, body: Mapping[str, Any], run: Run) -> tuple[list[str], str, Any]:
     """Return the signals that a finding shows to be read wrongly, and the key and value that mend it; none where it does not."""
-    if note.code in ("unit", "speed_unit", "depth_unit"):
+    if note.code in ("unit", "speed_unit", "depth_unit", "course_slope"):
         return [note.data["signal"]] if "unit" in note.data else [], "unit", note.data.get("unit")
     if note.code in ("rate_sign", "speed_sign"):
         return [note.data["signal"]], "sign", -1
@@ -60,14 +59,19 @@ def _remedy(note: Note, body: Mapping[str, Any], run: Run) -> tuple[list[str], s
     return [], "", None
 
 
-def _counts_turns(signals: Mapping[str, Any], run: Run) -> bool:
-    """Whether a heading of more than a turn that goes with its rate number for number is in rad, not both in degrees.
+def _counts_turns(note: Note, signals: Mapping[str, Any], run: Run) -> bool:
+    """Whether a finding shows that a heading of more than a turn is in rad, as its course turns or number for number as its rate.
 
-    It is where the rate's unit is known, and where the other angles of the log are in rad: one logger wrote them.
+    The latter is so where the rate's unit is known, and where the other angles of the log are in rad: one logger wrote them.
     """
+    if "unit" not in signals.get("yaw_rad", {}):
+        return False
+    if note.code == "course_slope":
+        return note.data.get("unit") == "rad"
     others = [s for s in ANGLES_BESIDE if s in signals and "unit" not in signals[s] and run.has(s)]
     largest = max((float(np.nanpercentile(np.abs(run[s]), 99)) for s in others), default=np.inf)
-    return "unit" in signals.get("yaw_rad", {}) and ("unit" in signals.get("yaw_rate_rad_s", {}) or largest < WIDEST)
+    is_rate = note.code == "unit" and note.data["signal"] == "yaw_rate_rad_s"
+    return is_rate and ("unit" in signals.get("yaw_rate_rad_s", {}) or largest < WIDEST)
 
 
 def _evidence(signals: list[str], what: str, note: Note) -> Note:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from fieldsid.logs.mapping.draft import Draft, draft_of, label_of, place_of, with_units_by_span
+from fieldsid.logs.mapping.draft import Draft, draft_of, place_of, with_units_by_span
 from fieldsid.logs.mapping.fins.several import which_output, with_several_fins
 from fieldsid.logs.mapping.name_words import words_of
 from fieldsid.logs.mapping.numbers.row_rate import ASSUMED_HZ, rate_by_turning
@@ -39,7 +39,7 @@ def _tried(log: Log, draft: Draft) -> Proposal:
         if done.signal not in signals or len(signals) < 2:
             with_units_by_span(draft, log.inventory)
             return Proposal(draft.body, problem=done).saying(*draft.notes, *left_out)
-        message = f"{done.signal} is not proposed from {label_of(signals.pop(done.signal))}: {done.what}"
+        message = f"{done.signal} is not proposed from `{place_of(signals.pop(done.signal))}`: {done.what}"
         left_out.append(Note("left_out", message, {"signal": done.signal}))
     return Proposal(draft.body).saying(*draft.notes, *left_out)
 
@@ -64,7 +64,7 @@ def _with_own_heading(log: Log, draft: Draft) -> Proposal:
     others = [attempt(lambda body: tried(log, body, draft.defined), body) for body in bodies]
     several = [done, *(p for p in others if isinstance(p, Proposal))]
     runs = [p.run for p in several if p.run is not None]
-    found = better_heading(runs, [label_of(p.body["signals"]["yaw_rad"]) for p in several]) if len(runs) > 1 else None
+    found = better_heading(runs, [f"`{place_of(p.body['signals']['yaw_rad'])}`" for p in several]) if len(runs) > 1 else None
     return done if found is None else several[found[0]].saying(found[1])
 
 

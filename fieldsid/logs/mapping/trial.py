@@ -6,16 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.channels import ChannelMap
-from fieldsid.logs.mapping.draft import unit_by_size
+from fieldsid.logs.doctor.angle_and_rate import PAIRS
+from fieldsid.logs.mapping.draft import place_of
 from fieldsid.logs.mapping.mend import mended
-from fieldsid.logs.mapping.numbers.heading_units import heading_in_doubt, unit_of_wraps, wraps_in_rad
-from fieldsid.logs.mapping.numbers.unit_evidence import assumed_units
+from fieldsid.logs.mapping.numbers.units_told import assumed_units, heading_in_doubt, set_by_size, unit_of_wraps
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.run import GOALS, Note, Run
+from fieldsid.logs.run import SIGNALS, Note, Run
 
 MENDS = 6
 """Readings of the log with what the last one's findings have set: a unit, a frame and the signs of two rates come in turn."""
@@ -65,37 +63,24 @@ def tried(log: Log, body: dict[str, Any], defined: frozenset[str]) -> Proposal:
     from fieldsid.logs.mapping.mapping_file import mapping_of
 
     raw, signals = log.read(mapping_of(body)), body["signals"]
-    by_size = _in_degrees(raw, signals)
+    plain = {s: v for s, v in raw.series.items() if s in signals and v.values.ndim == 1}
+    told = {s: v.unit for s, v in plain.items() if v.unit is not None}
+    by_size = set_by_size(signals, {s: v.values for s, v in plain.items()}, told)
+    yaw = raw.series.get("yaw_rad")
+    wraps = None if yaw is None else unit_of_wraps(yaw.values)
+    in_doubt = by_size if wraps is None else by_size - {"yaw_rad"}
     why: list[Note] = []
     for _ in range(MENDS):
         run, stated = log.run_of(body, raw), stated_by(mapping_of(body), raw)
         notes = examine(run, stated=stated)
-        set_now = mended(body, run, notes, by_size)
+        set_now = mended(body, run, notes, in_doubt)
         why += set_now
         if not set_now:
             break
-    yaw = raw.series.get("yaw_rad")
     if yaw is not None and "yaw_rad" in by_size and "unit" in signals["yaw_rad"]:
         why += heading_in_doubt(yaw.values, signals)
-    turned = {"yaw_rad"} if yaw is not None and wraps_in_rad(yaw.values) else set()
-    why += assumed_units(run, {*defined, *stated.units, *turned}, signals)
+    # a size tells that a rate beside its angle is not in rad/s, and not in which unit it is then: that the angle says
+    open_rates = {rate for angle, rate in PAIRS if rate in by_size and run.has(angle)}
+    known = {*defined, *stated.units, *({"yaw_rad"} if wraps == "rad" else ())} - open_rates
+    why += assumed_units(run, known, {s: (place_of(item), item.get("unit", SIGNALS.get(s, ""))) for s, item in signals.items()})
     return Proposal(body, replace(run, notes=(*run.notes, *notes)), notes=tuple(why))
-
-
-def _in_degrees(raw: RawLog, signals: Mapping[str, Any]) -> frozenset[str]:
-    """Set the units that the size of the numbers says; return the signals whose unit was told by it.
-
-    Pitch, roll and goals without a unit are in degrees too where the heading is: one logger wrote them.
-    """
-    known = {
-        s: i.get("unit", raw.series[s].unit) for s, i in signals.items() if s in raw.series and raw.series[s].values.ndim == 1
-    }
-    seen = {s: np.abs(raw.series[s].values[np.isfinite(raw.series[s].values)]) for s, unit in known.items() if unit is None}
-    units = {s: unit for s, v in seen.items() if (unit := unit_by_size(s, float(v.max(initial=0.0)))) is not None}
-    if "yaw_rad" in units:
-        units["yaw_rad"] = unit_of_wraps(raw.series["yaw_rad"].values)
-    with_it = () if "deg" not in {units.get("yaw_rad"), known.get("yaw_rad")} else ("pitch_rad", "roll_rad", *sorted(GOALS))
-    beside = {s: "deg" for s in with_it if s in seen and s not in units and "field" not in signals[s]}
-    for signal, unit in (units | beside).items():
-        signals[signal]["unit"] = unit
-    return frozenset(units)

@@ -31,6 +31,8 @@ OF_ANOTHER = word_set(
     "wind ws air variation status mode enabled count id"
 )
 """Words that make a name one of something else than the signal it also names."""
+COMPASS = word_set("heading hdg compass")
+"""Words of a heading that is one by its name: from north, clockwise."""
 OVER_GROUND = word_set("gps gnss course cog sog vtg ground track")
 """Words of a course or a speed over ground, which current and sideslip keep from being the vehicle's own; and of a receiver
 that hears nothing under water, beside a position that was estimated."""
@@ -138,6 +140,16 @@ GLIDER: Mapping[str, str] = MappingProxyType({"m": "measured", "c": "commanded"}
 GREEK = word_set("phi theta psi")
 MOST_BESIDE_GREEK = 2
 """Words beside a Greek letter up to which it is the symbol; with more it is an abbreviation, as in `PHI_HOST_PORT_DB`."""
+
+_TURNS = ("roll_rate_rad_s", "pitch_rate_rad_s", "yaw_rate_rad_s")
+VECTORS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "angular_velocity": _TURNS, "angular": _TURNS, "linear": ("surge_m_s", "sway_m_s", "heave_m_s"),
+        "position": ("x_m", "y_m", "depth_m"), "vector": ("roll_rad", "pitch_rad", "yaw_rad"),
+    }
+)  # fmt: skip
+"""What the x, y and z are of vectors in standard messages; those of a `vector` where its topic is one of Euler's angles."""
+EULER = word_set("rpy euler attitude orientation angles")
 
 PHRASES = tuple((rule, tuple(phrase.split())) for rule in RULES for phrase in rule.phrases.split(", "))
 """Each phrase by its words, with its rule."""

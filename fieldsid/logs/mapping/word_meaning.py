@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import re
 
+from fieldsid.logs.channels import ANGLES
+from fieldsid.logs.doctor.angle_and_rate import PAIRS
 from fieldsid.logs.mapping.canonical_names import canonical
 from fieldsid.logs.mapping.name_words import unit_said, words_of
 from fieldsid.logs.mapping.vocabulary import (
     COMMANDED,
+    EULER,
     GREEK,
     GROUNDED,
     MEASURED,
@@ -16,16 +19,17 @@ from fieldsid.logs.mapping.vocabulary import (
     OVER_GROUND,
     PHRASES,
     SEEN,
+    VECTORS,
     WANTED,
     Rule,
     Span,
 )
 from fieldsid.logs.run import GOALS
 
-RATES = {"yaw_rad": "yaw_rate_rad_s", "pitch_rad": "pitch_rate_rad_s", "roll_rad": "roll_rate_rad_s"}
+RATES = dict(PAIRS)
 """What an angle's name means beside the unit of a rate, as `yaw_deg_s`."""
-CANONICAL = 9
-"""What a canonical name is as sure as."""
+CANONICAL, STANDARD = 9, 8
+"""What a canonical name, and a part of a standard message, is as sure as."""
 
 
 def meaning_of(name: str, span: Span | None = None) -> tuple[str, int] | None:
@@ -34,6 +38,9 @@ def meaning_of(name: str, span: Span | None = None) -> tuple[str, int] | None:
     if said is not None:
         return said.signal, CANONICAL
     words = words_of(name)
+    part = part_of(name.strip())
+    if part is not None and not COMMANDED & set(words) and (part not in ANGLES or EULER & set(words)):
+        return part, STANDARD
     scored = [(score, rule) for rule, phrase in PHRASES if (score := _score(rule, phrase, words)) > 0]
     held = [(score, rule) for score, rule in scored if span is None or rule.holds(span)]
     best = max(held, key=lambda found: found[0], default=None)
@@ -45,6 +52,13 @@ def meaning_of(name: str, span: Span | None = None) -> tuple[str, int] | None:
     signal = best[1].signal
     is_rate = signal in RATES and unit_said(name, ("angle",)) is None and unit_said(name, ("angle rate",)) is not None
     return _of_use(RATES[signal] if is_rate else signal, best[0], set(words))
+
+
+def part_of(path: str) -> str | None:
+    """Return the signal of one part of a standard message's vector, as in `twist.twist.angular.z`; None of any other."""
+    parent, _, last = path.rpartition(".")
+    vector = VECTORS.get(re.split(r"[. ]", parent)[-1])
+    return None if vector is None or last not in ("x", "y", "z") else vector["xyz".index(last)]
 
 
 def _score(rule: Rule, phrase: tuple[str, ...], words: list[str]) -> int:

@@ -170,9 +170,9 @@ def _even_clocks(columns: Columns) -> Iterator[Clock]:
 
 
 def _counts_rows(columns: Columns, source: Source) -> bool:
-    """Whether a column is the number of the row, from nought or one."""
+    """Whether a column goes on by one from row to row, as the number of the row does."""
     cells = columns.take(columns.index(source.places[0], TIME))
-    return cells.dtype.kind in "iuf" and cells[0] in (0, 1) and bool((np.diff(cells) == 1).all())
+    return cells.dtype.kind in "iuf" and bool((np.diff(cells) == 1).all())
 
 
 def _guessed(name: str, unit: str | None) -> tuple[Note, ...]:

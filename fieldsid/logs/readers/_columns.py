@@ -15,7 +15,7 @@ from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ATTITUDE, COMBINED, ChannelMap, Source
 from fieldsid.logs.convert.number_cells import as_numbers
 from fieldsid.logs.convert.times.time_column import seconds_of, seconds_of_parts
-from fieldsid.logs.mapping.canonical_names import Canonical, canonical, stated_unit, unit_in_name
+from fieldsid.logs.mapping.canonical_names import Canonical, canonical, unit_in_name
 from fieldsid.logs.mapping.name_words import words_of
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
@@ -91,7 +91,7 @@ class Columns:
 
     def unit(self, index: int, signal: str) -> str | None:
         """Return the unit that a column states for a signal, in its name or in the row of units; None where none fits."""
-        return unit_in_name(self.name(index), signal) or (stated_unit(self.units[index], signal) if self.units else None)
+        return unit_in_name(self.name(index), signal, self.units[index] if self.units else None)
 
     def rows(self, keep: npt.NDArray[np.bool_]) -> Columns:
         """Return the columns with some of their rows (n,) only."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import COMBINED, ChannelMap, Source
-from fieldsid.logs.mapping.canonical_names import stated_unit, unit_of_field
+from fieldsid.logs.mapping.canonical_names import unit_of_field
 from fieldsid.logs.reader import DEFINED, MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, RawLog, Series, span_of
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import stem_of
@@ -138,9 +138,7 @@ def _picked(path: Path, topics: Mapping[str, Topic], signal: str, source: Source
             )
     values = [topic.fields[name] for name in fields]
     label = f"{source.topic}.{source.path}" if source.path else source.topic
-    unit = None
-    if signal not in COMBINED:
-        unit = stated_unit(topic.unit, signal) if topic.unit else unit_of_field(source.topic, fields[0], signal)
+    unit = None if signal in COMBINED else unit_of_field(source.topic, fields[0], signal, topic.unit)
     return Series(topic.time, values[0] if len(values) == 1 else np.stack(values, axis=1), label, unit)
 
 

@@ -54,8 +54,7 @@ def families(inventory: Inventory) -> list[Family]:
 
 def _numbers(inventory: Inventory) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield the numbers of a log that its format does not define, by name, with their place."""
-    is_named = inventory.table is None or bool(inventory.table.header)
-    for channel in inventory.channels if is_named else ():
+    for channel in inventory.channels if inventory.is_named else ():
         for info in channel.fields:
             if info.kind not in ("text", "numbers") and info.means is None:
                 if inventory.by_topic:

@@ -13,6 +13,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from fieldsid.logs.mapping.numbers.windows import FEWEST
 from fieldsid.numerics.arrays import FloatArray
 
 TOGETHER = 0.05
@@ -23,7 +24,10 @@ ALIKE = 0.25
 """How far shares may be apart and be taken for equal."""
 NEAR = 0.08
 """How far the share of a fin of the strongest may be from a simple fraction and be taken for it."""
-FEWEST = 50
+EXPLAINS = 0.3
+"""Share of a rate's change beside the rate's own that a fin must explain."""
+WINDOWS_S = (1.0, 2.0)
+"""Times over which changes are taken: a fin shows best in a short one."""
 MOST_ROWS = 100_000
 
 
@@ -38,44 +42,51 @@ class FinShares:
     patterns: int
 
 
-def fin_shares(
-    fins: Sequence[FloatArray], time: FloatArray, rate: FloatArray, righting: FloatArray | None, width: int
-) -> FinShares | None:
-    """Return the shares of fins (n,) in a rate (n,) over windows of some samples; None where there is too little to tell.
+def moved_by(
+    fins: Sequence[FloatArray], time: FloatArray, rate: FloatArray | None, angle: FloatArray | None, width: int, *, rights: bool
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return what the change of a rate (n,) and the means (n, m) of fins have over windows beside the rate's own.
 
-    righting: the angle (n,) whose moment goes with it; None where the plane has none.
+    Where the angle (n,) alone was logged its change is the rate, and all goes by the means; `rights` says that its moment rights
+    the hull. None where there is too little to tell, or nothing moves.
     """
-    if time.size < width + FEWEST:
+    righting = angle if rights else None
+    if rate is None and angle is not None and time.size > width:
+        rate = (angle[width:] - angle[:-width]) / (time[width:] - time[:-width])
+        fins, righting = [window_mean(time, v, width) for v in fins], window_mean(time, angle, width) if rights else None
+        time = time[:-width]
+    if rate is None or time.size < width + FEWEST:
         return None
-    passed = time[width:] - time[:-width]
-    grows = (rate[width:] - rate[:-width]) / passed
-    beside = [
-        np.ones(grows.size),
-        window_mean(time, rate, width),
-        *([window_mean(time, righting, width)] if righting is not None else []),
-    ]
-    means = np.stack([window_mean(time, fin, width) for fin in fins], axis=1)
-    seen = np.isfinite(grows) & np.isfinite(means).all(axis=1) & np.isfinite(np.stack(beside)).all(axis=0)
+    grows = (rate[width:] - rate[:-width]) / (time[width:] - time[:-width])
+    beside = [window_mean(time, v, width) for v in (rate, righting) if v is not None]
+    base, means = (
+        np.stack(columns, axis=1) for columns in ([np.ones(grows.size), *beside], [window_mean(time, v, width) for v in fins])
+    )
+    seen = np.isfinite(grows) & np.isfinite(means).all(axis=1) & np.isfinite(base).all(axis=1)
     rows = np.flatnonzero(seen)[:: max(1, grows.size // MOST_ROWS)]
     if rows.size < FEWEST:
         return None
-    base = np.stack(beside, axis=1)[rows]
-    left, moved = (beyond(base, v[rows]) for v in (grows[:, None], means))
-    power = float(left[:, 0] @ left[:, 0])
-    if not power > 0.0:
-        return None
-    answer, _, _, length = np.linalg.lstsq(moved, left[:, 0], rcond=TOGETHER)
+    left, moved = (beyond(base[rows], v[rows]) for v in (grows[:, None], means))
+    return (left[:, 0], moved) if float(left[:, 0] @ left[:, 0]) > 0.0 else None
+
+
+def fin_shares(left: FloatArray, moved: FloatArray, width: int) -> FinShares:
+    """Return the shares of fins (m,) in what the change of a rate (n,) has beside its own, of `moved_by`."""
+    answer, _, _, length = np.linalg.lstsq(moved, left, rcond=TOGETHER)
     fitted = answer.astype(np.float64)
     shares, patterns = _shares(fitted), int((length > TOGETHER * length[0]).sum())
-    # as many patterns explain so much of noise: windows that share samples say the same
-    chance = min(patterns * width / grows.size, 1.0 - 1e-9)
     return FinShares(
         shares,
         fitted / float(np.sum(np.abs(fitted))),
-        (_explained(left[:, 0], moved @ shares) - chance) / (1.0 - chance),
-        max(_explained(left[:, 0], moved[:, i]) for i in range(len(fins))),
+        explained(left, moved @ shares, patterns * width),
+        max(explained(left, column, width) for column in moved.T),
         patterns,
     )
+
+
+def explains(share: float, rate: str) -> str:
+    """Return in words how much of a rate's change a fin explains."""
+    return f"{100 * share:.0f} % of what the {rate.removesuffix('_rad_s').replace('_', ' ')}'s change has beside the rate's own"
 
 
 def window_mean(time: FloatArray, values: FloatArray, width: int) -> FloatArray:
@@ -93,9 +104,14 @@ def beyond(base: FloatArray, values: FloatArray) -> FloatArray:
     return np.asarray(values - base @ np.linalg.lstsq(base, values, rcond=None)[0])
 
 
-def _explained(left: FloatArray, along: FloatArray) -> float:
-    power = float(along @ along) * float(left @ left)
-    return float(left @ along) ** 2 / power if power > 0.0 else 0.0
+def explained(left: FloatArray, along: FloatArray, chance: int) -> float:
+    """Return the share of what is left (n,) that goes along some numbers (n,), beyond that of noise.
+
+    Windows that share samples say the same, so that of so many rows as `chance` a pattern explains all.
+    """
+    power, of_noise = float(along @ along) * float(left @ left), min(chance / left.size, 1.0 - 1e-9)
+    share = float(left @ along) ** 2 / power if power > 0.0 else 0.0
+    return (share - of_noise) / (1.0 - of_noise)
 
 
 def _shares(fitted: FloatArray) -> FloatArray:

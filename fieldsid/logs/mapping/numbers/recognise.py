@@ -8,24 +8,28 @@ only where it stands out, and comes with the number that says so.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import permutations
+from functools import partial
+from itertools import permutations, product
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.geodetic import north_and_east
-from fieldsid.logs.convert.servo_counts import COUNTS, servo_of
-from fieldsid.logs.convert.units import KNOT
-from fieldsid.logs.mapping.fins.shares import beyond
-from fieldsid.logs.mapping.vocabulary import LATITUDE, LONGITUDE
+from fieldsid.logs.convert.units import UNITS
+from fieldsid.logs.doctor.angle_and_rate import PAIRS
+from fieldsid.logs.mapping.fins.shares import EXPLAINS, beyond, explained, explains, moved_by
+from fieldsid.logs.mapping.fins.shares import WINDOWS_S as SHORT_S
+from fieldsid.logs.mapping.numbers.units_told import Reading, fin_reading, in_radians
+from fieldsid.logs.mapping.numbers.windows import FEWEST, change, width_of
 from fieldsid.logs.reader import Samples
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.shifted_correlation import slope_of
 
-WINDOWS_S = (1.0, 2.0, 10.0)
-"""Times over which changes are taken: a fin shows best in a short one, a position with few digits its way in a long one."""
+WINDOWS_S = (*SHORT_S, 10.0)
+"""Times over which changes are taken: a position with few digits shows its way in a long one."""
 SAME_WAY = 0.9
 """Share of the way that is made along the heading: sideslip keeps it from one."""
 TURNS_ALONG = 0.6
@@ -34,36 +38,34 @@ MOST_SLIP = 3.0
 """How many times as far a heading may turn as its course, or the course as the heading: sideslip lies between them."""
 MOST_WAYS = 30
 BEYOND_TILTS_DEG = 90.0
-FOLLOWS = 0.95
-"""Correlation from which on one column is the derivative of another."""
-EXPLAINS = 0.3
-"""Share of a rate's change beside the rate's own that a fin must explain."""
 CLEARLY = 2.0
-"""How many times as much as any other column a fin must explain that the others do not: 4.8 to 18 on five ships' zigzags."""
-UNITS = {"deg": math.pi / 180.0, "rad": 1.0}
+"""How many times as much as any other column a fin must explain that the others do not: 4.8 to 20 on six zigzags of ships."""
+ALIKE = 0.95
+"""Correlation of two columns that are one signal twice."""
+ONE_SIDED = 0.2
+"""How far a fin goes to one side at least, against the other."""
+WITHIN = 0.3
+"""Share by which a column may miss what it should make, in the mean: noise of half a degree, few digits, a current do so much."""
 GLOBE = (90.0, 180.0)
 """Largest latitude and longitude in degrees."""
 AT_REST = 1e-3
 """A way of less than this in a second is no vehicle's in m, and every vehicle's in degrees of latitude and longitude."""
-WITHIN = 0.1
-"""Share of the speed by which the way made along the heading may differ from it."""
-SPEEDS = {"m/s": 1.0, "kn": KNOT}
-MOST_COLUMNS, FEWEST = 40, 50
-RATES = {"yaw_rad": "yaw_rate_rad_s", "pitch_rad": "pitch_rate_rad_s", "roll_rad": "roll_rate_rad_s"}
-PLACES = ("x_m", "y_m", LATITUDE, LONGITUDE)
+MOST_COLUMNS = 40
+PLACE = ("x_m", "y_m")
+"""Of degrees too, which `is_geographic` tells."""
 Column = str | int
 ComplexArray = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True)
 class Recognised:
-    """A signal, the column that it is, how it is to be read, why, and the correlation behind it."""
+    """A signal, the column that it is, how it is to be read, why, and how well it fits from 0 to 1."""
 
     signal: str
     column: Column
     item: Mapping[str, Any]
     why: str
-    trust: float = 0.0
+    trust: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,98 +84,126 @@ class _Scene:
         known = {**self.known, **{r.signal: r.column for r in more}}
         return replace(self, known=known, free=[c for c in self.free if c not in taken], found=self.found + more)
 
-    def changes(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Return the change of a column (n,) over the window."""
-        return np.asarray(values[self.width :] - values[: -self.width])
-
-    def is_geographic(self, x: Column, y: Column) -> bool:
-        """Whether two columns are a latitude and a longitude in degrees: on the globe, and as slow as no way in m is."""
-        columns = (self.samples.columns[x], self.samples.columns[y])
-        if any(float(np.nanmax(np.abs(c))) > limit for c, limit in zip(columns, GLOBE, strict=True)):
-            return False
-        way, passed = np.hypot(*(self.changes(c) for c in columns)), self.passed
-        good = np.isfinite(way) & (passed > 0.0)
-        return bool(good.any()) and 0.0 < float(np.median(way[good] / passed[good])) < AT_REST
-
-    def way(self, x: Column, y: Column) -> ComplexArray:
-        """Return the way in m (n,) over the window by two columns, x real: metres, or degrees of latitude and longitude."""
-        places = self.samples.columns[x], self.samples.columns[y]
-        x_m, y_m = north_and_east(np.stack(places, axis=1)) if self.is_geographic(x, y) else places
-        return np.asarray(self.changes(x_m + 1j * y_m))
-
-    def middle(self, values: FloatArray) -> FloatArray:
-        """Return a column (n,) in the middle of each window."""
-        return values[self.width // 2 :][: values.size - self.width]
+    def values(self, column: Column) -> FloatArray:
+        """Return a column (n,) as it is."""
+        return self.samples.columns[column]
 
     @property
     def passed(self) -> FloatArray:
-        """The time that passes over the window."""
-        return self.changes(self.samples.time)
+        """The time that passes over the window, NaN where it stands still."""
+        found = change(self.samples.time, self.width)
+        return np.where(found > 0.0, found, np.nan)
 
-    def swept(self, column: Column) -> FloatArray:
-        """Return the integral of a column over the window."""
-        time = self.samples.time
-        return self.changes(
-            np.cumsum(np.nan_to_num(self.samples.columns[column]) * np.diff(np.nan_to_num(time), prepend=time[0]))
-        )
+    def is_geographic(self, x: Column, y: Column) -> bool:
+        """Whether two columns are a latitude and a longitude in degrees: on the globe, and as slow as no way in m is."""
+        columns = (self.values(x), self.values(y))
+        if any(float(np.nanmax(np.abs(c))) > limit for c, limit in zip(columns, GLOBE, strict=True)):
+            return False
+        fast = np.hypot(*(change(c, self.width) for c in columns)) / self.passed
+        return bool(np.isfinite(fast).any()) and 0.0 < float(np.nanmedian(fast)) < AT_REST
+
+    def way(self, x: Column, y: Column) -> ComplexArray:
+        """Return the way in m (n,) over the window by two columns, x real: metres, or degrees of latitude and longitude."""
+        places = self.values(x), self.values(y)
+        x_m, y_m = north_and_east(np.stack(places, axis=1)) if self.is_geographic(x, y) else places
+        return change(x_m + 1j * y_m, self.width)
+
+    def speed(self) -> ComplexArray:
+        """Return the way made in a second (n,) along the heading, real, and across it."""
+        along = self.way(*(self.known[s] for s in PLACE)) * np.exp(-1j * self.angle("yaw_rad"))
+        return np.asarray(along * (1.0 / self.passed))
 
     def angle(self, signal: str) -> FloatArray:
-        """Return an angle that is known (n,) in rad, unwrapped."""
-        return _radians(self.samples.columns[self.known[signal]], next((r.item for r in self.found if r.signal == signal), None))
+        """Return an angle that is known (n,) in rad, unwrapped: in the unit in which it was found, else by its size."""
+        values = self.values(self.known[signal])
+        unit = next((r.item["unit"] for r in self.found if r.signal == signal), None)
+        return np.unwrap(np.where(np.isfinite(values), in_radians(values, unit), 0.0))
+
+    def turned(self, signal: str) -> FloatArray:
+        """Return how the change over the window varies of an angle that is known."""
+        return self.varied(self.angle(signal))
+
+    def varied(self, values: FloatArray) -> FloatArray:
+        """Return the change of numbers (n,) over the window, less its mean."""
+        found = change(values, self.width)
+        return found - np.nanmean(found)
+
+    def swept(self, column: Column) -> FloatArray:
+        """Return how the integral of a column over the window varies: what it adds steadily is a sensor's offset."""
+        time = self.samples.time
+        return self.varied(np.cumsum(np.nan_to_num(self.values(column)) * np.diff(time, prepend=time[0])))
+
+
+@dataclass(frozen=True, slots=True)
+class _Tie:
+    """What ties a signal to those it `needs`: the numbers (n,) that its column makes `by` some way, in some unit and sign."""
+
+    signal: str
+    needs: tuple[str, ...]
+    made: Callable[[_Scene], FloatArray]
+    by: Callable[[_Scene, Column], FloatArray]
+    units: tuple[str, ...]
+    says: str
+    signs: tuple[int, ...] = (1,)
+
+
+TIES = (
+    *(_Tie(rate, (angle,), partial(_Scene.turned, signal=angle), _Scene.swept, ("rad/s", "deg/s"),
+           f"the derivative of column {{{angle}}}", (1, -1)) for angle, rate in PAIRS),
+    _Tie("surge_m_s", ("yaw_rad", *PLACE), lambda s: s.speed().real, _Scene.values, ("m/s", "kn"),
+         "the way made along the heading"),
+    _Tie("sway_m_s", ("yaw_rad", *PLACE, "surge_m_s"), lambda s: s.speed().imag, _Scene.values, ("m/s", "kn"),
+         "the way made across the heading"),
+)  # fmt: skip
+"""What a column is by those that are known already, in this order."""
 
 
 def recognised(samples: Samples, known: Mapping[str, Column], free: list[Column]) -> tuple[Recognised, ...]:
     """Return signals among the columns that nobody named (`free`), beside those that are known by name.
 
-    Of what several ways and windows would give, that in which the most columns find their place among the others is taken, and
-    of those the one in which the rate is the heading's derivative best: that is exact, while a course is off by the sideslip.
+    Of what several ways and windows would give, that in which the most columns find their place among the others, and fit there
+    best, is taken.
     """
     best: tuple[Recognised, ...] = ()
     moving = [c for c in free if _moves(samples.columns[c])] if len(free) <= MOST_COLUMNS else []
     for scene in _scenes(samples, known, moving):
         for way in _ways(scene):
             seen = scene.knowing(way)
-            for step in (_rates, _speeds, _fin):
-                seen = seen.knowing(step(seen))
-            best = max(best, seen.found, key=_worth)
+            for tie in TIES:
+                seen = seen.knowing(_tied(seen, tie))
+            best = max(best, seen.knowing(_fin(seen)).found, key=_worth)
     return best
 
 
-def unit_of_heading(samples: Samples, heading: Column, position: tuple[Column, Column]) -> str | None:
-    """Return the unit in which a heading points along the way made; None where it does so in none."""
-    scene = next(_scenes(samples, {}, []), None)
-    found = [] if scene is None else max(_pointing(scene, heading, position), key=lambda way: way[0].trust, default=[])
-    return str(found[0].item["unit"]) if found else None
-
-
 def _scenes(samples: Samples, known: Mapping[str, Column], free: list[Column]) -> Iterator[_Scene]:
-    steps = np.diff(samples.time[np.isfinite(samples.time)])
-    for window in WINDOWS_S if steps.size >= FEWEST else ():
-        yield _Scene(samples, max(1, round(window / float(np.median(steps)))), known, free)
+    widths = (width_of(samples.time, window) for window in WINDOWS_S)
+    yield from (_Scene(samples, width, known, free) for width in widths if samples.time.size > width + FEWEST)
 
 
-def _worth(found: tuple[Recognised, ...]) -> tuple[int, float]:
-    return len(found), round(max((r.trust for r in found if r.signal not in PLACES), default=0.0), ndigits=3)
+def _worth(found: tuple[Recognised, ...]) -> float:
+    return sum(r.trust for r in found)
 
 
 def _moves(values: FloatArray) -> bool:
     return bool(np.isfinite(values).mean() > 0.5) and float(np.nanmax(values) - np.nanmin(values)) > 0.0
 
 
-def _radians(values: FloatArray, item: Mapping[str, Any] | None = None) -> FloatArray:
-    """Return an angle (n,) in rad, unwrapped: by its unit, where nothing is found of it by its size."""
-    largest = float(np.nanmax(np.abs(values)))
-    unit = item.get("unit", "rad") if item is not None else "deg" if largest > math.tau + 0.1 else "rad"
-    return np.unwrap(np.where(np.isfinite(values), UNITS[unit] * values, 0.0))
-
-
-def _alike(a: FloatArray, b: FloatArray) -> tuple[float, float]:
-    """Return the correlation of two columns (n,), and the slope of the first on the second."""
-    good = np.isfinite(a) & np.isfinite(b)
-    if good.sum() < FEWEST or float(np.ptp(a[good])) == 0.0 or float(np.ptp(b[good])) == 0.0:
-        return 0.0, 0.0
-    trust = float(np.corrcoef(a[good], b[good])[0, 1])
-    return trust, math.copysign(float(np.std(a[good]) / np.std(b[good])), trust)
+def _tied(scene: _Scene, tie: _Tie) -> Iterator[Recognised]:
+    """Yield the free column that a tie says to be its signal: in its unit and sign it misses what it should make by least."""
+    if tie.signal in scene.known or not set(tie.needs) <= scene.known.keys():
+        return
+    made, fits = tie.made(scene), []
+    for column in scene.free:
+        values = tie.by(scene, column)
+        good = np.isfinite(values) & np.isfinite(made)
+        size = float(np.abs(made[good]).sum())
+        for unit, sign in product(tie.units, tie.signs) if good.sum() >= FEWEST and size > 0.0 else ():
+            off = float(np.abs(sign * UNITS[unit].factor * values[good] - made[good]).sum()) / size
+            fits.append((off, column, {"unit": unit} | ({"sign": -1} if sign < 0 else {})))
+    off, column, item = min(fits, key=lambda fit: fit[0], default=(math.inf, "", {}))
+    if off <= WITHIN:
+        why = f"it is {tie.says.format(**scene.known)} within {100 * off:.1f} %"
+        yield Recognised(tie.signal, column, item, why, 1.0 - off)
 
 
 def _ways(scene: _Scene) -> list[list[Recognised]]:
@@ -181,131 +211,95 @@ def _ways(scene: _Scene) -> list[list[Recognised]]:
 
     Where none does, headings that go beyond what tilts do, and have a derivative; or nothing.
     """
-    if "yaw_rad" in scene.known or "x_m" in scene.known:
+    if "yaw_rad" in scene.known:
         return [[]]
-    angles = _with_rates(scene)
-    found = [
-        way
-        for place in permutations(scene.free, 2)
-        for heading in angles or scene.free
-        if heading not in place
-        for way in _pointing(scene, heading, place)
-    ]
+    alone = (replace(scene, known={"yaw_rad": c}, free=[o for o in scene.free if o != c]) for c in scene.free)
+    rates = {pair.known["yaw_rad"]: rate for pair in alone for rate in _tied(pair, TIES[0])}
+    toward = {
+        (c, unit): np.nan_to_num(np.exp(1j * in_radians(scene.values(c), unit)))
+        for c in rates or scene.free
+        for unit in ("deg", "rad")
+    }
+    known = tuple(scene.known[s] for s in PLACE if s in scene.known)
+    places = [known] if len(known) == len(PLACE) else permutations(scene.free, 2) if not known else []
+    found = [way for place in places for way in _pointing(scene, place, toward)]
     turning = [
-        [Recognised("yaw_rad", c, {"unit": "deg"}, f"it goes to {largest:.4g}, beyond tilts, and {why}", trust)]
-        for c, (trust, why) in angles.items()
-        if (largest := float(np.nanmax(np.abs(scene.samples.columns[c])))) > BEYOND_TILTS_DEG and trust > 0.0
+        [Recognised("yaw_rad", c, {"unit": "deg"}, f"it goes to {largest:.4g}, beyond tilts, and has a derivative", rate.trust)]
+        for c, rate in rates.items()
+        if (largest := float(np.nanmax(np.abs(scene.values(c))))) > BEYOND_TILTS_DEG and "sign" not in rate.item
     ]
     return sorted(found, key=lambda way: -way[0].trust)[:MOST_WAYS] or turning or [[]]
 
 
-def _with_rates(scene: _Scene) -> dict[Column, tuple[float, str]]:
-    """Return the columns of which another is the derivative, with the correlation, and that in words."""
-    swept = {c: scene.swept(c) for c in scene.free}
-    found: dict[Column, tuple[float, str]] = {}
-    for angle in scene.free:
-        turned = scene.changes(_radians(scene.samples.columns[angle]))
-        pairs = [(*_alike(turned, swept[c]), c) for c in scene.free if c != angle]
-        trust, slope, rate = max(pairs, key=lambda p: abs(p[0]), default=(0.0, 0.0, ""))
-        if abs(trust) > FOLLOWS and any(abs(abs(slope) / f - 1.0) < 0.2 for f in (1.0, UNITS["deg"], 1.0 / UNITS["deg"])):
-            found[angle] = trust, f"column {rate} is its derivative, correlation {trust:.3f}"
-    return found
-
-
-def _pointing(scene: _Scene, heading: Column, place: tuple[Column, Column]) -> Iterator[list[Recognised]]:
-    """Yield what a heading, x and y are, where the way that two columns make is made along the one taken as a heading."""
-    x, y = place
-    way = scene.way(x, y)
+def _pointing(
+    scene: _Scene, place: tuple[Column, ...], toward: Mapping[tuple[Column, str], ComplexArray]
+) -> Iterator[list[Recognised]]:
+    """Yield what a heading, x and y are, where the way that two columns make is made `toward` (n,) a third, in some unit."""
+    way = scene.way(*place)
     seen = np.isfinite(way)
     made = float(np.abs(way[seen]).sum())
     if not made > 0.0 or not float(np.median(np.abs(way[seen]))) > 0.0:
         return
-    signals = (LATITUDE, LONGITUDE) if scene.is_geographic(x, y) else ("x_m", "y_m")
-    course, values = np.unwrap(np.angle(way[seen])), scene.middle(np.nan_to_num(scene.samples.columns[heading]))[seen]
-    for unit, factor in UNITS.items():
-        along = float((way[seen] * np.exp(-1j * factor * values)).real.sum()) / made
-        trust, slope = _alike(np.unwrap(factor * values), course)
-        if along > SAME_WAY and trust > TURNS_ALONG and 1.0 / MOST_SLIP < slope < MOST_SLIP:
-            why = f"{100 * along:.1f} % of the way that columns {x} and {y} make is made along it, correlation {trust:.3f}"
-            same = f"the way made in it is along the heading in column {heading}"
-            yield [Recognised("yaw_rad", heading, {"unit": unit}, why, trust),
-                   *(Recognised(s, c, {}, same) for s, c in zip(signals, place, strict=True))]  # fmt: skip
-
-
-def _rates(scene: _Scene) -> Iterator[Recognised]:
-    """Yield the rates of the angles that are known: the columns whose sums over the window are the angle's change."""
-    free = list(scene.free)
-    for angle, rate in RATES.items():
-        if angle not in scene.known or rate in scene.known or not free:
+    item = {"unit": "deg"} if scene.is_geographic(*place) else {}
+    for (heading, unit), direction in toward.items():
+        along = float(np.vdot(direction[seen], way[seen]).real) / made
+        if heading in place or along <= SAME_WAY:
             continue
-        turned = scene.changes(scene.angle(angle))
-        trust, slope, column = max(((*_alike(turned, scene.swept(c)), c) for c in free), key=lambda found: abs(found[0]))
-        unit = next((u for u, factor in UNITS.items() if 0.7 < abs(slope) / factor < 1.4), None)
-        if unit is not None and abs(trust) >= FOLLOWS:
-            free.remove(column)
-            item = {"unit": f"{unit}/s"} | ({"sign": -1} if trust < 0.0 else {})
-            why = f"it is the derivative of column {scene.known[angle]}, correlation {trust:.3f}"
-            yield Recognised(rate, column, item, why, abs(trust))
+        slope, trust = slope_of(*(np.unwrap(np.angle(v[seen])) for v in (direction, way)))
+        if trust > TURNS_ALONG and 1.0 / MOST_SLIP < slope < MOST_SLIP:
+            why = f"{100 * along:.1f} % of the way that columns {' and '.join(map(str, place))} make is made along it"
+            same = f"the way made in it is along the heading in column {heading}"
+            of_place = [Recognised(s, c, item, same, along) for s, c in zip(PLACE, place, strict=True) if s not in scene.known]
+            yield [Recognised("yaw_rad", heading, {"unit": unit}, f"{why}, correlation {trust:.3f}", trust), *of_place]
 
 
-def _speeds(scene: _Scene) -> Iterator[Recognised]:
-    """Yield surge and sway: the columns that are the way made in a second along the heading and across it."""
-    place = [scene.known[s] for s in PLACES if s in scene.known]
-    if "surge_m_s" in scene.known or len(place) != 2 or "yaw_rad" not in scene.known:
-        return
-    made = scene.way(*place) * np.exp(-1j * scene.middle(scene.angle("yaw_rad"))) / scene.passed
-    middle = {c: scene.middle(scene.samples.columns[c]) for c in scene.free}
-    along = float(np.nanmedian(np.abs(made)))
-    ahead = [(float(np.nanmedian(np.abs(f * v - made.real))) / along, c, u) for c, v in middle.items() for u, f in SPEEDS.items()]
-    off, surge, unit = min(ahead, key=lambda found: found[0], default=(math.inf, "", ""))
-    if not off < WITHIN:
-        return
-    yield Recognised("surge_m_s", surge, {"unit": unit}, f"it is the way made along the heading within {100 * off:.1f} %")
-    across = [(*_alike(SPEEDS[unit] * v, made.imag), c) for c, v in middle.items() if c != surge]
-    trust, slope, sway = max(across, key=lambda found: found[0], default=(0.0, 0.0, ""))
-    if trust > FOLLOWS and 0.8 < slope < 1.25:
-        yield Recognised("sway_m_s", sway, {"unit": unit}, f"it is the way made across the heading, correlation {trust:.3f}")
+def _fin(scene: _Scene) -> list[Recognised]:
+    """Return the rudder: of the columns about zero that which the change of the yaw rate follows beside the rate itself.
+
+    The shortest window counts that tells it: over a long one a ship's roll goes with the yaw rate's change as its rudder does.
+    """
+    known, fins = scene.known, {c: fin for c in scene.free if (fin := _deflected(scene.values(c))) is not None}
+    if {"rudder_rad", "rudder_measured_rad"} & known.keys() or not {"yaw_rad", "yaw_rate_rad_s"} & known.keys() or not fins:
+        return []
+    rate = np.nan_to_num(scene.values(known["yaw_rate_rad_s"])) if "yaw_rate_rad_s" in known else None
+    angle = scene.angle("yaw_rad") if "yaw_rad" in known else None
+    angles = [np.nan_to_num(scene.values(c)) - fin.centre for c, fin in fins.items()]
+    for width in (width_of(scene.samples.time, window) for window in WINDOWS_S):
+        told = moved_by(angles, scene.samples.time, rate, angle, width, rights=False)
+        best = _moving(list(fins), angles, *told, width) if told is not None else None
+        if best is not None:
+            column, why, trust = best
+            return [Recognised("rudder_rad", column, fins[column].item, why, trust)]
+    return []
 
 
-def _fin(scene: _Scene) -> Iterator[Recognised]:
-    """Yield the rudder: of the columns about zero that which the change of the yaw rate follows beside the rate itself."""
-    known, columns = scene.known, scene.samples.columns
-    if {"rudder_rad", "rudder_measured_rad"} & known.keys() or not {"yaw_rad", "yaw_rate_rad_s"} & known.keys():
-        return
-    time = np.nan_to_num(scene.samples.time) + 1e-9 * np.arange(scene.samples.time.size)
-    has_rate = "yaw_rate_rad_s" in known
-    rate = np.nan_to_num(columns[known["yaw_rate_rad_s"]]) if has_rate else np.gradient(scene.angle("yaw_rad"), time)
-    grows = scene.changes(rate) / scene.passed
-    beside = [np.ones(grows.size), scene.middle(rate)]
-    fins = {c: fin for c in scene.free if (fin := _deflected(columns[c])) is not None}
-    means = {c: scene.changes(np.cumsum(np.nan_to_num(v))) / scene.width for c, (v, _) in fins.items()}
+def _moving(
+    names: list[Column], angles: list[FloatArray], grows: FloatArray, moved: FloatArray, width: int
+) -> tuple[Column, str, float] | None:
+    """Return which of some columns (n,) moves a rate by what `moved_by` gives of them, why, and how well; None for none."""
 
-    def left(*of: Column) -> float:
-        """Return the power of the rate's change beyond the rate's own and some columns."""
-        return float(np.sum(beyond(np.stack([*beside, *(means[c] for c in of)], axis=1), grows) ** 2))
+    def left(of: list[int]) -> float:
+        """Return the share of the rate's change that some columns leave."""
+        return float(np.sum(beyond(moved[:, of], grows) ** 2) / np.sum(grows**2))
 
-    alone = {c: 1.0 - left(c) / max(left(), 1e-300) for c in means}
-    column = max(alone, key=lambda c: alone[c], default=None)
-    if column is None or alone[column] < EXPLAINS:
-        return
+    alone = [explained(grows, column, width) for column in moved.T]
+    best = int(np.argmax(alone))
     # sway and roll follow the fin too: what counts is what the others do not explain as well
-    every = [column, *(c for c in means if c != column and abs(_alike(means[c], means[column])[0]) < FOLLOWS)]
-    own = {c: left(*(o for o in every if o != c)) - left(*every) for c in every}
-    rival = max(every[1:], key=lambda c: own[c], default=None)
-    if rival is not None and own[column] < CLEARLY * own[rival]:
-        return
-    beyond_it = (
-        "" if rival is None else f", {own[column] / max(own[rival], 1e-9):.3g} times what column {rival} adds to the others"
-    )
-    why = f"it explains {100 * alone[column]:.0f} % of what the yaw rate's change has beside the rate's own{beyond_it}"
-    yield Recognised("rudder_rad", column, fins[column][1], why)
-
-
-def _deflected(values: FloatArray) -> tuple[FloatArray, dict[str, Any]] | None:
-    """Return numbers (n,) of both sides of zero, or of a servo's centre, with how they are read; None where they are neither."""
-    servo = servo_of(values)
-    centred = values if servo is None else values - servo.centre
-    low, high = float(np.nanmin(centred)), float(np.nanmax(centred))
-    if not (low < 0.0 < high and min(-low, high) > 0.2 * max(-low, high) and (high < 90.0 or servo is not None)):
+    every = [best, *(i for i in range(len(names)) if i != best and slope_of(angles[i], angles[best])[1] < ALIKE)]
+    own = {i: left([o for o in every if o != i]) - left(every) for i in every if len(every) > 1}
+    rival = max(every[1:], key=lambda i: own[i], default=None)
+    if alone[best] < EXPLAINS or (rival is not None and own[best] < CLEARLY * own[rival]):
         return None
-    return centred, {"unit": "deg" if high > 1.6 else "rad"} if servo is None else {"unit": COUNTS, "centre": round(servo.centre)}
+    why = f"it explains {explains(alone[best], 'yaw_rate')}"
+    if rival is not None:
+        why += f", and adds {100 * own[best]:.0f} % to the others, column {names[rival]} {100 * own[rival]:.0f} %"
+    return names[best], why, alone[best]
+
+
+def _deflected(values: FloatArray) -> Reading | None:
+    """Return how numbers (n,) of both sides of zero, or of a servo's centre, are read as a fin's; None where they are neither."""
+    fin = fin_reading(values)
+    if fin is None:
+        return None
+    low, high = (fin.worth * (float(end) - fin.centre) for end in (np.nanmin(values), np.nanmax(values)))
+    return fin if low < 0.0 < high < 0.5 * math.pi and min(-low, high) > ONE_SIDED * max(-low, high) else None

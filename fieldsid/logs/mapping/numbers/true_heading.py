@@ -12,14 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldsid.logs.doctor.angle_and_rate import PAIRS, changes_of
+from fieldsid.logs.doctor.course_findings import course_of
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.numerics.trapezoid import trapezoid_integral
 
 WINDOW_S = 1.0
-"""Time over which a course and a rate are taken."""
-LEAST_WAY_M = 0.1
-FEWEST = 50
+"""Time over which a course is taken: in a longer one a vehicle turns more than once."""
 SURE = 4.0
 """Standard errors by which one heading must lead, and the other not."""
 BETTER = 2.0
@@ -44,9 +43,7 @@ def better_heading(runs: Sequence[Run], names: Sequence[str]) -> tuple[int, Note
     misfits = [_off_rate(run) for run in runs]
     best = min(range(len(runs)), key=lambda i: misfits[i])
     if np.isfinite(misfits[0]) and best != 0 and misfits[0] > BETTER * misfits[best]:
-        why = (
-            f"over {WINDOW_S:g} s the logged rate makes it within {misfits[best]:.2g} rad, the other within {misfits[0]:.2g} rad"
-        )
+        why = f"the logged rate makes it within {misfits[best]:.2g} rad, the other within {misfits[0]:.2g} rad"
         return best, _taken(names, best, why)
     other = lead_of(runs[0])
     if np.isfinite(misfits[0]) or other is None or other.is_clear:
@@ -69,33 +66,14 @@ def _taken(names: Sequence[str], best: int, why: str) -> Note:
 
 def _off_rate(run: Run) -> float:
     """Return by how many rad a heading's change over a window is off the integral of the yaw rate; infinite without one."""
-    if not (run.has("yaw_rad") and run.has("yaw_rate_rad_s")):
-        return float("inf")
-    good = np.isfinite(run["yaw_rad"]) & np.isfinite(run["yaw_rate_rad_s"])
-    time, yaw, rate = run.time[good], run["yaw_rad"][good], run["yaw_rate_rad_s"][good]
-    width = _width(time)
-    if time.size < FEWEST + width:
-        return float("inf")
-    swept = trapezoid_integral(time, rate)
-    off = (yaw[width:] - yaw[:-width]) - (swept[width:] - swept[:-width])
-    return float(np.std(off))
+    changes = changes_of(run, *PAIRS[0]) if run.has("yaw_rad") and run.has("yaw_rate_rad_s") else None
+    return float("inf") if changes is None else float(np.std(changes[0] - changes[1]))
 
 
 def lead_of(run: Run) -> Lead | None:
     """Return by how much the heading of a run leads its course; None where the log does not show it."""
-    if not all(run.has(s) for s in ("yaw_rad", "x_m", "y_m")):
-        return None
-    good = np.all([np.isfinite(run[s]) for s in ("yaw_rad", "x_m", "y_m")], axis=0)
-    time, yaw, x, y = run.time[good], run["yaw_rad"][good], run["x_m"][good], run["y_m"][good]
-    width = 2 * max(1, _width(time) // 2)
-    if time.size < FEWEST + width:
-        return None
-    dx, dy = x[width:] - x[:-width], y[width:] - y[:-width]
-    middle, rate = yaw[width // 2 : -width // 2], (yaw[width:] - yaw[:-width]) / (time[width:] - time[:-width])
-    moved = np.hypot(dx, dy) > LEAST_WAY_M
-    if moved.sum() < FEWEST:
-        return None
-    return _regressed((middle - np.arctan2(dy, dx))[moved], middle[moved], rate[moved], width)
+    made = course_of(run, WINDOW_S) if all(run.has(s) for s in ("yaw_rad", "x_m", "y_m")) else None
+    return None if made is None else _regressed(made.heading - made.course, made.heading, made.rate, made.width)
 
 
 def _regressed(off: FloatArray, yaw: FloatArray, rate: FloatArray, width: int) -> Lead | None:
@@ -111,7 +89,3 @@ def _regressed(off: FloatArray, yaw: FloatArray, rate: FloatArray, width: int) -
     spread = width * float(left @ left) / max(angle.size - width * base.shape[1], 1)
     covariance = np.linalg.inv(base.T @ base) * spread
     return Lead(float(values[0]), float(np.sqrt(covariance[0, 0])))
-
-
-def _width(time: FloatArray) -> int:
-    return max(1, round(WINDOW_S / float(np.median(np.diff(time))))) if time.size > 1 else 1

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fieldsid.logs.mapping.canonical_names import STEMS, canonical, canonical_names, unit_in_name
+from fieldsid.logs.mapping.canonical_names import STEMS, canonical, unit_in_name
 from fieldsid.logs.mapping.name_words import words_of
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.run import SIGNALS
@@ -41,7 +41,7 @@ def test_other_names_are_not_canonical(name):
 @given(st.text(max_size=20))
 def test_any_text_is_canonical_or_not_and_never_a_crash(text):
     found = canonical(text)
-    assert found is None or found.signal in canonical_names()
+    assert found is None or found.signal in {"time_s", *SIGNALS}
 
 
 @given(st.sampled_from(sorted(STEMS)), st.sampled_from(["rad", "deg", "rad_s", "deg_s", "m_s", "kn", "m", "ft", "rpm", "s"]))

@@ -45,6 +45,25 @@ def test_metres_without_a_name_stay_metres(tmp_path):
     assert {"x_m", "y_m"} <= found.proposal.body["signals"].keys()
 
 
+def test_a_heading_without_a_name_is_the_column_along_which_a_named_way_is_made(tmp_path):
+    columns = {"time": TRUTH["time_s"], "x": TRUTH["x_m"], "y": TRUTH["y_m"], "q1": HEADING_DEG,
+               "q9": SPEED + 0.01 * np.sin(TRUTH["time_s"]), "rudder_deg": RUDDER_DEG}  # fmt: skip
+    found, run = read_as_proposed(write_table(tmp_path / "boat.csv", columns))
+    signals = found.proposal.body["signals"]
+    assert signals["yaw_rad"] == {"column": "q1", "unit": "deg"}
+    assert signals["surge_m_s"] == {"column": "q9", "unit": "m/s"}
+    np.testing.assert_allclose(run["yaw_rad"] - run["yaw_rad"][0], TRUTH["yaw_rad"] - TRUTH["yaw_rad"][0], atol=1e-5)
+
+
+def test_a_heading_beyond_a_turn_is_in_rad_where_its_course_turns_so_far(tmp_path):
+    columns = {"time": TRUTH["time_s"], "x": TRUTH["x_m"], "y": TRUTH["y_m"], "yaw": TRUTH["yaw_rad"] + 8.0 * np.pi,
+               "rudder": TRUTH["rudder_rad"]}  # fmt: skip
+    found, run = read_as_proposed(write_table(tmp_path / "boat.csv", columns))
+    assert "unit" not in found.proposal.body["signals"]["yaw_rad"]
+    assert any("count turns" in n.message for n in found.notes)
+    np.testing.assert_allclose(np.diff(run["yaw_rad"]), np.diff(TRUTH["yaw_rad"]), atol=1e-6)
+
+
 def test_a_stamp_of_a_sensor_is_not_its_signal_and_a_wind_speed_is_no_speed(tmp_path):
     columns = {
         "time_s": TRUTH["time_s"], "estlat": GEOGRAPHIC["lat"], "estlon": GEOGRAPHIC["lon"], "ws_spd": 7.0 + 0.0 * HEADING_DEG,

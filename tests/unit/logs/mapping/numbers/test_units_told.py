@@ -60,3 +60,11 @@ def test_a_speed_that_makes_too_much_way_in_a_turn_of_the_propeller_is_found(tmp
                "rpm": 900.0 + 0.0 * TRUTH["time_s"]}  # fmt: skip
     _, notes = read_as_proposed(write_table(tmp_path / "log.csv", columns))
     assert "speed_unit" in notes
+
+
+def test_the_counts_of_a_servo_are_known_in_joined_tables_as_in_one(tmp_path):
+    write_table(tmp_path / "imu.csv", {"time": TRUTH["time_s"], "heading": np.degrees(TRUTH["yaw_rad"]) % 360.0})
+    pulses = np.round(1500.0 + 800.0 * TRUTH["rudder_rad"])
+    write_table(tmp_path / "act.csv", {"time": TRUTH["time_s"] + 0.01, "rudder": pulses})
+    found = inspect_log(tmp_path).proposal.body["signals"]["rudder_rad"]
+    assert found == {"topic": "act", "field": "rudder", "unit": "counts", "centre": 1500}
