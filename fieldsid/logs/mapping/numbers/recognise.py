@@ -44,8 +44,8 @@ ALIKE = 0.95
 """Correlation of two columns that are one signal twice."""
 ONE_SIDED = 0.2
 """How far a fin goes to one side at least, against the other."""
-WITHIN = 0.3
-"""Share by which a column may miss what it should make, in the mean: noise of half a degree, few digits, a current do so much."""
+VARIES_WITHIN, IS_WITHIN = 0.3, 0.1
+"""Share by which a column may miss in the mean what it should make: changes, under noise, and a level, which others are near."""
 GLOBE = (90.0, 180.0)
 """Largest latitude and longitude in degrees."""
 AT_REST = 1e-3
@@ -144,14 +144,15 @@ class _Tie:
     by: Callable[[_Scene, Column], FloatArray]
     units: tuple[str, ...]
     says: str
+    within: float = VARIES_WITHIN
     signs: tuple[int, ...] = (1,)
 
 
 TIES = (
     *(_Tie(rate, (angle,), partial(_Scene.turned, signal=angle), _Scene.swept, ("rad/s", "deg/s"),
-           f"the derivative of column {{{angle}}}", (1, -1)) for angle, rate in PAIRS),
+           f"the derivative of column {{{angle}}}", signs=(1, -1)) for angle, rate in PAIRS),
     _Tie("surge_m_s", ("yaw_rad", *PLACE), lambda s: s.speed().real, _Scene.values, ("m/s", "kn"),
-         "the way made along the heading"),
+         "the way made along the heading", IS_WITHIN),
     _Tie("sway_m_s", ("yaw_rad", *PLACE, "surge_m_s"), lambda s: s.speed().imag, _Scene.values, ("m/s", "kn"),
          "the way made across the heading"),
 )  # fmt: skip
@@ -201,7 +202,7 @@ def _tied(scene: _Scene, tie: _Tie) -> Iterator[Recognised]:
             off = float(np.abs(sign * UNITS[unit].factor * values[good] - made[good]).sum()) / size
             fits.append((off, column, {"unit": unit} | ({"sign": -1} if sign < 0 else {})))
     off, column, item = min(fits, key=lambda fit: fit[0], default=(math.inf, "", {}))
-    if off <= WITHIN:
+    if off <= tie.within:
         why = f"it is {tie.says.format(**scene.known)} within {100 * off:.1f} %"
         yield Recognised(tie.signal, column, item, why, 1.0 - off)
 
