@@ -107,3 +107,22 @@ def test_an_import_still_asks_for_a_mapping(run_cli, tmp_path):
     done = run_cli("import", written(tmp_path), "-o", tmp_path / "runs")
     assert done.code == 2
     assert "--write-mapping" in done.err
+
+
+def test_a_rate_of_turn_in_degrees_a_minute_is_told_by_the_heading_that_wraps(run_cli, tmp_path):
+    columns = {"time": TRUTH["time_s"], "Heading": np.degrees(TRUTH["yaw_rad"] + 0.05) % 360.0,
+               "ROT": 60.0 * np.degrees(TRUTH["yaw_rate_rad_s"]), "RudderAngle": TRUTH["rudder_rad"] / DEG,
+               "SpeedKts": TRUTH["surge_m_s"] * 3600 / 1852}  # fmt: skip
+    done = run_cli("identify", write_table(tmp_path / "boat.csv", columns), "--axis", "yaw", "--no-figures", "--json")
+    assert done.code == 0, done.err
+    assert "yaw rate from ROT (deg/min)" in done.err
+    assert done.json["fits"][0]["parameters"]["b2"]["value"] == pytest.approx(B2, rel=0.01)
+
+
+def test_names_that_say_their_frames_are_turned_into_ours(run_cli, tmp_path):
+    columns = {"time": TRUTH["time_s"], "yaw_enu_rad": 0.5 * np.pi - TRUTH["yaw_rad"],
+               "yaw_rate_enu_rad_s": -TRUTH["yaw_rate_rad_s"], "RudderDeg": TRUTH["rudder_rad"] / DEG,
+               "SpeedKts": TRUTH["surge_m_s"] * 3600 / 1852}  # fmt: skip
+    done = run_cli("identify", write_table(tmp_path / "boat.csv", columns), "--axis", "yaw", "--no-figures", "--json")
+    assert done.code == 0, done.err
+    assert done.json["fits"][0]["parameters"]["b2"]["value"] == pytest.approx(B2, rel=0.01)
