@@ -39,7 +39,7 @@ NUMBERS = {
     "free-run error of `pem` over that of output error, for `auto`, where a test rejects": auto_method.MAX_FREE_RUN_RATIO,
     "share that a measured speed is off by": speed_correction.MEASURED_SPEED_STD_ERROR,
     "dead band in which the middle of a fin lies, rad": own_moment.DEAD_BAND_RAD,
-    "shortest delay that is said, s": score_tests.MIN_DELAY_S,
+    "share of the damping that an ignored delay moves at least": score_tests.MIN_BIAS,
     "correlation that is said": parameter_checks.MAX_CORRELATION,
     "width of a group of speeds, log": parameters.GROUP_WIDTH,
     "the same while models are compared": speed_law_search.FINE_GROUP_WIDTH,

@@ -22,12 +22,15 @@ from fieldsid.logs.run import Note
 from fieldsid.models.axis import NAMES
 from fieldsid.models.effect import effect_named
 from fieldsid.noise.whiten import noise_vector
+from fieldsid.rounding import TWO_SIDED_95
 
 CLEAR_STD_ERRORS = 4.0
 """Standard errors from which an estimate counts."""
-MIN_DELAY_S, MAX_INITIAL_DELAY_S = 0.02, 0.2
-"""Smallest delay that is reported, and the largest that a refit starts from: the larger a first-order step, the less reliable it
-is."""
+STEP_AT_S, MAX_INITIAL_DELAY_S = 0.01, 0.2
+"""The delay that a first-order step is taken at, and the largest that a refit starts from: the larger a step, the less reliable
+it is."""
+MIN_BIAS = 0.005
+"""Share of the damping by which an ignored delay moves it at least to be reported: no plan asks for a closer one."""
 MIN_DRAG_LIKELIHOOD_GAIN = 10.0
 """Log likelihood the refit with damping that grows with the rate must gain."""
 FIN_TIMING = ("delay", "servo_lag", "rate_limit", "backlash", "clock_offset")
@@ -61,6 +64,11 @@ class Lateness:
     damping_error: float
     without: float
 
+    @property
+    def moves(self) -> float:
+        """By how much the damping is another one without it, 1/s."""
+        return abs(self.without - self.damping)
+
 
 def lateness(problem: Problem, solution: Solution, begin: float) -> Lateness | None:
     """Return how late the vehicle answers the logged fin, from a refit that begins at a lateness in s of either sign.
@@ -78,31 +86,33 @@ def lateness(problem: Problem, solution: Solution, begin: float) -> Lateness | N
     error = np.sqrt(np.diag(covariance(found.normal)))
     late, bounds = float(found.x[slot]), longer.layout.parameters[slot]
     settled = found.converged and found.cost < without.cost and bounds.low < late < bounds.high
-    if not settled or late * begin < 0.0 or abs(late) < max(CLEAR_STD_ERRORS * float(error[slot]), MIN_DELAY_S):
+    if not settled or late * begin < 0.0 or abs(late) < CLEAR_STD_ERRORS * float(error[slot]):
         return None
     before = float(without.x[problem.layout.names.index(NAMES[problem.layout.axis].damping)])
     return Lateness(late, float(found.x[at]), float(error[at]), before)
 
 
 def _timing(problem: Problem, solution: Solution) -> Iterator[Note]:
-    value, error = score_test(problem, solution, "delay", "delay", 0.5 * MIN_DELAY_S)
-    if not np.isfinite(value) or abs(value) < max(CLEAR_STD_ERRORS * error, MIN_DELAY_S):
-        return
-    found = lateness(problem, solution, value)
-    if found is None:
+    value, error = score_test(problem, solution, "delay", "delay", STEP_AT_S)
+    found = lateness(problem, solution, value) if np.isfinite(value) and abs(value) >= CLEAR_STD_ERRORS * error else None
+    # a delay that leaves the damping within its band is no matter, however clear it is
+    if found is None or found.moves < max(TWO_SIDED_95 * found.damping_error, MIN_BIAS * abs(found.damping)):
         return
     name = NAMES[problem.layout.axis].damping
     known = abs(found.damping) > CLEAR_STD_ERRORS * found.damping_error
     bias = 100.0 * (found.without / found.damping - 1.0) if known else None
     moves = f"left out, it moves {problem.layout.shown(name)} from {found.damping:.3g} to {found.without:.3g} 1/s" + (
-        f" ({bias:+.0f} %)" if known else ""
+        f" ({bias:+.2g} %)" if known else ""
     )
-    data = {"value": found.late, "limit": MIN_DELAY_S, "with": found.damping, "without": found.without, "bias_percent": bias}
+    data = {
+        "value": found.late, "limit": CLEAR_STD_ERRORS * error, "with": found.damping, "without": found.without,
+        "bias_percent": bias,
+    }  # fmt: skip
     if found.late > 0.0:
         yield Note(
             "ignored_delay",
-            f"the vehicle answers about {1e3 * found.late:.0f} ms after the logged fin (limit {1e3 * MIN_DELAY_S:.0f} ms): "
-            f"{moves}; log the measured fin, or use `--effects delay` or `--effects servo_lag`",
+            f"the vehicle answers about {1e3 * found.late:.0f} ms after the logged fin: {moves}; "
+            f"log the measured fin, or use `--effects delay` or `--effects servo_lag`",
             data,
         )
     else:
