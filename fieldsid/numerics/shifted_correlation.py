@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 import numpy.typing as npt
+from scipy.fft import next_fast_len
 
 from fieldsid.numerics.arrays import FloatArray
 
@@ -81,8 +82,9 @@ def _products(a: FloatArray, b: FloatArray, reach: int) -> FloatArray:
     """Return the sum of a[i + k] b[i] for each shift k."""
     total = np.zeros(2 * reach + 1)
     padded = np.concatenate([np.zeros(reach), a, np.zeros(reach)])
-    length = min(BLOCK_SAMPLES, b.size)
-    size = length + 2 * reach
+    # a block is no shorter than the shifts reach, or their number would grow with the length of the log, and so would each
+    length = min(max(BLOCK_SAMPLES, reach), b.size)
+    size = next_fast_len(length + 2 * reach, real=True)
     for start in range(0, b.size, length):
         block = b[start : start + length]
         spectrum = np.fft.rfft(padded[start : start + block.size + 2 * reach], size) * np.conj(np.fft.rfft(block, size))
