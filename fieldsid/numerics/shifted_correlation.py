@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from scipy.fft import next_fast_len
 
 from fieldsid.numerics.arrays import FloatArray
 
@@ -84,7 +83,7 @@ def _products(a: FloatArray, b: FloatArray, reach: int) -> FloatArray:
     padded = np.concatenate([np.zeros(reach), a, np.zeros(reach)])
     # a block is no shorter than the shifts reach, or their number would grow with the length of the log, and so would each
     length = min(max(BLOCK_SAMPLES, reach), b.size)
-    size = next_fast_len(length + 2 * reach, real=True)
+    size = 1 << (length + 2 * reach - 1).bit_length()  # of any other length a transform may take ten times as long
     for start in range(0, b.size, length):
         block = b[start : start + length]
         spectrum = np.fft.rfft(padded[start : start + block.size + 2 * reach], size) * np.conj(np.fft.rfft(block, size))

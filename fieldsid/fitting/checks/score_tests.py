@@ -112,7 +112,7 @@ def _timing(problem: Problem, solution: Solution) -> Iterator[Note]:
         yield Note(
             "ignored_delay",
             f"the vehicle answers about {1e3 * found.late:.0f} ms after the logged fin: {moves}; "
-            f"log the measured fin, or use `--effects delay` or `--effects servo_lag`",
+            "log the measured fin, or use `--effects delay` or `--effects servo_lag`",
             data,
         )
     else:

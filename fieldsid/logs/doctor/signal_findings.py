@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.logs.convert.faults.dropouts import dropout_findings
-from fieldsid.logs.convert.faults.repeats import held_for
 from fieldsid.logs.convert.faults.spikes import spikes_of
 from fieldsid.logs.convert.servo_counts import FINS, servo_of
 from fieldsid.logs.doctor.pair_findings import goes_with_way
@@ -50,7 +48,6 @@ def signal_findings(run: Run, name: str, stated: Stated) -> list[Note]:
     found += _size(run, name, present, stated)
     if name in MEASURED and present.size > 20:
         found += [*_frozen(name, run.time[seen], present), *_coarse(name, present), *_spikes(name, run.time[seen], present)]
-        found += dropout_findings(name, present)
     return found
 
 
@@ -116,13 +113,6 @@ def _coarse(name: str, values: FloatArray) -> list[Note]:
     share = float(np.mean(steps == 0.0))
     moved = steps[steps > 0.0]
     levels = float(np.ptp(values)) / float(moved.min()) if moved.size else 0.0
-    every = held_for(np.flatnonzero(steps > 0.0))
-    if every > 1:
-        message = (
-            f"{name} changes at every {every}th sample only ({moved.size} times): it was taken at a lower rate and repeated; log "
-            "it at its own rate, or leave the repeated cells empty"
-        )
-        return [Note("coarse", message, {"signal": name, "value": share, "limit": COARSE_LIMIT, "step": float(moved.min())})]
     if share <= COARSE_LIMIT or levels > 1000:
         return []
     message = (

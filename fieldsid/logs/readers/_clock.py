@@ -146,8 +146,12 @@ def _tried(columns: Columns, source: Source) -> Clock | None:
 
 def _by_numbers(columns: Columns) -> Clock | None:
     """Return the first column that goes on by even steps, and is named as nothing else: a row number as the last."""
-    clocks = list(_even_clocks(columns))
-    return next((c for c in clocks if not _counts_rows(columns, c.source)), clocks[0] if clocks else None)
+    of_rows = None
+    for clock in _even_clocks(columns):
+        if not _counts_rows(columns, clock.source):
+            return clock
+        of_rows = of_rows or clock
+    return of_rows
 
 
 def _even_clocks(columns: Columns) -> Iterator[Clock]:

@@ -56,14 +56,14 @@ class Dropout:
     count: int
     samples: int
 
-    def note(self, name: str, now: str) -> Note:
-        """Return the finding that a signal jumps to one number and back, time and again; `now` says what is done about it."""
+    def note(self, name: str) -> Note:
+        """Return the finding that a signal jumps to one number and back, time and again."""
         unit, number = SIGNALS[name], f"{self.number:.6g}"
         if unit in ("rad", "rad/s"):  # most logs have it in degrees
             number += f" {unit} ({math.degrees(self.number):.6g} {unit.replace('rad', 'deg')})"
         message = (
             f"{name} jumps to exactly {number} and back {self.count} times, {self.samples} samples in all (limit {FEWEST}): what "
-            f"its sensor or logger writes where it has nothing; {now}"
+            f"its sensor or logger writes where it has nothing; they are missing now"
         )
         data = {"signal": name, "value": self.count, "limit": FEWEST, "number": self.number, "samples": self.samples}
         return Note("dropouts", message, data)
@@ -73,15 +73,9 @@ def without_dropouts(name: str, values: FloatArray) -> tuple[FloatArray, list[No
     """Return a signal (n,) with its drop-outs missing, and the notes that say so."""
     notes = list[Note]()
     while (found := _dropout_of(name, values[np.isfinite(values)])) is not None:
-        notes.append(found.note(name, "they are missing now"))
+        notes.append(found.note(name))
         values = np.where(values == found.number, np.nan, values)
     return values, notes
-
-
-def dropout_findings(name: str, values: FloatArray) -> list[Note]:
-    """Return the finding that a signal (n,) without gaps jumps to one number and back; none where it does not."""
-    found = _dropout_of(name, values)
-    return [] if found is None else [found.note(name, "leave those cells empty")]
 
 
 @np.errstate(over="ignore", invalid="ignore")

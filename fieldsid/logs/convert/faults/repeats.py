@@ -19,7 +19,7 @@ def without_repeats(name: str, values: FloatArray) -> tuple[FloatArray, list[Not
     """Return a signal (n,) with the repeats of its slower sensor missing, and the note that says so; itself where it has none."""
     seen = np.flatnonzero(np.isfinite(values))
     changed = np.flatnonzero(np.diff(values[seen]) != 0.0)
-    every = held_for(changed)
+    every = _held_for(changed)
     if every == 1:
         return values, []
     own = np.full(values.shape, np.nan)
@@ -32,7 +32,7 @@ def without_repeats(name: str, values: FloatArray) -> tuple[FloatArray, list[Not
     return own, [Note("repeated", message, {"signal": name, "value": every, "count": changed.size})]
 
 
-def held_for(changed: npt.NDArray[np.intp]) -> int:
+def _held_for(changed: npt.NDArray[np.intp]) -> int:
     """Return for how many samples numbers are held, by the places (k,) before a change; 1 where it is not for always as many.
 
     That k changes fall on every m-th sample by chance has the probability m^(1-k): ten are no chance. A number that comes twice
