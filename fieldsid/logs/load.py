@@ -5,13 +5,13 @@ from __future__ import annotations
 import shlex
 import sys
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.errors import FieldsidError, MappingError
-from fieldsid.logs.channels import ChannelMap, Source, TableForm, is_enough
+from fieldsid.logs.channels import ATTITUDE, AXES, ChannelMap, Source, TableForm, is_enough
 from fieldsid.logs.convert.assemble import WHOLE, assemble
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
 from fieldsid.logs.mapping.canonical_names import canonical
@@ -185,22 +185,35 @@ def _unmapped(
     if found.by_topic:
         what = "bag" if found.form.endswith("bag") else "run in several tables" if reader.name == JOINED else "log of topics"
         return MappingError(f"`{path}` is a {what} and needs a mapping", found=f"topics {shown or 'none'}", hint=hint)
-    close, is_whole = _near_names(found)
+    close, proposed = _near_names(found)
     hint += f"; {close}" if close else ""
-    hint += "" if is_whole else "".join(f"; {note.message}" for note in tables_beside(path))
-    if not any((said := canonical(n)) is not None and said.signal == TIME for n in names):
-        return MappingError(f"`{path}` has no column `{TIME}`", found=f"columns {shown}", hint=hint)
-    return MappingError(f"`{path}` has no column of a signal that is known by its name", found=f"columns {shown}", hint=hint)
+    hint += "" if is_enough(proposed) else "".join(f"; {note.message}" for note in tables_beside(path))
+    if found.no_clock is not None:
+        reason = found.no_clock[1]
+        return MappingError(f"`{path}` has no clock: {reason.what}", found=reason.found, hint=f"{reason.hint}; {hint}")
+    lacking = _lacking(proposed)
+    if lacking:
+        what = f"no column of numbers in `{path}` is known by its name as {' or '.join(lacking)}"
+    else:
+        what = f"`{path}` needs a mapping: not all of its columns have the names of signals"
+    return MappingError(what, found=f"columns {shown}", hint=hint)
 
 
-def _near_names(found: Inventory) -> tuple[str, bool]:
-    """Say which signals columns that are none by their names probably are, as `sysid inspect` does; and whether all are there."""
+def _lacking(signals: Collection[str]) -> list[str]:
+    """Return in words what a run needs and none of some signals is."""
+    motions, fins = ({s for axis in AXES for s in axis[i]} for i in range(2))
+    kinds = ("time", {TIME}), ("the vehicle's angle or rate", motions | {ATTITUDE}), ("a fin's angle", fins)
+    return [words for words, any_of in kinds if not any_of & set(signals)]
+
+
+def _near_names(found: Inventory) -> tuple[str, Collection[str]]:
+    """Say which signals columns that are none by their names probably are, as `sysid inspect` does; and return all proposed."""
     from fieldsid.logs.mapping.draft import draft_of, place_of
 
     body = draft_of(found).body
     lines = ({TIME: body["time"]} if "time" in body else {}) | body["signals"]
     pairs = [f"`{place_of(item)}` may be `{signal}`" for signal, item in lines.items() if canonical(place_of(item)) is None]
-    return ", ".join(pairs[:NEAR_SHOWN]), is_enough(body["signals"])
+    return ", ".join(pairs[:NEAR_SHOWN]), lines
 
 
 def _from_stdin(mapping: ChannelMap | Path | None, **more: Any) -> Run:

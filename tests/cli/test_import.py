@@ -150,7 +150,7 @@ def emptied(log):
 BAD = {
     "missing column": (
         lambda p: edited(p, lambda r: [["Time", *r[0][1:]], *r[1:]]),
-        "no column `time_s`",
+        "needs a mapping",
         "`Time` may be `time_s`",
     ),
     "time backwards": (with_column("time_s", lambda i, v: 1.0 if i == 200 else v), "time goes backwards", "--salvage"),

@@ -6,6 +6,7 @@ import numpy as np
 
 from fieldsid.logs.convert.faults.spikes import spikes_of
 from fieldsid.logs.convert.servo_counts import FINS, servo_of
+from fieldsid.logs.doctor.holes import usual_step
 from fieldsid.logs.doctor.pair_findings import goes_with_way
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import GOALS, SIGNALS, Note, Run
@@ -52,8 +53,11 @@ def signal_findings(run: Run, name: str, stated: Stated) -> list[Note]:
 
 
 def _missing(name: str, seen: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[Note]:
+    steps = np.diff(np.flatnonzero(seen)).astype(np.float64)
+    apart = float(np.median(steps)) if steps.size else 1.0
+    if name not in MEASURED and apart > 1.0 and usual_step(steps) is None:
+        return []  # a command that is published when it changes
     # of a sensor slower than the clock only its own samples can be missing
-    apart = float(np.median(np.diff(np.flatnonzero(seen)))) if seen.sum() > 1 else 1.0
     share = 1.0 - apart * float(seen.mean())
     if share <= MISSING_LIMIT:
         return []

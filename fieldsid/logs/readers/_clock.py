@@ -163,7 +163,7 @@ def _even_clocks(columns: Columns) -> Iterator[Clock]:
             continue
         if is_counter(name) and cells.dtype.kind != "M":
             continue
-        clock = _tried(columns, Source(column=columns.place(i), unit=unit_by_size(cells)))
+        clock = _tried(columns, _source(columns, i))
         if clock is None:
             continue
         steps = np.diff(clock.time[np.isfinite(clock.time)])

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from fieldsid.logs.doctor.holes import hiding, hole_notes, holes_of, unbroken, usual_step
+from fieldsid.logs.doctor.signal_findings import signal_findings
+from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import Run
 
 TIME = 0.1 * np.arange(600)
@@ -57,3 +59,16 @@ def test_a_whole_run_is_returned_as_it_is():
     run = Run("r", TIME, {"rudder_rad": switched(10.0)})
     assert unbroken(run, "rudder_rad") is run
     assert hole_notes(run, "rudder_rad") == ()
+
+
+def test_nothing_is_missing_of_a_command_that_is_published_when_it_changes():
+    fin = np.full(TIME.size, np.nan)
+    fin[[0, 30, 60, 90, 120, 180, 240, 270, 300]] = [0.0, 0.2, -0.2, 0.0, 0.2, -0.2, 0.0, -0.2, 0.2]
+    assert _codes(fin) == []
+    fin = np.where(np.arange(TIME.size) % 3 == 0, np.nan, switched(10.0))
+    assert _codes(fin) == ["missing"]
+
+
+def _codes(fin):
+    run = Run("run", TIME, {"yaw_rad": np.sin(TIME), "rudder_rad": fin})
+    return [n.code for n in signal_findings(run, "rudder_rad", Stated())]

@@ -139,9 +139,30 @@ def test_a_missing_column_names_the_near_ones(tmp_path):
 def test_a_table_without_a_time_says_which_column_may_be_it(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text(table(names=("Time", "yaw_rad", "rudder_rad")))
-    with pytest.raises(MappingError, match="no column `time_s`") as error:
+    with pytest.raises(MappingError, match="needs a mapping") as error:
         load_run(path)
     assert "`Time` may be `time_s`" in error.value.hint
+
+
+def test_a_table_says_what_it_lacks_and_why_its_time_is_none(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text(table(names=("Time", "yaw_rad", "remark")))
+    with pytest.raises(MappingError, match="known by its name as a fin's angle"):
+        load_run(path)
+    rows = [f"1.77788E+12,{0.1 * i},{0.01 * i}" for i in range(20)]
+    path.write_text("\n".join(["stamp (ms),heading (rad),rudder (rad)", *rows]))
+    with pytest.raises(MappingError, match="has no clock: time repeats"):
+        load_run(path)
+
+
+@pytest.mark.parametrize(("name", "unit_s"), [("elapsed_min", 60.0), ("julian_day", 86400.0), ("t_h", 3600.0)])
+def test_a_clock_that_only_its_steps_tell_has_the_unit_of_its_name(tmp_path, name, unit_s):
+    path = tmp_path / "run.csv"
+    time = np.arange(50) * 0.1
+    rows = [f"{124.0 + t / unit_s:.10f},{np.sin(t):.5f},{0.1 * np.cos(t):.5f}" for t in time]
+    path.write_text("\n".join([f"{name},heading_rad,rudder_rad", *rows]))
+    run = load_run(path, recognise=True)
+    np.testing.assert_allclose(run.time - run.time[0], time, atol=1e-4)
 
 
 @pytest.mark.parametrize(
