@@ -101,6 +101,7 @@ def test_a_second_plan_does_not_replace_the_first_without_force(run_cli, written
     assert (written / "plan.yaml").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_rivals_are_told_apart_with_odds(run_cli):
     body = run_cli("plan", "--separate", "deadband,stall", "--json").json
     assert body["separation"]["decides"] is True
@@ -120,9 +121,8 @@ def test_rivals_get_a_leg_at_every_speed_inside_the_default_limits_and_circles_w
         assert {"signal": "yaw_rad", "kind": "deviation"}.items() <= next(a for a in leg["abort"] if "yaw" in a["signal"]).items()
 
 
-@pytest.mark.parametrize(
-    ("axis", "more"), [("yaw", ("--radius",)), pytest.param("pitch", ("--depth-band", "1:8"), marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("axis", "more"), [("yaw", ("--radius",)), ("pitch", ("--depth-band", "1:8"))])
 def test_every_leg_is_written_as_fins_in_every_format_rules_and_circles_too(run_cli, tmp_path, axis, more):
     body = run_cli(*QUICK, "--axis", axis, *more, "--course", "30deg", "-o", tmp_path / "p", "--json").json
     for i, leg in enumerate(body["legs"], 1):
@@ -154,7 +154,7 @@ def test_every_limit_is_printed_and_what_has_none_is_named(run_cli):
     ("arguments", "words"),
     [
         (("--want", "a22=0.02%"), "--want a22="),
-        (("--want", "a22=2%", "--minutes", "0.5"), "--minutes"),
+        pytest.param(("--want", "a22=2%", "--minutes", "0.5"), "--minutes", marks=pytest.mark.slow),
         pytest.param(("--want", "a22=0.4%", "--minutes", "3"), "--want a22=", marks=pytest.mark.slow),
         (("--want", "d2=5%"), "b2"),
         (("--area", "20x10"), "--area"),
@@ -183,7 +183,7 @@ def test_every_limit_is_printed_and_what_has_none_is_named(run_cli):
         (("--axis", "pitch", "--radius"), "--axis yaw"),
         (("--separate", "delay"), "delay,servo_lag"),
         (("--separate", "delay,lag"), "servo_lag"),
-        (("--radius", "--area", "100x15"), "--area"),
+        pytest.param(("--radius", "--area", "100x15"), "--area", marks=pytest.mark.slow),
     ],
 )
 def test_what_cannot_be_done_is_refused_with_what_would_be_possible(run_cli, arguments, words):

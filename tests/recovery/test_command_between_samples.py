@@ -27,7 +27,7 @@ WITHIN = 5e-3
 """Share of the truth within which a22 comes back."""
 NOISE = 3e-4
 PHASES = np.arange(0.05, 1.0, 0.1)
-RATES = (5, pytest.param(10, marks=pytest.mark.slow), 20, pytest.param(50, marks=pytest.mark.slow))
+RATES = (5, *(pytest.param(rate, marks=pytest.mark.slow) for rate in (10, 20, 50)))
 TOPICS = {"yaw_rad": "h", "yaw_rate_rad_s": "r", "rudder_rad": "c"}
 
 

@@ -69,6 +69,7 @@ def test_few_seeds_stay_within_their_intervals(case, method):
     assert 0.7 < np.std(z) < 1.35
 
 
+@pytest.mark.slow
 def test_prediction_error_beats_output_error_under_a_disturbance():
     plain, refined = (np.mean(errors(YAW[1], "disturbed", m, range(12)) ** 2, axis=0) for m in ("output_error", "pem"))
     assert refined[0] < 0.8 * plain[0]

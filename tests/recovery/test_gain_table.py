@@ -14,8 +14,6 @@ from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.wish import Wish
 
 SEED = 7
-QUICK = "flat"
-"""The kind that the quick suite has."""
 
 
 def at_one_speed(number: int) -> Hull:
@@ -39,10 +37,8 @@ def test_the_table_counts_what_was_said_never_to_settle_and_what_was_refused():
     assert any(line.split() == ["90", "deg", "1", "none", "said"] for line in unsaid)
 
 
-@pytest.mark.parametrize(
-    "number",
-    [pytest.param(i, id=kind, marks=() if kind == QUICK else pytest.mark.slow) for i, kind in enumerate(KINDS)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(len(KINDS)), ids=list(KINDS))
 def test_hulls_of_every_kind_settle_within_what_was_said_and_none_hunts(number):
     rows = evaluate(at_one_speed(number), number, SEED, "pd", "pulses")
     assert rows

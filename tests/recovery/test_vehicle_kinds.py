@@ -22,7 +22,7 @@ POWERS = {"a22": 1, "b2": 2, "quadratic": 0, "cross_damping": 1, "cross_rate": 2
 SLOW_SWAY = {"barge", "ship"}
 """Kinds whose sway dies out slower than the catalogue's bound of 0.1 1/s: it is not theirs."""
 CASES = [(kind, effect) for kind in BY_NAME for effect in HIDDEN if not (kind in SLOW_SWAY and effect == "sway_coupling")]
-SHORT = (("aircraft", "sway_coupling"), ("ship", ""))
+SHORT = (pytest.param("aircraft", "sway_coupling", marks=pytest.mark.slow), ("ship", ""))
 
 
 @cache

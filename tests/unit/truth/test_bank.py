@@ -49,7 +49,10 @@ def test_nothing_hidden_leaves_the_base_model_near_the_floor(index):
     assert case.ratio < 1.35
 
 
-@pytest.mark.parametrize("kind", ["single", "imperfect", "uncatalogued", "pair"])
+MORE = [pytest.param(kind, marks=pytest.mark.slow) for kind in ("imperfect", "uncatalogued", "pair")]
+
+
+@pytest.mark.parametrize("kind", ["single", *MORE])
 def test_what_is_hidden_shows_in_the_base_models_error(kind):
     found = [make_case(i, 2, kind=kind) for i in range(4)]
     assert sum(c.visible for c in found) >= 2

@@ -69,6 +69,7 @@ def test_an_unstable_hull_is_not_left_in_a_wrong_minimum():
     assert belief.turn(hull.speeds[2], hull.rudder_limit, 1.0).radius == pytest.approx(truth, rel=0.15)
 
 
+@pytest.mark.slow
 def test_few_effective_draws_and_a_fit_like_no_vehicle_are_not_identified(monkeypatch):
     hull, runs = runs_of(0, "pulses+zigzag")
     fitted = identify(runs[:1], Axis.YAW, effects=("quadratic_damping",))
@@ -100,7 +101,8 @@ def test_draws_worth_less_widen_the_band(monkeypatch):
     assert width(1.0) > 1.01 * width(200.0)
 
 
-@pytest.mark.parametrize("turn", ["half", *(pytest.param(turn, marks=pytest.mark.slow) for turn in ("circle", "uturn"))])
+@pytest.mark.slow
+@pytest.mark.parametrize("turn", ["half", "circle", "uturn"])
 def test_a_turn_at_one_speed_helps_the_others(turn):
     hull, runs = runs_of(1, f"pulses+{turn}")
     with_circle = believed(runs)
