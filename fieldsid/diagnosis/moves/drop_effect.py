@@ -13,10 +13,10 @@ from fieldsid.models.effect import Effect
 
 
 def drop_each(h: ScoredModel, tried: Archive, grounds: Grounds) -> bool:
-    """Fit a model without each of its effects, unless that was done; return whether anything was fitted.
+    """Fit a model without each of its effects, unless that was done; return whether any model was fitted.
 
-    Later effects may have made earlier ones idle. The set without one may have been tried in other variants only, or have ended
-    at a worse optimum than the one that the larger model has found.
+    An effect added later may have made an earlier one superfluous. A smaller set may so far have been tried only in other
+    variants, or its fit may have ended at a worse optimum than the one the larger model leads to.
     """
     if len(h.names) <= len(tried.known) + 1 or tried.is_thinned(h):
         return False

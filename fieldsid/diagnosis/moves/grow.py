@@ -1,4 +1,4 @@
-"""The move that adds: a model with each effect that passes the screens; the best in other variants and under other laws."""
+"""The move that adds an effect: screen all effects, fit those that promise most, refine the best in variants and speed laws."""
 
 from __future__ import annotations
 
@@ -94,9 +94,9 @@ class Growth:
             self._try_laws_and_variants(self._leading())
 
     def _evaluate_foremost(self, groups: Sequence[Sequence[SearchMove]]) -> list[SearchMove]:
-        """Evaluate the moves of the effects that promise most, then those of the others; return the starts left out.
+        """Fit the effects that promise most, then the others; return the starts that were left out.
 
-        Where the best child then leaves no visible error, of the others only what its effect may be mistaken for.
+        Where the best child already leaves no visible error, only effects that may be mistaken for its own are fitted after it.
         """
         first = foremost(groups, FOREMOST_EFFECTS)
         later = self.evaluate(first)
@@ -107,9 +107,9 @@ class Growth:
         return later + self.evaluate([g for g in others if not explained or g[0].screened.effect.name in alike])
 
     def evaluate(self, groups: Sequence[Sequence[SearchMove]], *, every: bool = False) -> list[SearchMove]:
-        """Evaluate the moves to each set of effects; return those left out: an earlier start has reached their predicted cost.
+        """Fit the moves to each set of effects; return the moves skipped because an earlier start reached their predicted cost.
 
-        `every` leaves none out. All moves are compared with the same rival, so that the result does not depend on their order.
+        `every` skips none. All moves are compared with the same rival, so that the result does not depend on their order.
         """
         rival = max((h.log_likelihood for h in self.tried.children(self.key)), default=-np.inf)
 
@@ -133,9 +133,9 @@ class Growth:
         return left
 
     def _fitted(self, move: SearchMove, free: list[FittedProblem], rival: float) -> LikelihoodFit:
-        """Fit the model that a move leads to, by output error first where it was screened so, which joins `free`.
+        """Fit the model of a move by maximum likelihood, and from the equivalent solution with the same response at one speed.
 
-        By maximum likelihood from there, and from the equivalent solution that has the same response at one speed.
+        A move screened by output error is first fitted by output error; that fit is appended to `free`.
         """
         screened, of_parent = move.screened, move.parent.likelihood_fit
         self.grounds.report("+".join((*move.parent.names, screened.effect.name)))
@@ -147,10 +147,10 @@ class Growth:
         return prefer_smaller_equivalent(ml_fit, screened.effect)
 
     def _prefer_output_error(self, *, refit: bool) -> bool:
-        """Give the leading children with more evidence than their parent their output-error fit, where that validates better.
+        """Replace the leading children's fits by their output-error fits where these predict the unseen runs better.
 
-        `refit`: beside that the parent is fitted again from the best child. Returns whether it was better so: then the children
-        are those before their output-error fits.
+        Only children with more evidence than their parent are considered. With `refit` the parent is also fitted again from its
+        best child; True is returned where that improved the parent, and the children then keep the fits they had.
         """
         parent, leading = self.tried[self.key], self.tried.children(self.key)[:LEADING_CHILDREN]
 
@@ -185,9 +185,9 @@ class Growth:
         return True
 
     def _leading(self) -> list[Names]:
-        """Return the best children, and the one with most evidence on the training runs, as far as they may come to lead.
+        """Return the children worth refining: the best few, and the one with most evidence on the training runs.
 
-        A wrong speed law may hide the last on the validation runs.
+        The latter may rank low only because a wrong speed law spoils it on the validation runs.
         """
         children = self.tried.children(self.key)
         best = sorted(children, key=lambda h: -h.training_evidence)[:1]
@@ -197,34 +197,33 @@ class Growth:
         return [frozenset(h.names) for h in children if self._stays_in_question(h, children[0])]
 
     def _stays_in_question(self, h: ScoredModel, best: ScoredModel) -> bool:
-        """Whether a model is a rival of its best sibling by log evidence, or leaves clearly less of fitted and of unseen runs.
+        """Whether a model is a rival of its best sibling by log evidence, or has a clearly lower error on fitted and unseen runs.
 
-        Its evidence may be lower only because its effect is there in another variant.
+        Its evidence may be lower only because the vehicle has another variant of its effect.
         """
         if best.log_evidence - h.log_evidence < RIVAL_LOG_ODDS:
             return True
         return leaves_error(best, self.grounds.floor) and errs_less(h, best, MAX_ERROR_RATIO)
 
     def _is_worth_refining(self, h: ScoredModel, best: ScoredModel) -> bool:
-        """Whether a child may come to lead its best sibling in another variant or under another law.
+        """Whether a child may overtake its best sibling in another variant or under another speed law.
 
-        Any may where that leaves a visible error. Where it leaves none, what explains less of the parent's than it leaves is not
-        the effect that is missing, in whatever variant.
+        Any child may while the sibling leaves a visible error. Otherwise a child that explains less than half of the parent's
+        error is not the missing effect in any variant.
         """
         if worst_error(best, self.grounds.floor) > SUFFICIENT_ERROR_RATIO or self._stays_in_question(h, best):
             return True
         return self.grounds.explained_share(self.tried[self.key], h) >= MAIN_EXPLAINED_SHARE
 
     def _is_lost(self, children: Sequence[ScoredModel]) -> bool:
-        """Whether the parent errs far and no child gains evidence: what is missing may be any of them in another variant."""
+        """Whether the parent's error is large and no child gains evidence: any child may be the missing effect in a variant."""
         large = self.grounds.error_ratio(self.tried[self.key]) > MISSING_ERROR_RATIO
         return large and not any(gains_evidence(self.tried[self.key], child) for child in children)
 
     def _try_laws_and_variants(self, names: Sequence[Names]) -> None:
-        """Try another speed law and other variants of the effects for some children, kept where they have more evidence.
+        """Try some children under another speed law and with other variants; keep what has more evidence.
 
-        Where no child gains evidence over all runs and the parent's error is large all children are tried: the missing effect may
-        be any of them in another variant, whatever follows the training runs alone.
+        Where no child gains evidence over all runs and the parent's error is large, all children are tried.
         """
         tried, parent = self.tried, self.tried[self.key]
         lost = self._is_lost([tried[n] for n in names])

@@ -1,11 +1,13 @@
 """The search over sets of effects: one best-first queue over one archive, entered from the bare model and from the whole hull.
 
-A model that is taken from the queue is expanded: an effect is added to it, the best of what comes of that is tried in other
-variants and under other laws of the speed, and what leads then is fitted without each of its effects. Where one effect alone
-comes near the noise, the queue goes a step from below before the whole hull is fitted: a lag of much evidence and little error
-would else hide that effect, and a cross state, free enough, take it up. The two entries lead to the same sets from below and
-from above, and of each set the better optimum is kept, wherever it came from. At the end what is found is fitted without each of
-its effects until none is idle.
+A model taken from the queue is expanded in three moves. Each effect of the catalogue is added to it; the best of these models are
+fitted with other variants of their effects and under other speed laws; and the model with the most evidence is then fitted
+without each of its effects. The search enters from below, at the bare model, and from above, at the whole hull. Both ways lead to
+the same sets of effects, and of each set the better optimum is kept, whichever way found it.
+
+Where one effect alone comes near the noise, the queue takes one step from below before the whole hull is fitted. Otherwise a
+servo lag, which gains much evidence and lowers the error little, would hide that effect, and the free cross state of the hull
+would fit it. At the end the set found is fitted without each of its effects, until every effect in it is needed.
 """
 
 from __future__ import annotations
@@ -106,13 +108,15 @@ class Search:
         return found
 
     def _nears_from_below(self) -> bool:
-        """Whether one effect alone may be all that is missing, though another of more evidence, a small one, is there too."""
+        """Whether some model with one effect comes near the noise: that effect may be all that is missing beside a small one."""
         return any(worst_error(h, self.floor) <= MISSING_ERROR_RATIO for h in self.tried.children(self.root))
 
     def _eliminate(self, found: ScoredModel) -> bool:
-        """Fit what is found without each of its effects, the others in their variants; return whether anything was fitted.
+        """Fit the set found without each of its effects; return whether any model was fitted.
 
-        An effect may stand for a variant of another, beside it or in its place: a dead time for the inertia of a servo.
+        An effect may be mistaken for a variant of another, as a dead time for the inertia of a servo. So each remaining set is
+        also tried with the variants of the effects that the removed one may be mistaken for, in the set or in place of the
+        removed one.
         """
         if drop_each(found, self.tried, self.grounds):
             asked = []
@@ -131,12 +135,12 @@ class Search:
         return {n for e in self.catalogue if e.name == name for n in e.mistaken_for}
 
     def _refit_leading(self) -> bool:
-        """Fit the models that a table shows again from their parts, where those are likelier; return whether that was better."""
+        """Fit the models of the table again from any subset that is likelier than they are; return whether one became better."""
         leading = [self.best_admissible(), *self.tried.ranked()[:MAX_CANDIDATES]]
         return refit_from_parts(list({frozenset(h.names): h for h in leading}.values()), self.tried, self.grounds)
 
     def expand(self, h: ScoredModel) -> None:
-        """Add an effect to a model, and drop one from the model that leads then."""
+        """Add each effect to a model; fit the model with the most evidence without each of its effects and in other variants."""
         self.grow(h)
         drop_each(self.tried.most_evident(), self.tried, self.grounds)
         if self.may_go_on():
@@ -145,7 +149,7 @@ class Search:
         self.lower_floor(self.best_admissible())
 
     def grow(self, h: ScoredModel, *, forced: bool = False) -> list[ScoredModel]:
-        """Return a model with each effect that passes the screens, or with each when forced, those of most log evidence first."""
+        """Return the models with one effect more, sorted by log evidence; `forced` fits every effect, not only those screened."""
         key = frozenset(h.names)
         if key not in self.tried.expanded:
             effects = [e for e in self.catalogue if e.name not in key]
@@ -153,11 +157,11 @@ class Search:
         return self.tried.children(key)
 
     def _next_to_expand(self) -> ScoredModel | None:
-        """Return the next model of the queue, None where all are expanded, leave no error, or no evaluations are left.
+        """Return the next model to expand; None where all are expanded or at the noise, or the budget is used up.
 
-        First comes the model of the highest log evidence; then every model of accepted effects with a clearly lower error, whose
-        evidence may be lower only because it lacks a small effect that the first has besides a wrong one; then the first without
-        each of its effects, whose expansions exchange that effect.
+        The order is: the model with the highest log evidence; models of accepted effects whose error is clearly lower, since such
+        a model may have less evidence only because it lacks a small effect; and, while an error is left, the first model without
+        each of its effects, whose expansions exchange that effect for another.
         """
         if not self.may_go_on():
             return None
@@ -168,9 +172,9 @@ class Search:
         return next((h for h in (best, *front, *less) if self._is_expandable(h)), None)
 
     def _is_expandable(self, h: ScoredModel) -> bool:
-        """Whether a model is new, does not diverge, and leaves an error above the noise floor.
+        """Whether a model has not been expanded, does not diverge, and leaves an error above the noise floor.
 
-        Nothing else ends its growth: what an effect more must bring to lead is the prior against it.
+        No other rule stops the growth of a set: the prior against each further effect does.
         """
         is_new = frozenset(h.names) not in self.tried.expanded
         return is_new and bool(np.isfinite(h.log_evidence)) and leaves_error(h, self.floor)
@@ -199,7 +203,7 @@ class Search:
             ml_fit = fit_base(fitted, self.floor, self.resolution_floor, self.parallel)
             self.noise_kind = ml_fit.noise_kind
             h = score_model(ml_fit, self.validation).evaluate_errors()
-            # both ways ask for its errors: two processes would compute and count them twice
+            # both branches below need these errors: computed here, they are not computed in each of two processes
             _ = h.unseen_errors
             ways: tuple[Callable[[], Any], ...] = (partial(prefer_output_error, h, self.floor), partial(self._under_other_law, h))
             own, other = self.parallel.map(lambda way: way(), ways)
@@ -218,7 +222,7 @@ class Search:
 
     @property
     def grounds(self) -> Grounds:
-        """What all models have in common."""
+        """The records, the noise floor and the kind of noise under which all models are compared."""
         return Grounds(self.validation, self.floor, self.resolution_floor, self.noise_kind, self.parallel, self.report)
 
     def lower_floor(self, h: ScoredModel) -> None:
@@ -231,9 +235,9 @@ class Search:
             self.floor = lowered_noise_floor(self.floor, self.records, residuals_of(problem, x))
 
     def share_own_moments(self) -> None:
-        """Let every model have the moments of the runs' own that the one of the highest evidence tells: the runs are the same.
+        """Give every model the standard deviation of the runs' own moments that the most evident model estimates.
 
-        A model that lacks an effect takes part of it for trims that differ from run to run.
+        The runs are the same for all models, and a model that lacks an effect mistakes part of it for trims that differ by run.
         """
         told = self.tried.most_evident().own_moment
         others = {name: h.with_own_moment(told) for name, h in self.tried.items() if h.own_moment != told}
@@ -250,7 +254,7 @@ class Search:
         return worst_error(self.best_admissible(), self.floor) > SUFFICIENT_ERROR_RATIO
 
     def leaves_unexplained(self) -> bool:
-        """Whether the best accepted set leaves a visible error, or explains less of one than stands whatever is left."""
+        """Whether the best accepted set leaves a visible error, or explains too small a share of the base model's error."""
         if self.leaves_visible_error():
             return True
         base, best = self.base(), self.best_admissible()
@@ -258,7 +262,7 @@ class Search:
         return is_visible and compared_share(base, best, self.floor) < MIN_EXPLAINED_SHARE
 
     def _misses_something(self) -> bool:
-        """Whether the best accepted set leaves that, or an error that the verdict counts although those shown are small."""
+        """Whether the best accepted set leaves an unexplained error, also where only the verdict's comparison shows it."""
         if self.leaves_unexplained():
             return True
         return compared_error(self.base(), self.best_admissible(), self.floor) > SUFFICIENT_ERROR_RATIO

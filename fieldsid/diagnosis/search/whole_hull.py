@@ -1,9 +1,9 @@
 """The second entry of a search: the whole hull, with the effects that every vehicle has, fitted at once.
 
-Every real hull has a cross state, a servo with a lag, drag that grows with the square of the rate, and loses speed in a turn.
-Steps from the bare model lose their way among the four: each takes up a part of the others. So they are added one after another
-whatever each is worth alone, each from the best few of its scan points at the fit before it, and the whole is tried in its
-variants: alone, a part that is free enough takes up the others. What the data do not show is dropped again.
+Every real hull has a cross state (sway or heave), a servo lag, drag that grows with the square of the rate, and loses speed in a
+turn. Steps from the bare model go astray among the four, because each effect alone fits a part of the others. So all four are
+added one after another, whatever each gains alone, each from its few most promising scan points at the fit before it. The whole
+hull is then tried with other variants, and the effects that the data do not show are dropped again.
 """
 
 from __future__ import annotations
