@@ -56,13 +56,13 @@ class Verdict:
 def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: LikelihoodFit) -> Verdict:
     """Return the verdict on the model a search ended at, from its errors and the tests of its innovations.
 
-    Errors are over the noise floor that is reported, with the sensors' coloured noise where they have it. Without an effect,
-    `sufficient` asks for training and validation errors within SUFFICIENT_ERROR_RATIO; above it the verdict is `disturbed` where
-    the innovations pass the tests of a disturbance, else `unexplained`. So it is where an effect that fits the training runs
-    better leaves a visible error on the validation runs that is no smaller than without it, or explains less of a large one, that
-    of all runs, than it leaves: a lag of a sample may be there, and is not what is missing. And so it is where an effect that
-    leaves a visible error has nothing to add for a rival by evidence. Where what is left surely follows something else that was
-    measured, a moment of the water is not named, as that of a hull's roll swings as a wave's does.
+    Errors are relative to the reported noise floor, which includes the sensors' coloured noise. Where no effect was found, the
+    verdict is `sufficient` if training and validation errors are within SUFFICIENT_ERROR_RATIO; else `disturbed` if the
+    innovations pass the tests of a disturbance, and `unexplained` if not. The same two verdicts are given where the effects found
+    leave a visible error on the validation runs that is no smaller than without them, explain less than half of a large error, or
+    are hardly more evident than no effect: such an effect may exist and is still not what is missing. A moment of the water, such
+    as a wave, is not named where the remaining error surely follows another measured signal, because the moment of a rolling hull
+    oscillates as that of a wave does.
     """
     floor = reported_noise_floor(search.floor, ml_fit.noise)
     was, now = compared_errors(search.base(), found, floor)
@@ -93,7 +93,8 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
 def left_of(search: Search, named: ScoredModel, found: ScoredModel, tests: ResidualTests, floor: Noise) -> Left:
     """Return what a named model leaves over a noise floor; `tests` are those of the model found, which may hold more effects.
 
-    What the tests pass for a disturbance is not unexplained, unless it is on the unseen runs alone or more than any sea leaves.
+    An error that the tests accept as a disturbance is not unexplained, unless it is far larger on the unseen runs or larger than
+    a sea can leave.
     """
     ratio = worst_error(named, floor)
     if ratio <= SUFFICIENT_ERROR_RATIO:
@@ -109,7 +110,7 @@ def _unnamed(found: ScoredModel, left: ResidualTests, floor: Noise) -> Verdict:
 
 
 def _is_no_disturbance(h: ScoredModel, tests: ResidualTests, floor: Noise) -> bool:
-    """Whether what a model leaves follows the motion, is more than any sea leaves, or far more on the unseen runs."""
+    """Whether a model's remaining error follows the motion, is larger than a sea can leave, or is far larger on unseen runs."""
     worst = worst_error(h, floor)
     p = 3.0 * tests.dependence if worst < GUSTY_ERROR_RATIO else tests.p
     return p < MIN_P_VALUE or worst > FAR_ERROR_RATIO or validation_error_ratio(h, floor) > MAX_VALIDATION_ERROR_RATIO
@@ -134,9 +135,9 @@ def added_effects(search: Search, h: ScoredModel) -> tuple[str, ...]:
 
 
 def rivals_of(search: Search, found: ScoredModel) -> tuple[ScoredModel, ...]:
-    """Return the models that cannot be distinguished from the final one, of its size, or larger and ending a visible error.
+    """Return the models that the evidence cannot tell from the final one: of its size, or larger and ending a visible error.
 
-    Their free runs may differ, at numbers that the training runs leave open: the evidence has counted that.
+    Their free runs may differ where the training runs leave a parameter undetermined, which the evidence takes into account.
     """
     margin, sums = RIVAL_LOG_ODDS if len(search.records) > 1 else 2.0 * RIVAL_LOG_ODDS, search.evidences()
     best = sums[frozenset(found.names)]
@@ -163,8 +164,8 @@ def worsens(search: Search, h: ScoredModel, floor: Noise) -> bool:
 def probabilities(evidences: Mapping[frozenset[str], float], left: float = 1.0) -> dict[frozenset[str], float]:
     """Return the posterior probability of each set of effects: proportional to exp(log evidence / EVIDENCE_TEMPERATURE).
 
-    They sum to what is left beside the probability that what is hidden is in none of the sets tried, which is estimated from the
-    error over the noise that the named set leaves, `left`: no evidence of one set over another says anything of that.
+    They sum to one less the probability that the hidden effect is in none of the sets tried. The evidence of one set over another
+    says nothing about that probability; it is estimated from `left`, the error over the noise that the named set leaves.
     """
     scores = np.array(list(evidences.values())) / EVIDENCE_TEMPERATURE
     weights = np.exp(scores - scores.max())

@@ -1,6 +1,6 @@
-"""The acceptance rules of an addition to a model: by its log evidence, and by the free-run errors.
+"""The rules by which an effect added to a model is accepted: by the log evidence, and by the free-run errors.
 
-The log evidence holds the prior odds of what was added; the errors are those of training and of validation runs.
+The log evidence includes the prior odds against the added effect. The errors are those on training and on validation runs.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ def is_accepted(
 def lowers_error(
     without: ScoredModel, with_: ScoredModel, floor: Noise | None = None, least: float = SUFFICIENT_ERROR_RATIO
 ) -> bool:  # fmt: skip
-    """Whether an addition lowers the training or the validation error clearly, their product, and does not raise the latter.
+    """Whether an addition clearly lowers the training or the validation error, and their product, and does not raise the latter.
 
-    Either may show the effect: a mild validation run does not excite what a hard training run does, and the training error of
-    a model without the effect is low where its other parameters are biased towards those runs. Over a noise floor, where the
-    model without it leaves more than `least` times that in some run, the addition may explain instead more of what is left above
-    the floor than it leaves: near the floor no effect lowers the whole error much. A validation error that stays within what a
-    sufficient model has speaks against nothing: the run is too mild. See `compared_errors` for which validation error.
+    One of the two errors is enough. A mild validation run may not excite the effect, and the training error without the effect
+    may be low because the other parameters are biased towards the training runs. Near the noise floor no effect can lower the
+    whole error much; there the effect may instead explain most of the squared error above the floor, provided that some run
+    without it has more than `least` times the floor. A validation error at which a model is sufficient is no argument against the
+    effect: the run is too mild to show it. `compared_errors` says which validation error is meant.
     """
     before, now = compared_errors(without, with_, floor)
     was, left = fitted_errors(without, with_)
@@ -57,12 +57,12 @@ def lowers_error(
 def compared_errors(without: ScoredModel, with_: ScoredModel, floor: Noise | None = None) -> tuple[Errors, Errors]:
     """Return the validation errors that two models are compared by.
 
-    They are those at the training runs' parameters or, where the validation runs are likelier with the addition, those at the
-    parameters of all runs, whichever the addition lowers more: training runs may leave open what one validation run settles, in
-    either model, as the deviation of a compass on headings not flown, and the predictive density knows what is left open. Over a
-    noise floor only where the validation runs at those parameters, or the training runs, have a visible error without the
-    addition. Both with moments of the runs' own of the size that the more evident of the two tells: the runs are the same, and
-    what a model lacks is no trim that differs from run to run.
+    They are the errors at the training runs' parameters. Where the validation runs are likelier with the addition, they may also
+    be the errors at the parameters estimated from all runs, if the addition lowers these more: training runs may leave a
+    parameter undetermined that one validation run determines, such as the deviation of a compass on headings that were not flown.
+    Given a noise floor, this holds only where the training runs, or the validation runs at those parameters, have a visible error
+    without the addition. The moments of the runs' own have in both models the size that the more evident model estimates, because
+    an effect that one model lacks is no trim that differs from run to run.
     """
     std = common_own_moment(without, with_)
     first, *settled = zip(without.unseen_under(std), with_.unseen_under(std), strict=True)
@@ -88,10 +88,10 @@ def common_own_moment(without: ScoredModel, with_: ScoredModel) -> float:
 
 
 def _explains_most(before: Sequence[Errors], now: Sequence[Errors], floor: Noise, least: float) -> bool:
-    """Whether an addition removes most of the squared error above a noise floor, of training and validation runs together.
+    """Whether an addition removes most of the squared error above a noise floor on training and validation runs together.
 
-    And LEAST_EXPLAINED_SHARE of that of the validation runs: what leaves them as they were is no effect that all runs have. Some
-    run must have `least` times the floor.
+    It must also remove LEAST_EXPLAINED_SHARE of that on the validation runs, since an effect of the vehicle acts in all runs.
+    Some run without it must have an error above `least` times the floor.
     """
     was, left = (np.array([max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in side]) for side in (before, now))
     leaves = max(run.over(floor) for errors in before for run in errors.runs) > least
@@ -100,10 +100,10 @@ def _explains_most(before: Sequence[Errors], now: Sequence[Errors], floor: Noise
 
 
 def _explains_beyond_misfit(before: Sequence[Errors], now: Sequence[Errors], floor: Noise) -> bool:
-    """Whether an addition explains enough beside what the model leaves with it, where that is visible.
+    """Whether an addition explains enough compared with the misfit that the model still has with it, where that is visible.
 
-    What a wrong hull leaves is made up for by whatever moves in time: an effect is believed by what it explains beyond the misfit
-    of the model it is in.
+    Any effect that varies in time can fit a part of the misfit of a wrong hull. So an effect is believed only for what it
+    explains beyond the misfit that remains.
     """
     was, left = (float(np.mean([max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in side])) for side in (before, now))
     visible = any(errors.over(floor) > SUFFICIENT_ERROR_RATIO for errors in now)
@@ -144,9 +144,9 @@ def worst_error(h: ScoredModel, floor: Noise) -> float:
 
 
 def compared_error(base: ScoredModel, h: ScoredModel, floor: Noise) -> float:
-    """Return the error over a noise floor that a model leaves on unseen or fitted runs, as it is compared with the base there.
+    """Return the larger error over a noise floor on unseen and on fitted runs, as a model is compared with the base on them.
 
-    A model may follow the unseen runs from the fitted runs' parameters by chance, and not from those that all runs leave.
+    A model may follow the unseen runs at the fitted runs' parameters by chance, but not at the parameters of all runs.
     """
     return max(compared_errors(base, h, floor)[1].over(floor), fitted_errors(base, h)[1].over(floor))
 
@@ -176,11 +176,11 @@ def _adds_numbers_of_runs(without: ScoredModel, with_: ScoredModel) -> bool:
 
 
 def settles_error(without: ScoredModel, with_: ScoredModel, floor: Noise) -> bool:
-    """Whether an addition that is a rival by log evidence, the prior against it included, ends a visible error on all runs.
+    """Whether an addition that is a rival by log evidence brings the error on all runs down to the noise.
 
-    A slow disturbance takes up in the likelihood, at next to no cost, what a drift or a current does. Which of the two it is such
-    runs do not tell, and a model that follows all of them to the noise is no part of one that does not. Effects with numbers of
-    each run's own follow any run, and are left out.
+    In the likelihood a slow disturbance can stand for a drift or a current at almost no cost, so that the evidence cannot
+    separate the two; the model whose free run follows all runs to the noise is then preferred. Effects with parameters of each
+    run's own can follow any run, and are excluded.
     """
     if with_.log_evidence <= without.log_evidence - RIVAL_LOG_ODDS or _adds_numbers_of_runs(without, with_):
         return False
@@ -193,7 +193,7 @@ def gains_any_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
 
 
 def only_validation_shows(h: ScoredModel, floor: Noise) -> bool:
-    """Whether a model follows the training runs to the noise and not the validation runs, or the latter far worse."""
+    """Whether a model fits the training runs to the noise but not the validation runs, or fits the latter far worse."""
     followed = h.train.over(floor) <= SUFFICIENT_ERROR_RATIO < h.validation_errors.over(floor)
     return validation_error_ratio(h, floor) > MAX_VALIDATION_ERROR_RATIO or (bool(h.validation) and followed)
 

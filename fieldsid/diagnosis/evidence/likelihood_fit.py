@@ -1,8 +1,8 @@
 """Fits of one model (base and some effects) to the training runs: by output error and by maximum likelihood.
 
-Output error gives the free run. Maximum likelihood alternates generalised least squares of the parameters with an estimate of the
-noise model (disturbance moment, coloured sensor noise); its likelihood is what models are compared by. A model that lacks an
-effect needs a larger disturbance, which lowers its likelihood.
+Output error fits the free run. Maximum likelihood alternates generalised least squares for the parameters with an estimate of the
+noise model (disturbance moment, coloured sensor noise). Models are compared by this likelihood: a model that lacks an effect
+needs a larger disturbance, which lowers it.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class FittedProblem:
 class LikelihoodFit:
     """A maximum-likelihood fit: generalised least squares under its own noise model, and the log likelihood there.
 
-    That holds the log prior density of the noise: a disturbance slower than any sea must not stand for what a model lacks.
+    It includes the log prior density of the noise, so that a disturbance slower than any sea cannot stand for a missing effect.
     """
 
     fitted: FittedProblem
@@ -140,7 +140,7 @@ def largest_own_moment(problem: Problem, x: FloatArray) -> float:
 
 
 def prefer_smaller_equivalent(ml_fit: LikelihoodFit, effect: Effect) -> LikelihoodFit:
-    """Return the fit, or that from its equivalent solution where that is likelier, a priori the one of the smaller coefficient.
+    """Return the fit, or the fit from its equivalent solution where that is likelier; a priori the smaller coefficient is.
 
     The equivalent solution has the same response at one speed (see `Effect.equivalent_solution`).
     """
@@ -148,7 +148,7 @@ def prefer_smaller_equivalent(ml_fit: LikelihoodFit, effect: Effect) -> Likeliho
     other = equivalent_solution(problem, ml_fit.fitted.x, effect)
     if other is None:
         return ml_fit
-    # on its way it is left where it cannot reach the other: no penalty is larger
+    # the fit stops early where it cannot overtake the first one even with the largest penalty
     most = ml_fit.log_likelihood - ALTERNATIVE_LOG_ODDS * len(ml_fit.fitted.effects)
     twin = fit_maximum_likelihood(problem, other, ml_fit.noise, ml_fit.floor, ml_fit.noise_kind, rival=most)
     own, others = (j.log_likelihood - exchange_penalty(j) for j in (ml_fit, twin))

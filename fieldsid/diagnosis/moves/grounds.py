@@ -1,4 +1,4 @@
-"""What all models of a search have in common: the runs they are scored on, the noise they are fitted under, the other process."""
+"""What all models of a search share: the runs they are scored on, the noise they are fitted under, and the worker process."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SAME_OPTIMUM = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Grounds:
-    """The grounds on which models are compared: log evidences of two models differ by what their effects differ by alone.
+    """The common conditions under which models are compared, so that log evidences differ only because the effects differ.
 
     `floor` is the sensors' noise, `resolution_floor` what the white part of a fit's noise stays near, `noise_kind` the kind of
     noise of every fit.
@@ -50,8 +50,7 @@ class Grounds:
     def better(self, known: ScoredModel | None, ml_fit: LikelihoodFit) -> ScoredModel:
         """Return the model of a fit, or the one known of the same effects where that has more evidence.
 
-        The likelier one may validate worse: where two optima are about as likely after the training runs, as an event's at two
-        times, the validation runs decide.
+        Where two optima are about equally likely on the training runs, such as an event at two times, the validation runs decide.
         """
         if known is None:
             return score_model(ml_fit, self.validation)
@@ -66,7 +65,7 @@ class Grounds:
         return h.selection_errors.over(self.floor)
 
     def explained_share(self, before: ScoredModel, h: ScoredModel) -> float:
-        """Return the share of what a model leaves above the noise, on fitted and on unseen runs, that another explains."""
+        """Return the share of one model's squared error above the noise, on fitted and unseen runs, that another explains."""
         was, left = ((one.selection_errors, one.train) for one in (before, h))
         return excess_share(was, left, self.floor)
 

@@ -38,15 +38,15 @@ class AcceptedSets:
 
 
 def core_of(h: ScoredModel, tried: Archive, floor: Noise) -> Names:
-    """Return the accepted effects of a model: the rest is left out, one at a time, where the model without it is as good.
+    """Return the accepted effects of a model: effects without which the model is as good are removed, one at a time.
 
-    An effect that gains evidence beside all else stays where it lowers the error, though it may gain none once a small one is
-    left out: what that leaves in fast samples, a disturbance takes up with the rest. So does one that ends a visible error
-    and is a rival by evidence.
+    An effect that gains evidence beside all the others is kept where it lowers the error, even if it gains none after a small
+    effect has been removed, because the disturbance may then fit both. An effect that is a rival by evidence is kept where it
+    ends a visible error.
     """
     base = tried[tried.known]
     over = sensor_noise(floor, base)
-    # an error to explain is a visible one, and any where the base leaves a visible one
+    # where the base has a visible error every error above the noise is to be explained, elsewhere a visible one only
     least = EXPLAINED_ERROR_RATIO if worst_error(base, over) > SUFFICIENT_ERROR_RATIO else SUFFICIENT_ERROR_RATIO
     proven = {name for name, w in tried.without_each(h) if is_accepted(w, h, over, least)}
 
