@@ -14,7 +14,7 @@ import typer
 
 from fieldsid.cli.console import emit, progress, say
 from fieldsid.cli.exit_codes import GATE_FAILED
-from fieldsid.cli.options import AxisOption, FigureFile, Force, JsonFlag, MappingFile, VehicleFile
+from fieldsid.cli.options import AxisOption, FigureFile, Force, JsonFlag, MappingFile, Method, VehicleFile, argument, flag, option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,21 +24,15 @@ if TYPE_CHECKING:
     from fieldsid.models.axis import Axis
     from fieldsid.results.trial import NotUsed
 
-Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Logs, and folders of logs; runs that were imported, too.")]
-Folder = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder of the table and of each log's answer.")]
-Method = Annotated[str, typer.Option("--method", metavar="NAME", help="auto, output_error, pem, svf_ls, svf_rls or srivc.")]
-Diagnose = Annotated[bool, typer.Option("--diagnose/--no-diagnose", help="Ask of each run which effect is missing.")]
-Whole = Annotated[bool, typer.Option("--whole", help="Take logs as one run each, and use all of it.")]
-Workers = Annotated[
-    int | None, typer.Option("--workers", metavar="N", min=1, help="Processes on this machine; one a core.", show_default=False)
-]
-Scheduler = Annotated[
-    str | None,
-    typer.Option("--scheduler", metavar="tcp://...", help="Work on this Dask cluster (extra `cluster`).", show_default=False),
-]
-Timeout = Annotated[float, typer.Option("--timeout", metavar="S", min=0.1, help="Longest time for one log.")]
-Memory = Annotated[float, typer.Option("--memory", metavar="MB", min=100.0, help="Most memory of one process.")]
-WithTrend = Annotated[bool, typer.Option("--trend", help="Say and draw where parameters changed over the runs' dates.")]
+Logs = Annotated[list[Path], argument("LOG...", "Logs, and folders of logs; runs that were imported, too.")]
+Folder = Annotated[Path, option("-o --output", "DIR", "Folder of the table and of each log's answer.")]
+Diagnose = Annotated[bool, flag("--diagnose/--no-diagnose", "Ask of each run which effect is missing.")]
+Whole = Annotated[bool, flag("--whole", "Take logs as one run each, and use all of it.")]
+Workers = Annotated[int | None, option("--workers", "N", "Processes on this machine; one a core.", min=1)]
+Scheduler = Annotated[str | None, option("--scheduler", "tcp://...", "Work on this Dask cluster (extra `cluster`).")]
+Timeout = Annotated[float, option("--timeout", "S", "Longest time for one log.", min=0.1)]
+Memory = Annotated[float, option("--memory", "MB", "Most memory of one process.", min=100.0)]
+WithTrend = Annotated[bool, flag("--trend", "Say and draw where parameters changed over the runs' dates.")]
 
 MOST_REASONS = 8
 

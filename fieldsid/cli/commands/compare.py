@@ -11,7 +11,7 @@ import typer
 
 from fieldsid.cli.commands._other_data import fitted_to
 from fieldsid.cli.console import complain, emit, table
-from fieldsid.cli.options import FigurePlace, Figures, Force, FromS, JsonFlag, MappingFile, ToS
+from fieldsid.cli.options import FigurePlace, Figures, Force, FromS, JsonFlag, MappingFile, ToS, argument, option
 from fieldsid.cli.progress import get_ready, refuse_place
 from fieldsid.cli.session import drawing
 from fieldsid.cli.voice import shown_in, shown_words
@@ -26,21 +26,13 @@ if TYPE_CHECKING:
 
 MOST_SHOWN = 6
 
-First = Annotated[
-    Path, typer.Argument(metavar="MODEL", help="A model file, the folder of the models before a swap, or gains that were flown.")
-]
+First = Annotated[Path, argument("MODEL", "A model file, the folder of the models before a swap, or gains that were flown.")]
 Others = Annotated[
-    list[Path],
-    typer.Argument(metavar="RUN...", help="Runs or log files, more models before them; or the model or folder after a swap."),
+    list[Path], argument("RUN...", "Runs or log files, more models before them; or the model or folder after a swap.")
 ]
 
-MinFit = Annotated[
-    float | None,
-    typer.Option(
-        "--min-fit", metavar="PERCENT", help="Gate: exit 1 when a run's angle or rate fit is below this.", show_default=False
-    ),
-]
-Top = Annotated[int, typer.Option("--top", min=1, help="Conditions to show for each run.")]
+MinFit = Annotated[float | None, option("--min-fit", "PERCENT", "Gate: exit 1 when a run's angle or rate fit is below this.")]
+Top = Annotated[int, option("--top", "", "Conditions to show for each run.", min=1)]
 
 
 def command(

@@ -16,7 +16,7 @@ import typer
 from fieldsid.cli.app import run
 from fieldsid.cli.console import WIDTH, emit
 from fieldsid.cli.headlines.trial import of_demo
-from fieldsid.cli.options import Force, JsonFlag, OutputDir
+from fieldsid.cli.options import Force, JsonFlag, OutputDir, flag, option
 from fieldsid.cli.progress import compiling
 from fieldsid.cli.session import Session
 from fieldsid.cli.voice import voice
@@ -47,8 +47,8 @@ SHORT_OPENING = (
 BRIEF, VERBOSE, SILENT = "brief", "verbose", "silent"
 """How much of the tour is told while it goes on."""
 
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print each command with all that it says, and what it means.")]
-EffectName = Annotated[str, typer.Option("--effect", metavar="NAME", help="The effect to hide: see `sysid effects list`.")]
+Verbose = Annotated[bool, flag("--verbose -v", "Print each command with all that it says, and what it means.")]
+EffectName = Annotated[str, option("--effect", "NAME", "The effect to hide: see `sysid effects list`.")]
 
 
 def command(

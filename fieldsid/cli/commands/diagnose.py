@@ -11,7 +11,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fieldsid.cli.console import emit, print_page, table
-from fieldsid.cli.options import ExcitedAxis, FigureFile, Force, JsonFlag, MappingFile, OutputFile, RunFiles, ValidateRuns
+from fieldsid.cli.options import (
+    ExcitedAxis,
+    FigureFile,
+    Force,
+    JsonFlag,
+    MappingFile,
+    OutputFile,
+    RunFiles,
+    ValidateRuns,
+    flag,
+    option,
+)
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, refuse_figure, trying
 from fieldsid.cli.session import tasks_of
 from fieldsid.cli.voice import angles
@@ -27,16 +38,11 @@ if TYPE_CHECKING:
     from fieldsid.models.model import Model
     from fieldsid.results.diagnoses import Applied, Diagnosed
 
-KnownModel = Annotated[
-    Path | None, typer.Option("--model", metavar="MODEL", help="A model whose effects are known already.", show_default=False)
-]
+KnownModel = Annotated[Path | None, option("--model", "MODEL", "A model whose effects are known already.")]
 Thorough = Annotated[
-    bool, typer.Option("--thorough", help="Go on for as long as there is something to try, half a minute where much is left.")
+    bool, flag("--thorough", "Go on for as long as there is something to try, half a minute where much is left.")
 ]
-Apply = Annotated[
-    bool,
-    typer.Option("--apply", help="Add what is named, an effect at a time, each a model in `models/` with its errors."),
-]
+Apply = Annotated[bool, flag("--apply", "Add what is named, an effect at a time, each a model in `models/` with its errors.")]
 
 
 def command(

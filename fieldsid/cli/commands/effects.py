@@ -12,7 +12,7 @@ import typer
 from fieldsid.cli.console import emit, table
 from fieldsid.cli.headlines.missing import of_catalogue, of_effect, of_new_effect
 from fieldsid.cli.headlines.typed import pasted
-from fieldsid.cli.options import Force, JsonFlag
+from fieldsid.cli.options import Force, JsonFlag, argument, option
 from fieldsid.cli.progress import refuse_existing
 from fieldsid.cli.user_effects import OWN_EFFECTS, load_own_effects
 from fieldsid.errors import UsageError
@@ -26,18 +26,11 @@ if TYPE_CHECKING:
 
 command = typer.Typer(help="List the physical effects, show one, start one of your own.\n\nExample: sysid effects show servo_lag")
 
-EffectName = Annotated[str, typer.Argument(metavar="NAME", help="Name of an effect, as in `sysid effects list`.")]
-OneAxis = Annotated[Axis | None, typer.Option("--axis", help="Only the effects of this plane.", show_default=False)]
-NewName = Annotated[
-    str, typer.Argument(metavar="NAME", help="Name that yours shall have: a small letter, then letters, digits, _.")
-]
-NewAxis = Annotated[Axis, typer.Option("--axis", help="The plane that it acts on.")]
-NewFile = Annotated[
-    Path | None,
-    typer.Option(
-        "-o", "--output", metavar="FILE", help="YAML file to write; effects/NAME.yaml if not given.", show_default=False
-    ),
-]
+EffectName = Annotated[str, argument("NAME", "Name of an effect, as in `sysid effects list`.")]
+OneAxis = Annotated[Axis | None, option("--axis", "", "Only the effects of this plane.")]
+NewName = Annotated[str, argument("NAME", "Name that yours shall have: a small letter, then letters, digits, _.")]
+NewAxis = Annotated[Axis, option("--axis", "", "The plane that it acts on.")]
+NewFile = Annotated[Path | None, option("-o --output", "FILE", "YAML file to write; effects/NAME.yaml if not given.")]
 
 
 @command.command("list", short_help="List every effect by stage.")

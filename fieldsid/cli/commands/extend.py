@@ -15,7 +15,7 @@ from fieldsid.cli.console import emit, print_page, table
 from fieldsid.cli.headlines.missing import left_says, of_extension, of_undoing
 from fieldsid.cli.headlines.typed import pasted, repeated
 from fieldsid.cli.headlines.words import used
-from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, ValidateRuns
+from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, ValidateRuns, argument, flag, option
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, trying
 from fieldsid.cli.skipped_logs import Skips
 from fieldsid.cli.voice import angles, shown_in
@@ -34,15 +34,10 @@ if TYPE_CHECKING:
 MUCH, SMALL = 100.0, 1e-3
 """A standard error so many times the value, or the smallest value that counts, is no knowledge."""
 
-LearnedRuns = Annotated[
-    list[Path] | None, typer.Argument(metavar="RUN...", help="The runs that the model and the effects are fitted to.")
-]
-Added = Annotated[
-    list[str] | None,
-    typer.Option("--add", metavar="EFFECT", help="An effect to add: see `sysid effects list`; may repeat.", show_default=False),
-]
-Keep = Annotated[bool, typer.Option("--keep", help="Keep the addition even where the error on unseen runs does not fall.")]
-Undo = Annotated[bool, typer.Option("--undo", help="Go back: give the model that this one was extended from.")]
+LearnedRuns = Annotated[list[Path] | None, argument("RUN...", "The runs that the model and the effects are fitted to.")]
+Added = Annotated[list[str] | None, option("--add", "EFFECT", "An effect to add: see `sysid effects list`; may repeat.")]
+Keep = Annotated[bool, flag("--keep", "Keep the addition even where the error on unseen runs does not fall.")]
+Undo = Annotated[bool, flag("--undo", "Go back: give the model that this one was extended from.")]
 
 
 def command(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fieldsid.cli.console import emit, table
-from fieldsid.cli.options import Figures, Force, JsonFlag, ModelFiles, OutputFile
+from fieldsid.cli.options import Figures, Force, JsonFlag, ModelFiles, OutputFile, flag
 from fieldsid.cli.progress import refuse_existing
 from fieldsid.cli.session import tasks_of
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from fieldsid.plant.laws.axis_laws import Laws
     from fieldsid.plant.laws.parameter_law import ParameterLaw, PointCheck
 
-Unweighted = Annotated[bool, typer.Option("--unweighted", help="Let every point count alike, standard errors or not.")]
+Unweighted = Annotated[bool, flag("--unweighted", "Let every point count alike, standard errors or not.")]
 WORDS = {"through_zero": "through zero", "power": "power law"}
 
 

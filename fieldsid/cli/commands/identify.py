@@ -12,6 +12,7 @@ import typer
 
 from fieldsid.cli.console import alike, emit, progress, table
 from fieldsid.cli.options import (
+    Bandwidth,
     EffectNames,
     ExcitedAxis,
     Figures,
@@ -19,11 +20,14 @@ from fieldsid.cli.options import (
     FromS,
     JsonFlag,
     MappingFile,
+    Method,
     OutputDir,
     RunFiles,
     ToS,
     VehicleFile,
+    flag,
     names_of,
+    option,
 )
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_closed
 from fieldsid.cli.session import drawing
@@ -38,11 +42,9 @@ if TYPE_CHECKING:
     from fieldsid.results.fits import FittedModel
     from fieldsid.runtime.background_tasks import BackgroundTasks
 
-Method = Annotated[str, typer.Option("--method", metavar="NAME", help="auto, output_error, pem, svf_ls, svf_rls or srivc.")]
-Joint = Annotated[bool, typer.Option("--joint", help="One model for all runs: damping and trim shared, authority by speed.")]
-Whole = Annotated[bool, typer.Option("--whole", help="Use whole runs, not only the part that excites the axis.")]
-Bandwidth = Annotated[float, typer.Option("--lambda", metavar="RAD_S", min=0.01, help="Bandwidth of the state-variable filter.")]
-Forgetting = Annotated[float, typer.Option("--forgetting", min=0.5, max=1.0, help="Forgetting factor of svf_rls.")]
+Joint = Annotated[bool, flag("--joint", "One model for all runs: damping and trim shared, authority by speed.")]
+Whole = Annotated[bool, flag("--whole", "Use whole runs, not only the part that excites the axis.")]
+Forgetting = Annotated[float, option("--forgetting", "", "Forgetting factor of svf_rls.", min=0.5, max=1.0)]
 
 MOST_DRAWN = 6
 """Runs of one model that are drawn: two figures each, and nobody looks through sixty."""

@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from fieldsid.cli.options import Force, FromS, Join, JsonFlag, MappingFile, ToS, VehicleFile
+from fieldsid.cli.options import Force, FromS, Join, JsonFlag, MappingFile, MsgPath, ToS, VehicleFile, argument, flag, option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,37 +15,25 @@ if TYPE_CHECKING:
 
 
 def command(
-    logs: Annotated[
-        list[Path], typer.Argument(metavar="LOG...", help="Logs: tables, bags, MATLAB, MOOS, PX4, ArduPilot, gliders.")
-    ],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="DIR|FILE", help="Folder for the runs, or the file of a single one.")
-    ],
+    logs: Annotated[list[Path], argument("LOG...", "Logs: tables, bags, MATLAB, MOOS, PX4, ArduPilot, gliders.")],
+    output: Annotated[Path, option("-o --output", "DIR|FILE", "Folder for the runs, or the file of a single one.")],
     join: Join = False,
     mapping: MappingFile = None,
     channel: Annotated[
-        list[str] | None,
-        typer.Option("--channel", metavar="SIGNAL=COLUMN:UNIT", help="Map one signal; counts more than the mapping; may repeat."),
+        list[str] | None, option("--channel", "SIGNAL=COLUMN:UNIT", "Map one signal; counts more than the mapping; may repeat.")
     ] = None,
-    msg_path: Annotated[
-        Path | None, typer.Option("--msg-path", metavar="DIR", help="Folder of .msg files for types the bag does not define.")
-    ] = None,
+    msg_path: MsgPath = None,
     vehicle: VehicleFile = None,
     from_s: FromS = None,
     to_s: ToS = None,
-    max_gap: Annotated[
-        float,
-        typer.Option("--max-gap", metavar="S", help="Longest gap of a main signal, or 5 of its own steps.", min=0.0),
-    ] = 2.0,
+    max_gap: Annotated[float, option("--max-gap", "S", "Longest gap of a main signal, or 5 of its own steps.", min=0.0)] = 2.0,
     salvage: Annotated[
-        bool, typer.Option("--salvage", help="Take what is left of a damaged log: cut gzip, bad cells, time out of order.")
+        bool, flag("--salvage", "Take what is left of a damaged log: cut gzip, bad cells, time out of order.")
     ] = False,
     whole: Annotated[
-        bool, typer.Option("--whole", help="Keep what is not under way: on deck, at the surface, idle; one run for each log.")
+        bool, flag("--whole", "Keep what is not under way: on deck, at the surface, idle; one run for each log.")
     ] = False,
-    format_: Annotated[
-        str, typer.Option("--format", metavar="parquet|csv|csv.gz", help="Kind of file in the folder.")
-    ] = "parquet",
+    format_: Annotated[str, option("--format", "parquet|csv|csv.gz", "Kind of file in the folder.")] = "parquet",
     force: Force = False,
     as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:

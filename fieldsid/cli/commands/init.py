@@ -6,17 +6,15 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from fieldsid.cli.options import JsonFlag
+from fieldsid.cli.options import JsonFlag, argument, option
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 
 def command(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the trial, and of the folder to make.")],
-    template: Annotated[str, typer.Option("--template", metavar="KIND", help="Kind of vehicle: torpedo or surface.")] = "torpedo",
+    name: Annotated[str, argument("NAME", "Name of the trial, and of the folder to make.")],
+    template: Annotated[str, option("--template", "KIND", "Kind of vehicle: torpedo or surface.")] = "torpedo",
     as_json: JsonFlag = False,
 ) -> None:
     """Make a trial folder with a vehicle.yaml, a mapping.yaml and notes to fill in; nothing is ever replaced.

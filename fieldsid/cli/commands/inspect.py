@@ -5,9 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from fieldsid.cli.options import Force, Join, JsonFlag, LogAndTables, MappingFile
+from fieldsid.cli.options import Force, Join, JsonFlag, LogAndTables, MappingFile, MsgPath, option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -20,11 +18,9 @@ def command(
     logs: LogAndTables,
     join: Join = False,
     mapping: MappingFile = None,
-    msg_path: Annotated[
-        Path | None, typer.Option("--msg-path", metavar="DIR", help="Folder of .msg files for types the bag does not define.")
-    ] = None,
+    msg_path: MsgPath = None,
     write_mapping: Annotated[
-        Path | None, typer.Option("--write-mapping", metavar="FILE", help="Write the mapping, for `sysid import --mapping`.")
+        Path | None, option("--write-mapping", "FILE", "Write the mapping, for `sysid import --mapping`.")
     ] = None,
     force: Force = False,
     as_json: JsonFlag = False,

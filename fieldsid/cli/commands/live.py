@@ -14,7 +14,7 @@ import typer
 from fieldsid.cli.console import emit, out, say
 from fieldsid.cli.exit_codes import GATE_FAILED
 from fieldsid.cli.live.feed import Feed
-from fieldsid.cli.options import AxisOption, JsonFlag, MappingFile, VehicleFile
+from fieldsid.cli.options import AxisOption, Bandwidth, JsonFlag, MappingFile, VehicleFile, argument, flag, option
 from fieldsid.cli.voice import voice
 from fieldsid.errors import UsageError
 
@@ -28,89 +28,24 @@ if TYPE_CHECKING:
 SOURCE, GOAL, BESIDE = "Where the samples come from", "What is to be reached", "What a second process works out"
 """The groups of its own options on the page of help."""
 
-Log = Annotated[
-    Path | None,
-    typer.Argument(
-        metavar="LOG", help="A log to replay or follow; `-` reads JSON lines from standard input.", show_default=False
-    ),
-]
+Log = Annotated[Path | None, argument("LOG", "A log to replay or follow; `-` reads JSON lines from standard input.")]
 Factor = Annotated[
-    float,
-    typer.Option(
-        "--speed",
-        metavar="FACTOR",
-        min=0.0,
-        help="How many times as fast as logged to replay; 0 does not wait.",
-        rich_help_panel=SOURCE,
-    ),
+    float, option("--speed", "FACTOR", "How many times as fast as logged to replay; 0 does not wait.", SOURCE, min=0.0)
 ]
-Follow = Annotated[
-    bool, typer.Option("--follow", "-f", help="Go on as the log grows: CSV, MCAP, a bag's folder.", rich_help_panel=SOURCE)
-]
-Port = Annotated[
-    int | None,
-    typer.Option(
-        "--udp",
-        metavar="PORT",
-        min=1,
-        max=65535,
-        help="Take JSON lines as UDP on this machine.",
-        show_default=False,
-        rich_help_panel=SOURCE,
-    ),
-]
-Idle = Annotated[
-    float | None,
-    typer.Option(
-        "--idle", metavar="S", min=0.1, help="End when nothing has come for so long.", show_default=False, rich_help_panel=SOURCE
-    ),
-]
-PlanFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--plan",
-        metavar="YAML",
-        help="The accuracy to reach is what this plan promised.",
-        show_default=False,
-        rich_help_panel=GOAL,
-    ),
-]
-Want = Annotated[
-    str | None,
-    typer.Option(
-        "--want",
-        metavar="A=5%,...",
-        help="The accuracy to reach; 5 % of each but the trim.",
-        show_default=False,
-        rich_help_panel=GOAL,
-    ),
-]
-StateFile = Annotated[
-    Path | None,
-    typer.Option("--state", metavar="FILE", help="Go on from this file, if there; saved every second.", show_default=False),
-]
-Every = Annotated[float, typer.Option("--every", metavar="S", min=0.1, help="Seconds of the log between two looks.")]
-Bandwidth = Annotated[float, typer.Option("--lambda", metavar="RAD_S", min=0.01, help="Bandwidth of the state-variable filter.")]
-Forgetting = Annotated[float, typer.Option("--forgetting", min=0.5, max=1.0, help="Forgetting factor; 1 forgets nothing.")]
-UntilEnough = Annotated[
-    bool, typer.Option("--until-enough", help="End at enough data; exit code 1 where that is not reached.", rich_help_panel=GOAL)
-]
+Follow = Annotated[bool, flag("--follow -f", "Go on as the log grows: CSV, MCAP, a bag's folder.", SOURCE)]
+Port = Annotated[int | None, option("--udp", "PORT", "Take JSON lines as UDP on this machine.", SOURCE, min=1, max=65535)]
+Idle = Annotated[float | None, option("--idle", "S", "End when nothing has come for so long.", SOURCE, min=0.1)]
+PlanFile = Annotated[Path | None, option("--plan", "YAML", "The accuracy to reach is what this plan promised.", GOAL)]
+Want = Annotated[str | None, option("--want", "A=5%,...", "The accuracy to reach; 5 % of each but the trim.", GOAL)]
+StateFile = Annotated[Path | None, option("--state", "FILE", "Go on from this file, if there; saved every second.")]
+Every = Annotated[float, option("--every", "S", "Seconds of the log between two looks.", min=0.1)]
+Forgetting = Annotated[float, option("--forgetting", "", "Forgetting factor; 1 forgets nothing.", min=0.5, max=1.0)]
+UntilEnough = Annotated[bool, flag("--until-enough", "End at enough data; exit code 1 where that is not reached.", GOAL)]
 
-GainsFlag = Annotated[
-    bool, typer.Option("--gains", help="Design gains for the speed that is flown, once settled.", rich_help_panel=BESIDE)
-]
-Loaded = Annotated[
-    Path | None,
-    typer.Option(
-        "--schedule", metavar="YAML", help="The gains loaded, and what they were designed for.", show_default=False,
-        rich_help_panel=BESIDE,
-    ),
-]  # fmt: skip
-DepthFlag = Annotated[bool, typer.Option("--depth", help="With the depth loop above pitch.", rich_help_panel=BESIDE)]
-Diagnose = Annotated[
-    bool,
-    typer.Option("--diagnose", help="Diagnose what was flown whenever a maneuver ends.", rich_help_panel=BESIDE),
-]
+GainsFlag = Annotated[bool, flag("--gains", "Design gains for the speed that is flown, once settled.", BESIDE)]
+Loaded = Annotated[Path | None, option("--schedule", "YAML", "The gains loaded, and what they were designed for.", BESIDE)]
+DepthFlag = Annotated[bool, flag("--depth", "With the depth loop above pitch.", BESIDE)]
+Diagnose = Annotated[bool, flag("--diagnose", "Diagnose what was flown whenever a maneuver ends.", BESIDE)]
 
 SAVE_EVERY_S = 1.0
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fieldsid.cli.console import emit, progress, say
-from fieldsid.cli.options import LIMITS, WRITTEN, Figures, Force, JsonFlag, OutputDir, VehicleFile, names_of
+from fieldsid.cli.options import LIMITS, WRITTEN, Figures, Force, JsonFlag, OutputDir, VehicleFile, flag, names_of, option
 from fieldsid.cli.progress import compiling, refuse_closed, refuse_existing
 from fieldsid.cli.session import tasks_of
 from fieldsid.cli.voice import shown_in
@@ -30,55 +30,41 @@ Text = str | None
 GOAL, FLOWN, KNOWN = "What to learn", "How it is flown", "What is known before"
 """The groups of its own options on the page of help."""
 
-
-def _option(name: str, metavar: str, says: str, group: str) -> Any:
-    return typer.Option(name, metavar=metavar, help=says, show_default=False, rich_help_panel=group)
-
-
-Speeds = Annotated[Text, _option("--speeds", "M_S,..", "`1.0,1.4,1.8` or `1.0:1.8:0.4`; the prior's own if not given.", GOAL)]
-Believed = Annotated[Path | None, _option("--model", "YAML", "What is known before: a model or a prior file.", KNOWN)]
-PlannedAxis = Annotated[Axis | None, _option("--axis", "AXIS", "The plane to plan for; yaw, or that of a diagnosis.", GOAL)]
-PriorName = Annotated[Text, _option("--prior", "NAME", "A prior that is shipped, torpedo where no model is given.", KNOWN)]
+Speeds = Annotated[Text, option("--speeds", "M_S,..", "`1.0,1.4,1.8` or `1.0:1.8:0.4`; the prior's own if not given.", GOAL)]
+Believed = Annotated[Path | None, option("--model", "YAML", "What is known before: a model or a prior file.", KNOWN)]
+PlannedAxis = Annotated[Axis | None, option("--axis", "AXIS", "The plane to plan for; yaw, or that of a diagnosis.", GOAL)]
+PriorName = Annotated[Text, option("--prior", "NAME", "A prior that is shipped, torpedo where no model is given.", KNOWN)]
 Want = Annotated[
     Text,
-    _option(
+    option(
         "--want",
         "a22=5%,..",
         "Standard errors to reach at every speed, in shares of the value; of the trim, in shares of full fin.",
         GOAL,
     ),
 ]
-Minutes = Annotated[float | None, _option("--minutes", "MIN", "Time there is for all legs, turns included.", LIMITS)]
-Area = Annotated[Text, _option("--area", "LxW", "Length along the leg and width across it, m.", LIMITS)]
-DepthBand = Annotated[Text, _option("--depth-band", "M:M", "Shallowest and deepest, m; entered at the middle.", LIMITS)]
-MaxHeading = Annotated[Text, _option("--max-heading", "ANGLE", "Largest deviation of heading; 60deg in yaw, or `none`.", LIMITS)]
-MaxTrack = Annotated[float | None, _option("--max-track", "M", "Largest distance from the leg's line.", LIMITS)]
-MaxPitch = Annotated[Text, _option("--max-pitch", "ANGLE", "Largest pitch; 30deg in pitch, or `none`.", LIMITS)]
-MaxRoll = Annotated[Text, _option("--max-roll", "ANGLE", "Largest roll, `20deg`.", LIMITS)]
-FinMax = Annotated[Text, _option("--fin-max", "ANGLE", "Fin limit; the vehicle's own if not given, else 0.26 rad.", LIMITS)]
-FinRate = Annotated[Text, _option("--fin-rate", "ANGLE", "Fin rate limit per second; the vehicle's own if not given.", LIMITS)]
-Share = Annotated[
-    float, typer.Option("--risk", metavar="SHARE", help="Accepted probability of leaving the envelope.", rich_help_panel=LIMITS)
-]
-WindowS = Annotated[
-    float | None, _option("--window", "S", "Length of the part that is identified on; 33, to separate 60.", FLOWN)
-]
-RunUpS = Annotated[float, typer.Option("--run-up", metavar="S", help="Straight run before it.", rich_help_panel=FLOWN)]
-RateHz = Annotated[float, typer.Option("--rate", metavar="HZ", help="The vehicle's command rate.", rich_help_panel=FLOWN)]
-Radius = Annotated[
-    bool, typer.Option("--radius", help="Add full-fin circles, so that the turn radius is measured.", rich_help_panel=GOAL)
-]
-OpenLoop = Annotated[
-    bool,
-    typer.Option("--open-loop", help="Leave out maneuvers that follow the motion, such as the zig-zag.", rich_help_panel=FLOWN),
-]
-Separate = Annotated[Text, _option("--separate", "A,B", "What tells these effects apart; `none` is the plain model.", GOAL)]
-FromDiagnosis = Annotated[Path | None, _option("--from", "YAML", "A diagnosis: tell its rivals apart.", GOAL)]
+Minutes = Annotated[float | None, option("--minutes", "MIN", "Time there is for all legs, turns included.", LIMITS)]
+Area = Annotated[Text, option("--area", "LxW", "Length along the leg and width across it, m.", LIMITS)]
+DepthBand = Annotated[Text, option("--depth-band", "M:M", "Shallowest and deepest, m; entered at the middle.", LIMITS)]
+MaxHeading = Annotated[Text, option("--max-heading", "ANGLE", "Largest deviation of heading; 60deg in yaw, or `none`.", LIMITS)]
+MaxTrack = Annotated[float | None, option("--max-track", "M", "Largest distance from the leg's line.", LIMITS)]
+MaxPitch = Annotated[Text, option("--max-pitch", "ANGLE", "Largest pitch; 30deg in pitch, or `none`.", LIMITS)]
+MaxRoll = Annotated[Text, option("--max-roll", "ANGLE", "Largest roll, `20deg`.", LIMITS)]
+FinMax = Annotated[Text, option("--fin-max", "ANGLE", "Fin limit; the vehicle's own if not given, else 0.26 rad.", LIMITS)]
+FinRate = Annotated[Text, option("--fin-rate", "ANGLE", "Fin rate limit per second; the vehicle's own if not given.", LIMITS)]
+Share = Annotated[float, option("--risk", "SHARE", "Accepted probability of leaving the envelope.", LIMITS)]
+WindowS = Annotated[float | None, option("--window", "S", "Length of the part that is identified on; 33, to separate 60.", FLOWN)]
+RunUpS = Annotated[float, option("--run-up", "S", "Straight run before it.", FLOWN)]
+RateHz = Annotated[float, option("--rate", "HZ", "The vehicle's command rate.", FLOWN)]
+Radius = Annotated[bool, flag("--radius", "Add full-fin circles, so that the turn radius is measured.", GOAL)]
+OpenLoop = Annotated[bool, flag("--open-loop", "Leave out maneuvers that follow the motion, such as the zig-zag.", FLOWN)]
+Separate = Annotated[Text, option("--separate", "A,B", "What tells these effects apart; `none` is the plain model.", GOAL)]
+FromDiagnosis = Annotated[Path | None, option("--from", "YAML", "A diagnosis: tell its rivals apart.", GOAL)]
 Course = Annotated[
-    Text, _option("--course", "ANGLE", "Compass course of the legs, `90deg`: a MOOS helm then watches headings.", FLOWN)
+    Text, option("--course", "ANGLE", "Compass course of the legs, `90deg`: a MOOS helm then watches headings.", FLOWN)
 ]
-Write = Annotated[Text, _option("--write", "csv,..", "Some of csv, ros2, moos, dune, ardupilot; else all.", WRITTEN)]
-Seed = Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the search and of the draws.", rich_help_panel=FLOWN)]
+Write = Annotated[Text, option("--write", "csv,..", "Some of csv, ros2, moos, dune, ardupilot; else all.", WRITTEN)]
+Seed = Annotated[int, option("--seed", "N", "Seed of the search and of the draws.", FLOWN)]
 
 
 def command(

@@ -7,10 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from fieldsid.cli.console import emit
-from fieldsid.cli.options import Force, JsonFlag
+from fieldsid.cli.options import Force, JsonFlag, argument, option
 from fieldsid.cli.progress import get_ready
 from fieldsid.logs.run import Note
 
@@ -20,12 +18,10 @@ if TYPE_CHECKING:
     from fieldsid.trial_folder.state import FolderState
 
 Files = Annotated[
-    list[Path] | None,
-    typer.Argument(metavar="[FOLDER|FILE...]", help="A trial folder, or files of one; the folder it is run in if not given."),
+    list[Path] | None, argument("[FOLDER|FILE...]", "A trial folder, or files of one; the folder it is run in if not given.")
 ]
 Page = Annotated[
-    Path | None,
-    typer.Option("-o", "--output", metavar="FILE", help="report.html in the folder if not given; .pdf is printed by a browser."),
+    Path | None, option("-o --output", "FILE", "report.html in the folder if not given; .pdf is printed by a browser.")
 ]
 
 

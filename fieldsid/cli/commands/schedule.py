@@ -12,7 +12,7 @@ import typer
 from fieldsid.cli.commands._schedule_tables import render_design, render_export, render_verify
 from fieldsid.cli.console import emit, print_file, say
 from fieldsid.cli.headlines.gains import caveat, of_design, of_export, of_patch, of_verification
-from fieldsid.cli.options import LIMITS, Force, JsonFlag, ModelFiles, OutputFile, VehicleFile
+from fieldsid.cli.options import LIMITS, Force, JsonFlag, ModelFiles, OutputFile, OwnLaw, VehicleFile, argument, flag, option
 from fieldsid.cli.progress import refuse_existing, refuse_figure
 from fieldsid.cli.session import tasks_of
 
@@ -27,111 +27,54 @@ command = typer.Typer(
 )
 
 ANSWERED = "The answer asked"
-ScheduleFile = Annotated[Path, typer.Argument(metavar="SCHEDULE", help="A schedule written by `sysid schedule design`.")]
+ScheduleFile = Annotated[Path, argument("SCHEDULE", "A schedule written by `sysid schedule design`.")]
 Controller = Annotated[
-    str | None,
-    typer.Option("--controller", metavar="KIND", help="p, pd, pi, pid or lqr; pd where the runs have a rate, else p."),
+    str | None, option("--controller", "KIND", "p, pd, pi, pid or lqr; pd where the runs have a rate, else p.")
 ]
 Settling = Annotated[
     str | None,
-    typer.Option(
-        "--settling", metavar="TIME", help="Settle within this, `4s`, or `quickest`; if not given as the slowest speed can.",
-        rich_help_panel=ANSWERED,
-    ),
-]  # fmt: skip
-Bandwidth = Annotated[
-    str | None,
-    typer.Option("--bandwidth", metavar="RATE", help="Bandwidth in place of a time, `1rad/s`.", rich_help_panel=ANSWERED),
+    option("--settling", "TIME", "Settle within this, `4s`, or `quickest`; if not given as the slowest speed can.", ANSWERED),
 ]
-Overshoot = Annotated[
-    str | None, typer.Option("--overshoot", metavar="SHARE", help="The most overshoot, `10%`.", rich_help_panel=ANSWERED)
-]
+Bandwidth = Annotated[str | None, option("--bandwidth", "RATE", "Bandwidth in place of a time, `1rad/s`.", ANSWERED)]
+Overshoot = Annotated[str | None, option("--overshoot", "SHARE", "The most overshoot, `10%`.", ANSWERED)]
 Step = Annotated[
     str | None,
-    typer.Option(
-        "--step", metavar="ANGLE", help="The error that may ask for the whole fin: 20 deg of yaw, 10 of pitch if not given.",
-        rich_help_panel=ANSWERED,
-    ),
-]  # fmt: skip
-FinUse = Annotated[
-    str | None,
-    typer.Option("--fin-use", metavar="SHARE", help="Of the fin that step may ask for, `80%`.", rich_help_panel=ANSWERED),
+    option("--step", "ANGLE", "The error that may ask for the whole fin: 20 deg of yaw, 10 of pitch if not given.", ANSWERED),
 ]
+FinUse = Annotated[str | None, option("--fin-use", "SHARE", "Of the fin that step may ask for, `80%`.", ANSWERED)]
 Damping = Annotated[
-    float | None,
-    typer.Option("--damping", help="Damping ratio of the loop: that of the overshoot, else 0.7071.", rich_help_panel=ANSWERED),
+    float | None, option("--damping", "", "Damping ratio of the loop: that of the overshoot, else 0.7071.", ANSWERED)
 ]
-PhaseWanted = Annotated[
-    str, typer.Option("--phase-margin", metavar="ANGLE", help="Phase margin to keep, `45deg`.", rich_help_panel=ANSWERED)
-]
-Speeds = Annotated[
-    str | None, typer.Option("--speeds", metavar="LIST", help="Speeds of the rows, m/s; those of the models if not given.")
-]
+PhaseWanted = Annotated[str, option("--phase-margin", "ANGLE", "Phase margin to keep, `45deg`.", ANSWERED)]
+Speeds = Annotated[str | None, option("--speeds", "LIST", "Speeds of the rows, m/s; those of the models if not given.")]
 FinLimit = Annotated[
     str | None,
-    typer.Option(
-        "--fin-max",
-        metavar="ANGLE",
-        help="Largest fin angle, `15deg`; if not given the vehicle's limit, else the models' largest.",
-        rich_help_panel=LIMITS,
+    option(
+        "--fin-max", "ANGLE", "Largest fin angle, `15deg`; if not given the vehicle's limit, else the models' largest.", LIMITS
     ),
 ]
 FinRate = Annotated[
-    str | None,
-    typer.Option(
-        "--fin-rate", metavar="ANGLE", help="Fastest fin per s; the vehicle's or model's if not given.", rich_help_panel=LIMITS
-    ),
+    str | None, option("--fin-rate", "ANGLE", "Fastest fin per s; the vehicle's or model's if not given.", LIMITS)
 ]
-FinLag = Annotated[
-    str | None,
-    typer.Option("--fin-lag", metavar="TIME", help="Time constant, `0.2s`; the model's if not given.", rich_help_panel=LIMITS),
-]
-Delay = Annotated[
-    str | None,
-    typer.Option(
-        "--delay", metavar="TIME", help="Dead time from command to fin; the model's if not given.", rich_help_panel=LIMITS
-    ),
-]
+FinLag = Annotated[str | None, option("--fin-lag", "TIME", "Time constant, `0.2s`; the model's if not given.", LIMITS)]
+Delay = Annotated[str | None, option("--delay", "TIME", "Dead time from command to fin; the model's if not given.", LIMITS)]
 Latency = Annotated[
-    str | None,
-    typer.Option(
-        "--latency", metavar="TIME", help="The autopilot's own, sensor to command, with half its period.", rich_help_panel=LIMITS
-    ),
+    str | None, option("--latency", "TIME", "The autopilot's own, sensor to command, with half its period.", LIMITS)
 ]
-Depth = Annotated[bool, typer.Option("--depth", help="Add the depth loop above pitch.")]
-OwnLaw = Annotated[
-    list[str] | None, typer.Option("--law", metavar="NAME=c0[,c1]", help="A law of your own, c0 + c1 u^2, as `b2=-0.23,-0.33`.")
-]
-Models = Annotated[
-    list[Path] | None,
-    typer.Option("--model", metavar="MODEL", help="Models to verify on; those it was designed from if not given."),
-]
-MarginFigure = Annotated[
-    Path | None, typer.Option("-o", "--output", metavar="FILE", help="Draw a figure: .png, .svg or .pdf, by the suffix.")
-]
-NeedPhase = Annotated[
-    str | None, typer.Option("--require-phase-margin", metavar="ANGLE", help="Exit 1 when any speed has less, `40deg`.")
-]
-NeedGain = Annotated[
-    str | None, typer.Option("--require-gain-margin", metavar="DB", help="Exit 1 when any speed has less, `6dB`.")
-]
-NeedDelay = Annotated[
-    str | None, typer.Option("--require-delay-margin", metavar="TIME", help="Exit 1 when any speed has less, `0.3s`.")
-]
-MostOvershoot = Annotated[
-    str | None, typer.Option("--max-overshoot", metavar="SHARE", help="Exit 1 when any step has more, `20%`.")
-]
+Depth = Annotated[bool, flag("--depth", "Add the depth loop above pitch.")]
+Models = Annotated[list[Path] | None, option("--model", "MODEL", "Models to verify on; those it was designed from if not given.")]
+MarginFigure = Annotated[Path | None, option("-o --output", "FILE", "Draw a figure: .png, .svg or .pdf, by the suffix.")]
+NeedPhase = Annotated[str | None, option("--require-phase-margin", "ANGLE", "Exit 1 when any speed has less, `40deg`.")]
+NeedGain = Annotated[str | None, option("--require-gain-margin", "DB", "Exit 1 when any speed has less, `6dB`.")]
+NeedDelay = Annotated[str | None, option("--require-delay-margin", "TIME", "Exit 1 when any speed has less, `0.3s`.")]
+MostOvershoot = Annotated[str | None, option("--max-overshoot", "SHARE", "Exit 1 when any step has more, `20%`.")]
 TARGETS = ", ".join(m.name for m in iter_modules([str(Path(__file__).parents[2] / "exports")]) if not m.name.startswith("_"))
-To = Annotated[str, typer.Option("--to", metavar="TARGET", help=f"One of {TARGETS}.")]
-Node = Annotated[
-    str | None, typer.Option("--node", metavar="NAME", help="What the gains go under: node, section, prefix or process.")
-]
-Template = Annotated[
-    Path | None, typer.Option("--template", metavar="FILE", help="A template of your own, see templates/exports/.")
-]
-Into = Annotated[Path | None, typer.Option("--into", metavar="YAML", help="An existing YAML file to put the gains into.")]
-Key = Annotated[str | None, typer.Option("--key", metavar="A.B.C", help="The key in that file that holds the gains.")]
-Write = Annotated[bool, typer.Option("--write", help="Change the file of `--into` (a backup is kept), not only show how.")]
+To = Annotated[str, option("--to", "TARGET", f"One of {TARGETS}.")]
+Node = Annotated[str | None, option("--node", "NAME", "What the gains go under: node, section, prefix or process.")]
+Template = Annotated[Path | None, option("--template", "FILE", "A template of your own, see templates/exports/.")]
+Into = Annotated[Path | None, option("--into", "YAML", "An existing YAML file to put the gains into.")]
+Key = Annotated[str | None, option("--key", "A.B.C", "The key in that file that holds the gains.")]
+Write = Annotated[bool, flag("--write", "Change the file of `--into` (a backup is kept), not only show how.")]
 
 
 @command.command("design", short_help="Gains per speed from models, a fit file or a table.")

@@ -6,10 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from fieldsid.cli.console import emit
-from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile
+from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, option
 from fieldsid.cli.voice import shown_in
 from fieldsid.errors import UsageError
 
@@ -19,19 +17,12 @@ if TYPE_CHECKING:
     from fieldsid.logs.run import Run
     from fieldsid.models.model import Model
 
-ManeuverSpec = Annotated[
-    str | None,
-    typer.Option("--maneuver", metavar="SPEC", help="`zigzag`, or `zigzag:amplitude=15deg,turn=20deg`.", show_default=False),
-]
-FinOf = Annotated[Path | None, typer.Option("--run", metavar="RUN", help="Replay the fin of this run.", show_default=False)]
-Speed = Annotated[
-    float | None, typer.Option("--speed", metavar="M_S", help="Speed; the model's own if not given.", show_default=False)
-]
-FinMax = Annotated[str, typer.Option("--fin-max", metavar="ANGLE", help="Largest fin angle about trim, `20deg` or `0.35rad`.")]
-RateHz = Annotated[float, typer.Option("--rate", metavar="HZ", min=1.0, max=1000.0, help="Samples per second of a maneuver.")]
-NoiseSeed = Annotated[
-    int | None, typer.Option("--noise", metavar="SEED", help="Add the model's sensor noise from this seed.", show_default=False)
-]
+ManeuverSpec = Annotated[str | None, option("--maneuver", "SPEC", "`zigzag`, or `zigzag:amplitude=15deg,turn=20deg`.")]
+FinOf = Annotated[Path | None, option("--run", "RUN", "Replay the fin of this run.")]
+Speed = Annotated[float | None, option("--speed", "M_S", "Speed; the model's own if not given.")]
+FinMax = Annotated[str, option("--fin-max", "ANGLE", "Largest fin angle about trim, `20deg` or `0.35rad`.")]
+RateHz = Annotated[float, option("--rate", "HZ", "Samples per second of a maneuver.", min=1.0, max=1000.0)]
+NoiseSeed = Annotated[int | None, option("--noise", "SEED", "Add the model's sensor noise from this seed.")]
 
 
 def command(

@@ -9,12 +9,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from fieldsid.cli.console import emit, table
 from fieldsid.cli.headlines.trial import of_status
 from fieldsid.cli.headlines.words import counted
-from fieldsid.cli.options import JsonFlag
+from fieldsid.cli.options import JsonFlag, argument
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import stem_of
 
@@ -36,7 +34,7 @@ WIDEST_NAME = 40
 """Characters up to which a file's name stays in one piece, whatever stands beside it."""
 LAST = 3
 
-Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="The trial folder; the one it is run in if not given.")]
+Folder = Annotated[Path, argument("FOLDER", "The trial folder; the one it is run in if not given.")]
 
 
 def command(folder: Folder = Path(), as_json: JsonFlag = False) -> Mapping[str, Any]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fieldsid.cli.console import emit, print_page, say
-from fieldsid.cli.options import Figures, Force, JsonFlag, MappingFile, ModelFiles, OutputDir, VehicleFile
+from fieldsid.cli.options import Figures, Force, JsonFlag, MappingFile, ModelFiles, OutputDir, OwnLaw, VehicleFile, option
 from fieldsid.cli.progress import refuse_closed
 from fieldsid.cli.session import tasks_of
 from fieldsid.cli.skipped_logs import Skips
@@ -26,32 +26,18 @@ if TYPE_CHECKING:
     from fieldsid.turning.prediction import TurnPrediction
 
 Speeds = Annotated[
-    str | None,
-    typer.Option("--speeds", metavar="LIST", help="Speeds in m/s, 0.5:2.5:0.1 or 1.0,1.6; those of the models if not given."),
+    str | None, option("--speeds", "LIST", "Speeds in m/s, 0.5:2.5:0.1 or 1.0,1.6; those of the models if not given.")
 ]
 RudderMax = Annotated[
     str | None,
-    typer.Option(
-        "--fin-max",
-        metavar="ANGLE",
-        help="Rudder held in the turn, `15deg`; if not given the vehicle's limit, else the models' largest.",
-    ),
+    option("--fin-max", "ANGLE", "Rudder held in the turn, `15deg`; if not given the vehicle's limit, else the models' largest."),
 ]
 Measured = Annotated[
-    list[Path] | None,
-    typer.Option("--measured", metavar="RUN", help="Run of a turning circle, to compare with and to learn from; may repeat."),
+    list[Path] | None, option("--measured", "RUN", "Run of a turning circle, to compare with and to learn from; may repeat.")
 ]
-Runs = Annotated[
-    list[Path] | None,
-    typer.Option("--runs", metavar="RUN", help="Runs that the turn is fitted to; the models' own if not given."),
-]
-Method = Annotated[str, typer.Option("--method", metavar="NAME", help="auto, maneuvering, simulated, u_turn or steady.")]
-OwnLaw = Annotated[
-    list[str] | None, typer.Option("--law", metavar="NAME=c0[,c1]", help="A law of your own, c0 + c1 u^2, as `b2=-0.23,-0.33`.")
-]
-FinZero = Annotated[
-    str, typer.Option("--fin-zero", metavar="ANGLE", help="Fin offsets below this, `1deg`, are not counted in the formula.")
-]
+Runs = Annotated[list[Path] | None, option("--runs", "RUN", "Runs that the turn is fitted to; the models' own if not given.")]
+Method = Annotated[str, option("--method", "NAME", "auto, maneuvering, simulated, u_turn or steady.")]
+FinZero = Annotated[str, option("--fin-zero", "ANGLE", "Fin offsets below this, `1deg`, are not counted in the formula.")]
 
 
 def command(
