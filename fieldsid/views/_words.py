@@ -91,6 +91,23 @@ def error_facts(m: GoodnessOfFit, floor: Noise) -> list[tuple[str, str]]:
     ]
 
 
+def merit_blocks(runs: Iterable[tuple[str, float, GoodnessOfFit, Noise]], angles: Angles) -> tuple[Block, str]:
+    """Return how well the free run of each run is followed, of its name, speed, merit and noise, and the units of that."""
+    rows = [
+        (
+            name,
+            number(speed, 3),
+            *(number(angles.factor * v, 2) for v in (m.angle_rms, floor.angle)),
+            number(m.angle_fit, 3),
+            *(number(angles.factor * v, 2) for v in (m.rate_rms, floor.rate)),
+            number(m.rate_fit, 3),
+        )
+        for name, speed, m, floor in runs
+    ]
+    heads = ("run", "m/s", "angle rms", "noise", "fit %", "rate rms", "noise", "fit %")
+    return Block("", tuple(rows), heads), f"angle in {angles.unit}, rate in {angles.unit}/s"
+
+
 def times(ratio: float) -> str:
     """Return an error over the noise floor, `-` where there is none."""
     return f"{ratio:.2f}" if abs(ratio) < MANY else number(ratio, 3)

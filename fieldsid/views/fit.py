@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from functools import partial
+from collections.abc import Iterator
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.display import View
+from fieldsid.display import Figures, Frames, View
+from fieldsid.figures.kinds import sketch
 from fieldsid.page import Block, Page, facts, listed
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import number, p_value
@@ -66,7 +66,7 @@ def page(fit: Fit) -> Page:
     return Page(f"Fit of the {model.axis.value} axis", warned(_warnings(fit)), blocks)
 
 
-def frames(fit: Fit) -> Mapping[str, Callable[[], DataFrame]]:
+def frames(fit: Fit) -> Frames:
     """Return the parameters, the runs, the correlation of the estimates, and the motion of all runs over time."""
     return {
         "parameters": lambda: table(parameter_rows(fit.model), "parameter"),
@@ -76,13 +76,11 @@ def frames(fit: Fit) -> Mapping[str, Callable[[], DataFrame]]:
     }
 
 
-def figures(fit: Fit) -> Mapping[str, Callable[[], Any]]:
+def figures(fit: Fit) -> Figures:
     """Return the motion of each run by its name, and the estimates over time of a recursive method."""
-    from fieldsid.figures.identify import figure, history_figure
-
-    drawn: dict[str, Callable[[], Any]] = {p.record.name: partial(figure, fit, i) for i, p in enumerate(fit.predictions)}
+    drawn = {p.record.name: sketch("identify", fit, i) for i, p in enumerate(fit.predictions)}
     if fit.history is not None:
-        drawn["over_time"] = partial(history_figure, fit, fit.history)
+        drawn["over_time"] = sketch("identify", fit, fit.history, draw="history_figure")
     return drawn
 
 

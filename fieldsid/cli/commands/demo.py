@@ -21,11 +21,10 @@ from fieldsid.cli.progress import compiling
 from fieldsid.cli.session import Session
 from fieldsid.cli.voice import voice
 from fieldsid.errors import ArtifactError
+from fieldsid.page import Page, written
 from fieldsid.runtime.background_tasks import BackgroundTasks
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fieldsid.demo.steps import Step
     from fieldsid.demo.trial import Trial
     from fieldsid.fitting.jit_warmup import Warmup
@@ -47,15 +46,12 @@ SHORT_OPENING = (
 BRIEF, VERBOSE, SILENT = "brief", "verbose", "silent"
 """How much of the tour is told while it goes on."""
 
-Verbose = Annotated[bool, flag("--verbose -v", "Print each command with all that it says, and what it means.")]
-EffectName = Annotated[str, option("--effect", "NAME", "The effect to hide: see `sysid effects list`.")]
-
 
 def command(
     context: typer.Context,
-    effect: EffectName = HIDDEN,
+    effect: Annotated[str, option("--effect", "NAME", "The effect to hide: see `sysid effects list`.")] = HIDDEN,
     output: OutputDir = None,
-    verbose: Verbose = False,
+    verbose: Annotated[bool, flag("--verbose -v", "Print each command with all that it says, and what it means.")] = False,
     force: Force = False,
     as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
@@ -72,7 +68,9 @@ def command(
         body = _tour(effect, output, began, warmup, force=force, told=told)
     if told != SILENT:
         sys.stdout.write("\n")
-    return emit(body, as_json=as_json, render=lambda to: _render(to, body, figures=verbose), headline=of_demo(body))
+    figures = written(figure=[f for f in body["files"] if verbose and f.endswith(".png")])
+    page = Page("", closing=(*figures, "`sysid --help` lists every command."))
+    return emit(body, as_json=as_json, render=page, headline=of_demo(body))
 
 
 def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, force: bool, told: str) -> dict[str, Any]:
@@ -179,9 +177,3 @@ def _flown(trial: Trial, folder: Path, leg: Leg) -> str:
         f"The vehicle flies it at {leg.speed:.1f} m/s and {trial.learning} at {others} m/s, to learn from, then "
         f"{trial.judging} at {judging} m/s, to judge by. Its logs are in {folder}/trial."
     )
-
-
-def _render(to: Console, body: Mapping[str, Any], *, figures: bool) -> None:
-    for file in (f for f in body["files"] if figures and f.endswith(".png")):
-        to.print(f"figure: {file}", soft_wrap=True)
-    to.print("`sysid --help` lists every command.")

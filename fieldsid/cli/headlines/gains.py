@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, typed_with
-from fieldsid.cli.headlines.words import Body, counted, named, times
+from fieldsid.cli.headlines.words import Body, counted, named
 from fieldsid.cli.voice import shown_in
 from fieldsid.rounding import MANY, number, with_error
 from fieldsid.trial_folder.journal import is_trial
+from fieldsid.views._words import times
 
 if TYPE_CHECKING:
     from fieldsid.models.model import Model

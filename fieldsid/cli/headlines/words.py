@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fieldsid.cli.headlines.typed import pasted
-from fieldsid.rounding import MANY, number
 
 Body = Mapping[str, Any]
 USE = {"yaw": ("turn-radius",), "pitch": ("schedule", "design")}
@@ -23,11 +22,6 @@ def named(names: Sequence[str]) -> str:
     """Return the first few names, and how many more there are."""
     more = len(names) - MOST_NAMED
     return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
-
-
-def times(over: float) -> str:
-    """Return an error over the noise floor; far above it decimals say nothing."""
-    return f"{over:.2f}" if over < MANY else number(over, 3)
 
 
 def used(axis: str, model: str) -> str:
