@@ -11,7 +11,7 @@ from fieldsid.cli.console import emit
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted
 from fieldsid.cli.headlines.words import counted
-from fieldsid.cli.voice import shown_in
+from fieldsid.cli.voice import angles
 from fieldsid.errors import DataError
 from fieldsid.page import Block, Page
 from fieldsid.records.keys import body_of
@@ -56,7 +56,7 @@ def as_promised(gains: Path, runs: Sequence[Path], reading: Mapping[str, Any], *
 def _headline(gains: Path, models: Sequence[Path], runs: Sequence[Path], steps: Sequence[KeptStep]) -> Headline:
     from fieldsid.change.promise import worst_of
 
-    worst, (times, unit) = worst_of(steps), shown_in("rad")
+    worst, (times, unit) = worst_of(steps), angles().of("rad")
     broken = [s for s in steps if s.broken]
     how = f"overshoot {100 * worst.flown.overshoot:.0f} % (at most {100 * worst.promised.overshoot_most:.0f} %), "
     how += f"settled in {_seconds(worst.flown.settling)} ({_seconds(worst.promised.settling_most)}), "
@@ -75,7 +75,7 @@ def _seconds(value: float) -> str:
 
 
 def _page(steps: Sequence[KeptStep]) -> Page:
-    times, unit = shown_in("rad")
+    times, unit = angles().of("rad")
     rows = tuple(
         (
             s.run,

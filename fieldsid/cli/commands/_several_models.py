@@ -14,7 +14,7 @@ from fieldsid.cli.console import emit
 from fieldsid.cli.inputs import fitted_to
 from fieldsid.cli.progress import get_ready
 from fieldsid.cli.session import drawn_in
-from fieldsid.cli.voice import shown_words
+from fieldsid.cli.voice import angles
 from fieldsid.comparison.sufficient import pooled
 from fieldsid.errors import UsageError
 from fieldsid.figures.kinds import sketch
@@ -116,7 +116,7 @@ def _loop(paths: Sequence[Path], found_of: Sequence[Sequence[Comparison]]) -> Lo
 
 def _loop_blocks(loop: Loop) -> tuple[Block | str, ...]:
     """Return where the first model fails, and the error on fitted and unseen runs after each addition."""
-    places = [f"{shown_words(p.condition)} (rms {p.rms_ratio:.2f} x)" for p in loop.where[:MOST_PLACES]]
+    places = [f"{angles().words(p.condition)} (rms {p.rms_ratio:.2f} x)" for p in loop.where[:MOST_PLACES]]
     fails = Whole(f"{loop.before.run}: the {loop.start} fails most at {', '.join(places)}" if places else "")
     of = "" if loop.is_noiseless else ", over the noise floor"
     rows = tuple((s.added, *s.says) for s in loop.steps)

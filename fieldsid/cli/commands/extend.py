@@ -17,7 +17,7 @@ from fieldsid.cli.headlines.words import used
 from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, ValidateRuns, argument, flag, option
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, trying
 from fieldsid.cli.skipped_logs import Skips
-from fieldsid.cli.voice import angles, shown_in
+from fieldsid.cli.voice import angles
 from fieldsid.comparison.sufficient import is_noise
 from fieldsid.errors import ArtifactError, UsageError
 from fieldsid.page import Block, Page, paragraph, written
@@ -192,7 +192,7 @@ def _page(told: Extended, body: Mapping[str, Any]) -> Page:
     found = tuple(
         (name, _value(factor * c.value, factor * c.std_error, at_bound=c.at_bound), unit)
         for name, c in told.coefficients.items()
-        for factor, unit in [shown_in(c.unit)]
+        for factor, unit in [angles().of(c.unit)]
     )
     coefficients = Block("", found, ("coefficient", "value", "unit"), left=2)
     says = paragraph([_verdict(body), left_says(body)])

@@ -12,7 +12,7 @@ from fieldsid.cli.console import emit, say
 from fieldsid.cli.options import FigureFile, Force, JsonFlag, ModelFile
 from fieldsid.cli.progress import refuse_figure
 from fieldsid.cli.session import drawn_at
-from fieldsid.cli.voice import shown_in
+from fieldsid.cli.voice import angles
 from fieldsid.figures.kinds import sketch
 from fieldsid.logs.run import Note
 from fieldsid.page import Block, Page, Whole, paragraph, written
@@ -96,7 +96,7 @@ def _rows(gain: Gain) -> Iterator[tuple[str, ...]]:
     channels = [r for r in channels_of(gain) if r["runs"] == judged]
     over = f"{gain.over_floor[0]:.2f} -> {gain.over_floor[1]:.2f}"
     for name, r in zip_longest((f"+ {n}" for n in gain.added), channels, fillvalue=None):
-        times, unit = shown_in(r["unit"]) if r else (1.0, "")
+        times, unit = angles().of(r["unit"]) if r else (1.0, "")
         errors = [number(times * r[k], 3) if r else "" for k in ("before", "after", "noise_floor")]
         yield name or "", f"{r['channel']}, {unit}" if r else "", *errors, over
         over = ""

@@ -31,7 +31,7 @@ from fieldsid.cli.options import (
 )
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_closed
 from fieldsid.cli.session import drawn_in
-from fieldsid.cli.voice import angles, shown_estimate
+from fieldsid.cli.voice import angles
 from fieldsid.figures.kinds import sketch
 from fieldsid.logs.run import Note
 from fieldsid.page import Block, Page, Whole, paragraph, written
@@ -173,7 +173,7 @@ def _label(entry: FittedModel) -> str:
 
 def _page(entries: Sequence[FittedModel], *, figures: bool) -> Page:
     rows = tuple(
-        (_label(e) if i == 0 else "", p.shown, *shown_estimate(v.value, v.std_error, v.interval95, v.unit))
+        (_label(e) if i == 0 else "", p.shown, *angles().estimate(v.value, v.std_error, v.interval95, v.unit))
         for e in entries
         for i, (p, v) in enumerate((p, p.estimate) for p in e.parameters.values())
     )

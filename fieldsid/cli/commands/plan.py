@@ -13,7 +13,7 @@ from fieldsid.cli.console import emit, progress, say
 from fieldsid.cli.options import LIMITS, WRITTEN, Figures, Force, JsonFlag, OutputDir, VehicleFile, flag, names_of, option
 from fieldsid.cli.progress import compiling, refuse_closed, refuse_existing
 from fieldsid.cli.session import drawn_at
-from fieldsid.cli.voice import shown_in
+from fieldsid.cli.voice import angles
 from fieldsid.figures.kinds import sketch
 from fieldsid.models.axis import Axis
 from fieldsid.page import Block, Page
@@ -157,7 +157,7 @@ def _check_write(write: str | None, output: Path | None) -> None:
 
 
 def _page(plan: Plan, says: Iterable[str]) -> Page:
-    times, angle = shown_in("rad")
+    times, angle = angles().of("rad")
     rows = tuple(
         (
             number(leg.speed, 3),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from fieldsid.cli.console import emit
 from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, option
-from fieldsid.cli.voice import shown_in
+from fieldsid.cli.voice import angles
 from fieldsid.errors import UsageError
 from fieldsid.page import Block, Page, written
 from fieldsid.records.keys import body_of
@@ -112,6 +112,6 @@ def _page(body: Mapping[str, Any]) -> Page:
     rows = tuple(
         (name, *(number(factor * v[k]) for k in ("low", "high", "end")), unit)
         for name, v in body["signals"].items()
-        for factor, unit in [shown_in(COLUMNS[name])]
+        for factor, unit in [angles().of(COLUMNS[name])]
     )
     return Page("", blocks=(Block("", rows, ("signal", "low", "high", "end", "unit")),), closing=written(run=body["file"]))

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from fieldsid.trial_folder.state import FolderState, Item
 
 NAMES = {
-    "log": "log", "run": "run", "model": "model", "fit": "laws", "schedule": "gains", "turn-radius": "turning radius",
-    "plan": "plan", "diagnosis": "diagnosis", "vehicle": "vehicle", "mapping": "mapping", "simulated": "simulated run",
+    "vehicle": "vehicle", "mapping": "mapping", "plan": "plan", "log": "log", "run": "run", "model": "model",
+    "diagnosis": "diagnosis", "fit": "laws", "turn-radius": "turning radius", "schedule": "gains", "simulated": "simulated run",
 }  # fmt: skip
-ORDER = ("vehicle", "mapping", "plan", "log", "run", "model", "diagnosis", "fit", "turn-radius", "schedule", "simulated")
+"""Kinds of files in the order they are listed in, and what one is called."""
 MANY_IN_ONE, SEVERAL = ("laws", "gains"), {"diagnosis": "diagnoses", "turning radius": "turning radii"}
 """Files that hold several of what they are named after, and words whose plural is their own."""
 MOST_SOURCES = 2
@@ -80,7 +80,7 @@ def command(
 
 def _verdict(state: FolderState) -> str:
     counts = Counter(i.kind for i in state.items)
-    held = ", ".join(_many(counts[k], NAMES[k]) for k in ORDER if counts[k] and k not in ("vehicle", "mapping")) or "nothing yet"
+    held = ", ".join(_many(counts[k], NAMES[k]) for k in NAMES if counts[k] and k not in ("vehicle", "mapping")) or "nothing yet"
     stale = sum(bool(i.stale) for i in state.items)
     name = state.folder.resolve().name
     return f"{name}: {held}; " + (f"{stale} stale" if stale else "nothing is stale")
@@ -95,7 +95,7 @@ def _many(count: int, name: str) -> str:
 def _page(state: FolderState) -> Page:
     used = {s.path for i in state.of_kind("run") for s in i.sources}  # a log that has become a run says no more
     listed = [i for i in state.items if i.kind in NAMES and not (i.kind == "log" and state.place(i).resolve() in used)]
-    shown = sorted(listed, key=lambda i: (ORDER.index(i.kind), i.path))
+    shown = sorted(listed, key=lambda i: (list(NAMES).index(i.kind), i.path))
     told = []
     for e in [e for e in state.entries if e.verdict][-LAST:]:
         done = "" if e.exit in (0, 1) else "failed: "
