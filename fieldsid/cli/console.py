@@ -10,6 +10,7 @@ import json
 import sys
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from copy import copy
 from functools import partial
 from typing import Any, TypeVar
@@ -31,6 +32,7 @@ from fieldsid.text.one_line import one_line
 
 T = TypeVar("T")
 WIDTH = 80
+_SAID: ContextVar[str] = ContextVar("said", default="")
 NARROW, FAR, LEAST_WORDS = 60, 1000, 12
 """Columns of a terminal below which a table that does not fit is shown row by row, those in which any table fits, and those
 that a column of words is folded down to."""
@@ -80,6 +82,8 @@ def emit(
     quiet, the headline alone. Only what is no result, as a page of the guide, has no headline. Where what `render` prints
     `is_file`, to be redirected to one, the headline goes to stderr, and the file is what is left where it is to be quiet.
     """
+    if headline is not None:
+        _SAID.set(headline.says)
     whole = body if headline is None else {**body, "headline": body_of(headline)}
     if as_json:
         sys.stdout.write(json.dumps(plain(whole), allow_nan=False) + "\n")
@@ -101,6 +105,13 @@ def emit(
     else:
         render(to)
     return whole
+
+
+def said() -> str:
+    """Return the verdict of the last result, and forget it."""
+    verdict = _SAID.get()
+    _SAID.set("")
+    return verdict
 
 
 def print_headline(to: Console, headline: Headline) -> None:

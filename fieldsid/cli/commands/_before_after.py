@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from fieldsid.cli.console import emit
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import typed_with
@@ -44,9 +42,7 @@ def is_side(path: Path) -> bool:
         return False
 
 
-def before_after(
-    context: typer.Context, old: Path, new: Path, output: Path | None, *, force: bool, as_json: bool
-) -> Mapping[str, Any]:
+def before_after(old: Path, new: Path, output: Path | None, *, force: bool, as_json: bool) -> Mapping[str, Any]:
     """Compare two states and print what has changed; return the body."""
     sides = (_side(old), _side(new))
     axes = [a for a in sides[0].files if a in sides[1].files]
@@ -59,7 +55,7 @@ def before_after(
 
     names = (f"before: {old}", f"after: {new}")
     plots = {f"before_after_{c.axis.value}": sketch("change", c, names) for c in found}
-    drawn: Sequence[str | None] = drawn_in(context, output, plots, force=force) or [None] * len(found)
+    drawn: Sequence[str | None] = drawn_in(output, plots, force=force) or [None] * len(found)
     told = tuple(
         AxisChange(c, tuple(tuple(map(str, s.files[c.axis.value])) for s in sides), f, _next(c, sides))
         for c, f in zip(found, drawn, strict=True)

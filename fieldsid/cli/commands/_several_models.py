@@ -8,8 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from fieldsid.cli.console import emit
 from fieldsid.cli.inputs import fitted_to
 from fieldsid.cli.progress import get_ready
@@ -33,7 +31,6 @@ CLOSE = 1.05
 
 
 def several_models(
-    context: typer.Context,
     paths: Sequence[Path],
     runs: Sequence[Path],
     skips: Skips,
@@ -69,7 +66,7 @@ def several_models(
     plots = {} if loop is None else {"loop": sketch("loop", loop)}
     of_runs = zip(*found_of, strict=True)
     plots |= {f"models_on_{of_run[0].run}": sketch("several", of_run, names) for of_run in of_runs}
-    figures = tuple(drawn_in(context, output, plots, force=force))
+    figures = tuple(drawn_in(output, plots, force=force))
     least = min(range(len(paths)), key=lambda i: pooled(c.over_noise for c in found_of[i]))
     several = tuple(
         OneOfSeveral(

@@ -30,7 +30,6 @@ MOST_REASONS = 8
 
 
 def command(
-    context: typer.Context,
     logs: Annotated[list[Path], argument("LOG...", "Logs, and folders of logs; runs that were imported, too.")],
     axis: AxisOption,
     output: Annotated[Path, option("-o --output", "DIR", "Folder of the table and of each log's answer.")] = Path("batch"),
@@ -82,7 +81,7 @@ def command(
     trends = trends_of([dict(r) for r in rows], axis) if trend or figure is not None else ()
     place = figure or output / f"trend_{axis.value}.png"
     plot = sketch("trend", trends, axis.value)
-    drawn = drawn_at(context, place if trends else None, plot, force=force or figure is None)
+    drawn = drawn_at(place if trends else None, plot, force=force or figure is None)
     unusable = [row for row in rows if row["status"] != "done"]
     body = body_of(
         Batch(

@@ -29,7 +29,6 @@ MOST_SHOWN = 6
 
 
 def command(
-    context: typer.Context,
     model: Annotated[Path, argument("MODEL", "A model file, the folder of the models before a swap, or gains that were flown.")],
     runs: Annotated[
         list[Path], argument("RUN...", "Runs or log files, more models before them; or the model or folder after a swap.")
@@ -79,7 +78,7 @@ def command(
             raise UsageError(
                 "`--from`, `--to`, `--mapping` and `--min-fit` are for runs", found="two models and no run", hint="leave them out"
             )
-        return before_after(context, sides[0], sides[1], output, force=force, as_json=as_json)
+        return before_after(sides[0], sides[1], output, force=force, as_json=as_json)
     from fieldsid.cli.inputs import model_first, read_runs
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.cli.user_effects import check_effects
@@ -92,7 +91,7 @@ def command(
             raise UsageError("several models are compared over runs", found=given, hint="sysid compare M1.yaml M2.yaml RUN")
         from fieldsid.cli.commands._several_models import several_models
 
-        several = several_models(context, sides, others, Skips(), reading=reading, output=output, force=force, as_json=as_json)
+        several = several_models(sides, others, Skips(), reading=reading, output=output, force=force, as_json=as_json)
         _gate([run for m in several["models"] for run in m["runs"]], min_fit)
         return several
     model, runs = model_first(model, runs)
@@ -105,7 +104,7 @@ def command(
 
     found = compare(known, logs, unfit=skips.skip)
     plots = {f"{model.stem}_on_{c.run}": sketch("compare", c, known, model.name) for c in found}
-    drawn: Sequence[str | None] = drawn_in(context, output, plots, force=force) or [None] * len(found)
+    drawn: Sequence[str | None] = drawn_in(output, plots, force=force) or [None] * len(found)
     fitted = fitted_to(model, known, logs)
     compared = tuple(compared_run(c, file, fitted) for c, file in zip(found, drawn, strict=True))
     notes = left_out(logs, known.axis)

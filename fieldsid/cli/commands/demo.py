@@ -11,8 +11,6 @@ from textwrap import fill
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from fieldsid.cli.app import run
 from fieldsid.cli.console import WIDTH, emit
 from fieldsid.cli.headlines.trial import of_demo
@@ -48,7 +46,6 @@ BRIEF, VERBOSE, SILENT = "brief", "verbose", "silent"
 
 
 def command(
-    context: typer.Context,
     effect: Annotated[str, option("--effect", "NAME", "The effect to hide: see `sysid effects list`.")] = HIDDEN,
     output: OutputDir = None,
     verbose: Annotated[bool, flag("--verbose -v", "Print each command with all that it says, and what it means.")] = False,
@@ -64,7 +61,7 @@ def command(
     """
     began = perf_counter()
     told = SILENT if as_json or voice().is_quiet else VERBOSE if verbose else BRIEF
-    with compiling(context, _compile_loops) as warmup:
+    with compiling(_compile_loops) as warmup:
         body = _tour(effect, output, began, warmup, force=force, told=told)
     if told != SILENT:
         sys.stdout.write("\n")

@@ -8,8 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from fieldsid.cli.console import emit
 from fieldsid.cli.options import (
     ExcitedAxis,
@@ -41,7 +39,6 @@ if TYPE_CHECKING:
 
 
 def command(
-    context: typer.Context,
     runs: RunFiles,
     axis: ExcitedAxis = None,
     validate: ValidateRuns = None,
@@ -81,7 +78,7 @@ def command(
     from fieldsid.results.diagnoses import Diagnosed
 
     axis = known.axis if known else axis or axis_excited(training, AXIS_OPTION)
-    with compiling_first(context), trying("diagnosing") as report:
+    with compiling_first(), trying("diagnosing") as report:
         found = diagnose(training, axis, unseen, model=known, report=report, thorough=thorough, unfit=skips.skip)
     training, unseen = skips.left_of(training), skips.left_of(unseen)
     inputs = [*files_of([*training, *unseen]), *([model] if model else [])]
@@ -93,11 +90,9 @@ def command(
         known=() if known is None else known.effects,
         skipped_runs=tuple(skips.records),
     )
-    told = replace(
-        told, file=_saved(told, output, inputs, force=force), figure=drawn_at(context, figure, found.plot, force=force)
-    )
+    told = replace(told, file=_saved(told, output, inputs, force=force), figure=drawn_at(figure, found.plot, force=force))
     if apply:
-        told = replace(told, applied=_applied(context, found, (known, model), training, unseen, force=force))
+        told = replace(told, applied=_applied(found, (known, model), training, unseen, force=force))
     body = body_of(told)
     from fieldsid.cli.headlines.missing import Searched, of_diagnosis
 
@@ -130,7 +125,7 @@ def _saved(told: Diagnosed, path: Path | None, inputs: Sequence[Path], *, force:
 
 
 def _applied(
-    context: typer.Context, found: Diagnosis, model: tuple[Model | None, Path | None], training: Sequence[Run],
+    found: Diagnosis, model: tuple[Model | None, Path | None], training: Sequence[Run],
     unseen: Sequence[Run], *, force: bool,
 ) -> tuple[Applied, ...]:  # fmt: skip
     """Extend the model diagnosed by each named effect in turn, write each model, and return what each step has changed."""
@@ -150,7 +145,7 @@ def _applied(
         if not path.exists() or force:
             save_model(known, path, inputs=files_of(training), force=force)
     targets = step_files(path, found.effects, force=force)
-    with compiling_first(context), trying("adding what was found") as report:
+    with compiling_first(), trying("adding what was found") as report:
         steps = extend_in_steps(known, found.effects, training, unseen, report=report)
     save_steps(steps, targets, path, (training, unseen), force=force)
     return tuple(

@@ -8,8 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from fieldsid.cli.console import emit
 from fieldsid.cli.headlines.missing import left_says, of_extension, of_undoing
 from fieldsid.cli.headlines.typed import pasted, repeated
@@ -34,7 +32,6 @@ MUCH, SMALL = 100.0, 1e-3
 
 
 def command(
-    context: typer.Context,
     model: ModelFile,
     runs: Annotated[list[Path] | None, argument("RUN...", "The runs that the model and the effects are fitted to.")] = None,
     add: Annotated[list[str] | None, option("--add", "EFFECT", "An effect to add: see `sysid effects list`; may repeat.")] = None,
@@ -80,7 +77,7 @@ def command(
     from fieldsid.records.named_inputs import sha256_of
     from fieldsid.results.extensions import Extended, MadeFrom
 
-    with compiling_first(context), trying("extending") as report:
+    with compiling_first(), trying("extending") as report:
         steps = extend_in_steps(known, names, training, unseen, report=report, unfit=skips.skip)
     found = whole_of(steps)
     training, unseen = skips.left_of(training), skips.left_of(unseen)

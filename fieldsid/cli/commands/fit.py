@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-import typer
-
 from fieldsid.cli.console import emit
 from fieldsid.cli.options import Figures, Force, JsonFlag, ModelFiles, OutputFile, flag
 from fieldsid.cli.progress import refuse_existing
@@ -17,7 +15,6 @@ from fieldsid.views.laws import blocks_of
 
 
 def command(
-    context: typer.Context,
     models: ModelFiles,
     unweighted: Annotated[bool, flag("--unweighted", "Let every point count alike, standard errors or not.")] = False,
     output: OutputFile = None,
@@ -51,7 +48,7 @@ def command(
     if output is not None:
         there = [p for p in source.paths if p.is_file()]
         file = str(save_laws(laws, output, models=there if source.models else (), inputs=there, force=force))
-    drawn = drawn_at(context, figure, laws.plot, force=force)
+    drawn = drawn_at(figure, laws.plot, force=force)
     body = body_of(FittedLaws(laws=laws, file=file, figure=drawn))
     notes = (*source.notes, *law_notes(laws))
     page = Page("", blocks=tuple(blocks_of(laws)), closing=written(file=file, figure=drawn))

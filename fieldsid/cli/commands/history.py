@@ -6,8 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from fieldsid.cli.console import emit, say
 from fieldsid.cli.options import FigureFile, Force, JsonFlag, ModelFile
 from fieldsid.cli.progress import refuse_figure
@@ -26,9 +24,7 @@ if TYPE_CHECKING:
 KEPT = {"unseen": "unseen data are predicted better", "evidence": "the evidence pays for it", "--keep": "kept because of --keep"}
 
 
-def command(
-    context: typer.Context, model: ModelFile, figure: FigureFile = None, force: Force = False, as_json: JsonFlag = False
-) -> Mapping[str, Any]:
+def command(model: ModelFile, figure: FigureFile = None, force: Force = False, as_json: JsonFlag = False) -> Mapping[str, Any]:
     """Show how a model came about: its parents, the effects added, and how the error fell towards the noise floor.
 
     Every file's hash is checked against what its child and its data were when it was made.
@@ -53,7 +49,7 @@ def command(
             axis=known.axis,
             generations=line,
             intact=all(g.state == "intact" and not (g.step and g.step.changed_data) for g in line),
-            figure=drawn_at(context, figure if steps else None, plot, force=force),
+            figure=drawn_at(figure if steps else None, plot, force=force),
         )
     )
     from fieldsid.cli.headlines.models import of_history

@@ -8,8 +8,6 @@ from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from fieldsid.cli.console import alike, emit, progress
 from fieldsid.cli.options import (
     Bandwidth,
@@ -48,7 +46,6 @@ MOST_DRAWN = 6
 
 
 def command(
-    context: typer.Context,
     runs: RunFiles,
     axis: ExcitedAxis = None,
     method: Method = "auto",
@@ -88,7 +85,7 @@ def command(
     axis = axis or axis_excited(known, AXIS_OPTION)
     if joint:
         check_joint([run.name for run in known], len(runs))
-    with compiling_first(context), progress("fitting", 1 if joint else len(known)) as step:
+    with compiling_first(), progress("fitting", 1 if joint else len(known)) as step:
         fits = identify(
             known,
             axis,
@@ -105,7 +102,7 @@ def command(
     groups = [used] if joint else [[run] for run in used]
     files = [files_of(group) for group in groups]
     models = _written(fits, files, output, force=force)
-    drawn_in(context, output if figures else None, {k: v for fit in fits for k, v in _plots(fit).items()}, force=force)
+    drawn_in(output if figures else None, {k: v for fit in fits for k, v in _plots(fit).items()}, force=force)
     entries = tuple(fitted_model(fit, model, of) for fit, model, of in zip(fits, models, groups, strict=True))
     body = body_of(Identified(axis=axis, fits=entries, skipped_runs=tuple(skips.records)))
     from fieldsid.cli.headlines.models import of_identify

@@ -7,8 +7,6 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from fieldsid.cli.console import emit, progress, say
 from fieldsid.cli.options import LIMITS, WRITTEN, Figures, Force, JsonFlag, OutputDir, VehicleFile, flag, names_of, option
 from fieldsid.cli.progress import compiling, refuse_closed, refuse_existing
@@ -32,7 +30,6 @@ GOAL, FLOWN, KNOWN = "What to learn", "How it is flown", "What is known before"
 
 
 def command(
-    context: typer.Context,
     axis: Annotated[Axis | None, option("--axis", "AXIS", "The plane to plan for; yaw, or that of a diagnosis.", GOAL)] = None,
     speeds: Annotated[
         Text, option("--speeds", "M_S,..", "`1.0,1.4,1.8` or `1.0:1.8:0.4`; the prior's own if not given.", GOAL)
@@ -112,7 +109,7 @@ def command(
         axis, speeds, vehicle, model, prior, want, minutes, limiting, window, run_up, rate, radius,
         names_of(separate), diagnosis, seed, open_loop, course,
     )  # fmt: skip
-    with compiling(context) as warmup, progress("planning", asked.legs) as step:
+    with compiling() as warmup, progress("planning", asked.legs) as step:
 
         def ready() -> None:
             compile_planning()
@@ -135,7 +132,7 @@ def command(
         if figures:
             files.append(output / "plan.png")
             views = [figure_data(made.plan, leg, made.model) for leg in made.plan.legs]
-            drawn_at(context, files[-1], sketch("plan", views), force=force)
+            drawn_at(files[-1], sketch("plan", views), force=force)
     told: dict[str, Any] = {}
     if made.found:
         best = max(made.found, key=lambda s: s.expected_log_odds)

@@ -149,7 +149,6 @@ def design(
 
 @command.command("verify", short_help="Margins and steps over the identified set.")
 def verify(
-    context: typer.Context,
     schedule: ScheduleFile,
     models: Annotated[
         list[Path] | None, option("--model", "MODEL", "Models to verify on; those it was designed from if not given.")
@@ -212,7 +211,7 @@ def verify(
             scheduled=checked.scheduled,
             constant=checked.constant,
             gates=gates,
-            figure=drawn_at(context, output, sketch("schedule", known, checked), force=force),
+            figure=drawn_at(output, sketch("schedule", known, checked), force=force),
         )
     )
     headline = of_verification(body, schedule, models or source.paths)

@@ -7,8 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from fieldsid.cli.console import emit, say
 from fieldsid.cli.options import Figures, Force, JsonFlag, MappingFile, ModelFiles, OutputDir, OwnLaw, VehicleFile, option
 from fieldsid.cli.progress import refuse_closed
@@ -27,7 +25,6 @@ if TYPE_CHECKING:
 
 
 def command(
-    context: typer.Context,
     models: ModelFiles,
     speeds: Annotated[
         str | None, option("--speeds", "LIST", "Speeds in m/s, 0.5:2.5:0.1 or 1.0,1.6; those of the models if not given.")
@@ -95,7 +92,7 @@ def command(
         _save(found, output, source, force=force)
         plots = {"turn_radius": sketch("turn", prediction)}
         plots |= {f"circle_{m.turn.run}": sketch("turn", m.turn, draw="track_figure") for m in prediction.measured}
-        found = replace(found, figures=tuple(drawn_in(context, output if figures else None, plots, force=force)))
+        found = replace(found, figures=tuple(drawn_in(output if figures else None, plots, force=force)))
     body = body_of(found)
     headline, notes = of_turn(body, models, caveat(source.models, models)), prediction.notes
     page = Page("", blocks=page_of(prediction, angles()).blocks, closing=written(figure=found.figures))
