@@ -93,6 +93,11 @@ def told(block: Block | str) -> bool:
     return bool(block.rows if isinstance(block, Block) else block)
 
 
+def counted(count: int, word: str, many: str = "") -> str:
+    """Return `1 run`, `2 runs`; `many` is a plural that is no `s` more."""
+    return f"{count} {word if count == 1 else many or f'{word}s'}"
+
+
 def cut(text: str, longest: int) -> str:
     """Return a text on one line, its end left out where it is longer than so many characters."""
     line = " ".join(text.split())

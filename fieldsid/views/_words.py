@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.page import Block, cut, facts
+from fieldsid.page import Block, counted, cut, facts
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import MANY, RADIANS, Angles, interval, number, with_error
 
@@ -26,9 +26,9 @@ def warned(notes: Iterable[Note]) -> tuple[str, ...]:
     return tuple(f"{n.message} [{n.code}]" for n in notes)
 
 
-def counted(count: int, word: str) -> str:
+def some(count: int, word: str) -> str:
     """Return `1 warning`, `2 warnings`; empty for none."""
-    return "" if count == 0 else f"{count} {word}" if count == 1 else f"{count} {word}s"
+    return counted(count, word) if count else ""
 
 
 def joined(*parts: str) -> str:

@@ -11,7 +11,7 @@ from fieldsid.page import Block, Page, cut, paragraph
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import RADIANS, Angles
 from fieldsid.views._candidates import candidates
-from fieldsid.views._words import counted, joined, parameter_rows, table, warned, where_block, where_rows
+from fieldsid.views._words import joined, parameter_rows, some, table, warned, where_block, where_rows
 
 if TYPE_CHECKING:
     from fieldsid.diagnosis import Candidate, Diagnosis
@@ -21,7 +21,7 @@ MOST_PLACES, MOST_SPOKEN = 5, 3
 
 def line(found: Diagnosis) -> str:
     """Return axis, verdict and its sentence."""
-    return f"{found.axis.value}, {found.verdict}: {joined(cut(found.says, 280), counted(len(found.notes), 'note'))}"
+    return f"{found.axis.value}, {found.verdict}: {joined(cut(found.says, 280), some(len(found.notes), 'note'))}"
 
 
 def page(found: Diagnosis, angles: Angles = RADIANS) -> Page:

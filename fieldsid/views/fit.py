@@ -13,11 +13,11 @@ from fieldsid.records.keys import body_of
 from fieldsid.rounding import number, p_value
 from fieldsid.views._words import (
     base_words,
-    counted,
     error_facts,
     joined,
     parameter_block,
     parameter_rows,
+    some,
     table,
     warned,
 )
@@ -39,8 +39,8 @@ def line(fit: Fit) -> str:
 
     model, m = fit.model, goodness_of_fit(fit.predictions)
     how_well = f"rate fit {m.rate_fit:.1f} %" if isfinite(m.rate_fit) else f"angle fit {m.angle_fit:.1f} %"
-    head = joined(model.axis.value, model.method, listed(model.effects), counted(len(fit.predictions), "run"))
-    return f"{head}: {joined(base_words(model), how_well, counted(len(_warnings(fit)), 'warning'))}"
+    head = joined(model.axis.value, model.method, listed(model.effects), some(len(fit.predictions), "run"))
+    return f"{head}: {joined(base_words(model), how_well, some(len(_warnings(fit)), 'warning'))}"
 
 
 def page(fit: Fit) -> Page:
@@ -57,7 +57,7 @@ def page(fit: Fit) -> Page:
             ("effects", listed(model.effects) or "none"),
             ("runs", listed(model.runs)),
             ("samples", f"{sum(len(r) for r in records)} in {seconds:.1f} s"),
-            ("estimated", counted(len(model.free), "parameter")),
+            ("estimated", some(len(model.free), "parameter")),
             *error_facts(goodness_of_fit(fit.predictions), fit.floor),
             ("whiteness", "" if whiteness is None else p_value(whiteness)),
         ),

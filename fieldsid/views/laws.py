@@ -10,7 +10,7 @@ from fieldsid.display import Figures, Frames, View
 from fieldsid.figures.kinds import sketch
 from fieldsid.page import Block, Page, cut
 from fieldsid.rounding import number, with_error
-from fieldsid.views._words import counted, joined, table, warned
+from fieldsid.views._words import joined, some, table, warned
 
 if TYPE_CHECKING:
     from fieldsid.plant.laws.parameter_law import ParameterLaw, PointCheck
@@ -24,7 +24,7 @@ def line(laws: Laws) -> str:
     kinds = ", ".join(f"{name} {law.chosen}" for name, law in laws.by_name.items())
     exponent = laws.authority.exponent
     says = "" if exponent is None else f"{laws.authority.name} goes with u^{number(exponent.value, 3)}"
-    return f"{laws.axis.value}, {counted(len(laws.points), 'point')}: {joined(kinds, says)}"
+    return f"{laws.axis.value}, {some(len(laws.points), 'point')}: {joined(kinds, says)}"
 
 
 def page(laws: Laws) -> Page:

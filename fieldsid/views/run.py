@@ -8,7 +8,7 @@ from fieldsid.display import Figures, Frames, View
 from fieldsid.figures.kinds import sketch
 from fieldsid.page import Block, Page, cut, facts, listed
 from fieldsid.rounding import number
-from fieldsid.views._words import counted, joined, speed_words, warned
+from fieldsid.views._words import joined, some, speed_words, warned
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def line(run: Run) -> str:
     """Return name, samples, rate, speed and signals."""
     measured = [n for n in run.signals if run.has(n)]
-    words = joined(f"{len(run)} samples", _span(run), speed_words(_speed(run)), counted(len(run.notes), "note"))
+    words = joined(f"{len(run)} samples", _span(run), speed_words(_speed(run)), some(len(run.notes), "note"))
     return f"{cut(run.name, 60)}: {words}; {listed(measured, 5)}"
 
 

@@ -10,7 +10,7 @@ from fieldsid.figures.kinds import sketch
 from fieldsid.page import Block, Page, cut
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import RADIANS, Angles, number, with_error
-from fieldsid.views._words import counted, joined, table, warned
+from fieldsid.views._words import joined, some, table, warned
 
 if TYPE_CHECKING:
     from fieldsid.turning import TurnPrediction
@@ -24,7 +24,7 @@ def line(found: TurnPrediction) -> str:
     radii = f"{'95 % in ' if any(r.band_only for r in found.rows) else ''}{low} .. {high} m"
     span = f"{radii} at {min(speeds):.2f} .. {max(speeds):.2f} m/s"
     trust = ", ".join(dict.fromkeys(r.trust for r in found.rows))
-    more = joined(trust, counted(len(found.measured), "measured circle"), counted(len(found.notes), "warning"))
+    more = joined(trust, some(len(found.measured), "measured circle"), some(len(found.notes), "warning"))
     return f"rudder {found.rudder_max:.4g} rad, {_methods(found)}: radius {span}, {more}"
 
 

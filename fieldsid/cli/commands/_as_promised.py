@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 from fieldsid.cli.console import emit
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted
-from fieldsid.cli.headlines.words import counted
 from fieldsid.cli.voice import angles
 from fieldsid.errors import DataError
-from fieldsid.page import Block, Page
+from fieldsid.page import Block, Page, counted
 from fieldsid.records.keys import body_of
 
 if TYPE_CHECKING:

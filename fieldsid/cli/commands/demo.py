@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from contextlib import contextmanager, nullcontext, redirect_stderr, redirect_stdout
 from pathlib import Path
 from textwrap import fill
 from time import perf_counter
@@ -132,9 +132,11 @@ def _taken(place: int, step: Step, known: Mapping[str, str], session: Session, *
     words = words_of(step.line, known)
     if told == VERBOSE:
         sys.stdout.write(f"\n{place}. {step.title}\n$ sysid {' '.join(words)}\n\n")
+        sys.stdout.flush()
     began = perf_counter()
-    with _aloud() if told == VERBOSE else _silence():
+    with nullcontext() if told == VERBOSE else _silence():
         result = run([*expanded(words), *(["--force"] if force else [])], session)
+    sys.stderr.flush()
     meaning = step.means(result)
     if told == BRIEF:
         said = f"{place:2d}. {step.title}{'' if step.title.endswith('?') else ':'} {step.brief(result)}"
@@ -150,13 +152,6 @@ def _taken(place: int, step: Step, known: Mapping[str, str], session: Session, *
 def _silence() -> Iterator[None]:
     with open(os.devnull, "w", encoding="utf-8") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):  # noqa: PTH123
         yield
-
-
-@contextmanager
-def _aloud() -> Iterator[None]:
-    sys.stdout.flush()
-    yield
-    sys.stderr.flush()
 
 
 def _told(text: str, told: str) -> None:

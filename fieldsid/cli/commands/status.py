@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from fieldsid.cli.console import emit
 from fieldsid.cli.headlines.trial import of_status
-from fieldsid.cli.headlines.words import counted
 from fieldsid.cli.options import JsonFlag, argument
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import stem_of
-from fieldsid.page import Block, Page, Whole, paragraph
+from fieldsid.page import Block, Page, Whole, counted, paragraph
 from fieldsid.records.keys import body_of
 
 if TYPE_CHECKING:

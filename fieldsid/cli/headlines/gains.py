@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, typed_with
-from fieldsid.cli.headlines.words import Body, counted, named
+from fieldsid.cli.headlines.words import Body, named
 from fieldsid.cli.voice import angles
+from fieldsid.page import counted
 from fieldsid.rounding import MANY, number, with_error
 from fieldsid.trial_folder.journal import is_trial
 from fieldsid.views._words import times

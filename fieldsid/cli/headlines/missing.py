@@ -9,9 +9,10 @@ from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import Body, counted, named, used
+from fieldsid.cli.headlines.words import Body, named, used
 from fieldsid.cli.voice import angles
 from fieldsid.comparison.sufficient import is_noise
+from fieldsid.page import counted
 from fieldsid.rounding import MANY, noise_fall, number, times_noise
 
 MODELS = "models"

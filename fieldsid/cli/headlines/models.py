@@ -7,10 +7,12 @@ from math import isfinite
 from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
-from fieldsid.cli.headlines.typed import is_there, pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import MOST_NAMED, Body, counted, named, used
+from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
+from fieldsid.cli.headlines.words import MOST_NAMED, Body, named, used
 from fieldsid.cli.voice import angles
 from fieldsid.comparison.sufficient import is_noise, over_noise, pooled
+from fieldsid.page import counted
+from fieldsid.records.named_inputs import is_there
 from fieldsid.rounding import MANY, noise_fall, number, times_noise
 
 NO_NOISE, WHOLE_FIT = "filtered_sensor", 99.0

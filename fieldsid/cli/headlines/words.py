@@ -13,11 +13,6 @@ USE = {"yaw": ("turn-radius",), "pitch": ("schedule", "design")}
 MOST_NAMED = 3
 
 
-def counted(count: int, word: str, many: str = "") -> str:
-    """Return `1 run`, `2 runs`; `many` is a plural that is no `s` more."""
-    return f"{count} {word if count == 1 else many or f'{word}s'}"
-
-
 def named(names: Sequence[str]) -> str:
     """Return the first few names, and how many more there are."""
     more = len(names) - MOST_NAMED

@@ -30,11 +30,6 @@ def filled(parsed: Parsed, state: Callable[[], FolderState]) -> list[str]:
     return [] if fill is None else fill(parsed, state())
 
 
-def wants(parsed: Parsed) -> bool:
-    """Whether a command takes anything from a trial folder."""
-    return parsed.name in FILLS
-
-
 def _runs(parsed: Parsed, state: FolderState) -> list[str]:
     """Return the folder's runs without those that excite the other plane alone."""
     return [] if parsed.values.get("runs") else _of_plane(parsed, state)

@@ -15,7 +15,7 @@ import typer
 
 from fieldsid.cli.console import said, say
 from fieldsid.cli.exit_codes import BAD_INPUT, DONE, OUR_BUG
-from fieldsid.cli.trial.filled import filled, in_words, left_out, wants
+from fieldsid.cli.trial.filled import filled, in_words, left_out
 from fieldsid.cli.trial.parsed import Parsed, parse
 from fieldsid.errors import FieldsidError
 from fieldsid.records.named_inputs import is_there
@@ -35,7 +35,7 @@ def run_in_trial(arguments: Sequence[str], run: Callable[[Sequence[str]], Any]) 
     if parsed is None or parsed.name in NOT_KEPT:
         return run(arguments)
     folder, state = Path(), cache(_state)
-    added = filled(parsed, state) if wants(parsed) else []
+    added = filled(parsed, state)
     if added:
         others = len(left_out(parsed, state()))
         more = f"; {others} more excite the other plane alone" if others else ""
