@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from glob import glob, has_magic
@@ -18,7 +19,6 @@ from fieldsid.logs.convert.assemble import WHOLE
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
 from fieldsid.logs.importing import runs_under_way
 from fieldsid.logs.reader import neighbours
-from fieldsid.logs.several.run_names import names_apart
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -199,6 +199,14 @@ def _plain(pattern: Path) -> Path:
 
 
 def _apart(runs: Sequence[Run]) -> list[Run]:
-    """Return the runs with names that no two share, as `names_apart` finds them."""
-    names = names_apart([run.name for run in runs], [run.source or Path(run.name) for run in runs])
+    """Put the folder's name before the names that several runs share, and a number behind those that still do."""
+    shared = Counter(run.name for run in runs)
+    names: list[str] = []
+    for run in runs:
+        folder = "" if run.source is None or shared[run.name] == 1 else f"{run.source.resolve().parent.name}_"
+        name, n = f"{folder}{run.name}", 1
+        while name in names:
+            n += 1
+            name = f"{folder}{run.name}_{n}"
+        names.append(name)
     return [run if run.name == name else replace(run, name=name) for run, name in zip(runs, names, strict=True)]
