@@ -14,7 +14,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
 from fieldsid.errors import UsageError
 from fieldsid.page import Page, cut, html_of, text_of
@@ -24,12 +24,15 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 T = TypeVar("T")
+Frames: TypeAlias = "Mapping[str, Callable[[], DataFrame]]"
+Figures: TypeAlias = Mapping[str, Callable[[], Any]]
+"""What makes the tables and the figures of a record, by the names of its parts."""
 LONGEST = 399
 """Characters of a repr: a list of records stays readable."""
 MOST_ITEMS, LONGEST_TEXT = 3, 60
 
 
-def _none(_record: Any) -> Mapping[str, Callable[[], Any]]:
+def _none(_record: Any) -> Figures:
     return {}
 
 
@@ -54,9 +57,9 @@ class View(Generic[T]):
     name: str
     line: Callable[[T], str]
     page: Callable[..., Page]
-    frames: Callable[[T], Mapping[str, Callable[[], DataFrame]]]
+    frames: Callable[[T], Frames]
     label: Callable[[T], str] = str
-    figures: Callable[[T], Mapping[str, Callable[[], Any]]] = _none
+    figures: Callable[[T], Figures] = _none
     read: Callable[[DataFrame, str], T] = _unread
     system: Callable[[T, float | None], Any] = _no_system
 

@@ -19,20 +19,28 @@ LONGEST_WORD = 60
 class Block:
     """One block of a page: its title, the heads of its columns (none where they need none) and its rows, all as words.
 
-    The first `left` columns are words and stand at the left, the others are numbers and stand at the right.
+    The first `left` columns are words and stand at the left, the others are numbers and stand at the right. A terminal
+    keeps what is first in a row in one piece up to `kept` letters, whatever stands beside it: it is a name to be pasted.
     """
 
     title: str
     rows: tuple[tuple[str, ...], ...]
     columns: tuple[str, ...] = ()
     left: int = 1
+    kept: int = 0
+
+
+class Whole(str):
+    """A sentence that a terminal shows as one line however long it is, for it names files or runs."""
+
+    __slots__ = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Page:
     """What a record says: a title, what must be read before any number, blocks and sentences in their order.
 
-    A sentence belongs to what stands before it, unless it begins with an empty line.
+    A sentence belongs to what stands before it, unless it begins with an empty line; those of the closing are whole.
     """
 
     title: str
@@ -46,9 +54,15 @@ def facts(title: str, pairs: Iterable[tuple[str, str]]) -> Block:
     return Block(title, tuple(pair for pair in pairs if pair[1]), left=2)
 
 
-def paragraph(lines: Sequence[str]) -> tuple[str, ...]:
-    """Return sentences that stand together, apart from what stands before them."""
-    return tuple(line if i else f"\n{line}" for i, line in enumerate(lines))
+def paragraph(lines: Sequence[str], kind: type[str] = str) -> tuple[str, ...]:
+    """Return sentences that stand together, apart from what stands before them, each of a kind, such as Whole."""
+    return tuple(kind(line if i else f"\n{line}") for i, line in enumerate(lines))
+
+
+def written(**files: str | Iterable[str] | None) -> tuple[str, ...]:
+    """Return a line for each file that was written, as `figure: history.png`: what it is, and one path or several."""
+    named = ((what, [given] if isinstance(given, str) else given or ()) for what, given in files.items())
+    return tuple(f"{what}: {file}" for what, paths in named for file in paths)
 
 
 def text_of(page: Page) -> str:
@@ -77,6 +91,11 @@ def html_of(page: Page) -> str:
 def told(block: Block | str) -> bool:
     """Whether a block says anything."""
     return bool(block.rows if isinstance(block, Block) else block)
+
+
+def counted(count: int, word: str, many: str = "") -> str:
+    """Return `1 run`, `2 runs`; `many` is a plural that is no `s` more."""
+    return f"{count} {word if count == 1 else many or f'{word}s'}"
 
 
 def cut(text: str, longest: int) -> str:

@@ -107,10 +107,10 @@ def _remarks(parameters: tuple[ParameterChange, ...], apart: tuple[str, ...]) ->
         said = f"{', '.join(apart)} is in the models of one side only: what it takes up there the other's parameters take up"
         notes.append(Note("other_form", f"{said}; identify both with the same effects", {"effects": list(apart)}))
     for p in parameters:
-        changes = [a.change for a in p.speeds if a.p_adjusted < 0.05]
+        changes = [a.change for a in p.speeds if a.is_beyond_errors]
         both_ways = bool(changes) and min(changes) < 0 < max(changes)
         if p.state == CHANGED and changes and (both_ways or len(changes) < len(p.speeds)):
-            where = ", ".join(f"{a.speed:.2f}" for a in p.speeds if a.p_adjusted < 0.05)
+            where = ", ".join(f"{a.speed:.2f}" for a in p.speeds if a.is_beyond_errors)
             notes.append(Note("not_at_every_speed", f"{p.word}: the change is beyond its errors at {where} m/s only", {}))
     return notes
 

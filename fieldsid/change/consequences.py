@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.change.record import Answers, GainChange, RadiusChange
+from fieldsid.change.record import LEVEL, Answers, GainChange, RadiusChange
 from fieldsid.dynamics.free_run import command_record, effects_of, simulate
 from fieldsid.errors import FieldsidError
 from fieldsid.maneuvers import Limits, all_maneuvers
@@ -46,7 +46,7 @@ def gain_changes(
     wish = Wish() if before is None else before.wish
     was = before or design_schedule(old, fin.limit, speeds=speeds, wish=wish, limits=fin.stated)
     now = design_schedule(new, fin.limit, speeds=speeds, wish=wish, limits=fin.stated)
-    level = 0.05 / len(speeds)  # the speeds are asked together
+    level = LEVEL / len(speeds)  # the speeds are asked together
     return tuple(_gain(old, new, was.at(s), now.at(s), fin, level) for s in speeds)
 
 

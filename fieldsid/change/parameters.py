@@ -12,6 +12,7 @@ from fieldsid.change.estimates import Known, known_at, shared_values
 from fieldsid.change.holm import adjusted
 from fieldsid.change.record import (
     CHANGED,
+    LEVEL,
     TRIM_ANGLE,
     TRIM_MATTERS_RAD,
     UNCHANGED,
@@ -23,7 +24,6 @@ from fieldsid.models.axis import NAMES
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.parameter_source import ParameterSource
 
-LEVEL = 0.05
 MATTERS = 0.10
 """Share of a parameter below which a change does not matter: a tenth of the gain moves the damping ratio by a twentieth, and a
 step's overshoot at damping 0.7 by less than two hundredths."""

@@ -18,6 +18,8 @@ TRIM_ANGLE = "trim_angle"
 """The fin angle that the trim moment amounts to, rad: at one speed and another the same where the fin is bent."""
 TRIM_MATTERS_RAD = 0.0087
 """Half a degree of fin: what a fin is bent by on deck and nobody sees."""
+LEVEL = 0.05
+"""p-value below which a change is beyond its errors."""
 CHANGED, UNCHANGED, UNCLEAR = "changed", "unchanged", "unclear"
 VERDICTS: Mapping[str, str] = {
     "needed": "new gains needed",
@@ -40,6 +42,11 @@ class AtSpeed(Brief):
     change: Annotated[float, Key("The change, as a share of the value before where `is_relative`.")]
     std_error: Annotated[float, Key("The standard error of the change.")]
     p_adjusted: Annotated[Number, Key("The p-value of no change, by Holm over all tests; null where no error is known.")]
+
+    @property
+    def is_beyond_errors(self) -> bool:
+        """Whether the change is beyond its errors, all tests together wrong in one comparison of twenty."""
+        return self.p_adjusted < LEVEL
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -106,13 +106,15 @@ def run(arguments: Sequence[str], session: Session | None = None) -> Any:
 
     program, words, name = program_of(arguments)
     from fieldsid.cli.headlines.typed import remember
+    from fieldsid.cli.session import part_of
     from fieldsid.cli.user_effects import load_own_effects
 
     remember(arguments)
     if "--help" not in arguments:
         load_own_effects()
     try:
-        result = program(words, prog_name=name, standalone_mode=False, obj=session)
+        with part_of(session):
+            result = program(words, prog_name=name, standalone_mode=False)
     except SystemExit as end:
         if isinstance(end.__context__, BrokenPipeError):  # typer makes an exit of it
             raise end.__context__ from None

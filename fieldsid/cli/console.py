@@ -10,11 +10,12 @@ import json
 import sys
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from copy import copy
 from functools import partial
 from typing import Any, TypeVar
 
-from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
+from rich.console import Console, ConsoleOptions, Group, JustifyMethod, RenderableType, RenderResult
 from rich.measure import Measurement
 from rich.progress import BarColumn, Progress, ProgressColumn, TaskID, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.segment import Segment
@@ -25,12 +26,13 @@ from fieldsid.artifacts import plain
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.voice import voice
 from fieldsid.logs.run import Note
-from fieldsid.page import Block, Page, told
+from fieldsid.page import Block, Page, Whole, told
 from fieldsid.records.keys import body_of
 from fieldsid.text.one_line import one_line
 
 T = TypeVar("T")
 WIDTH = 80
+_SAID: ContextVar[str] = ContextVar("said", default="")
 NARROW, FAR, LEAST_WORDS = 60, 1000, 12
 """Columns of a terminal below which a table that does not fit is shown row by row, those in which any table fits, and those
 that a column of words is folded down to."""
@@ -69,17 +71,19 @@ def emit(
     body: Mapping[str, Any],
     *,
     as_json: bool,
-    render: Callable[[Console], None],
+    render: Page | Callable[[Console], None],
     headline: Headline | None = None,
     notes: Iterable[Note] = (),
     is_file: bool = False,
 ) -> Mapping[str, Any]:
     """Print a result and return its body: as one JSON object, or for a reader.
 
-    A reader gets the headline, then the notes as warnings, then what `render` prints; where it is to be quiet, the headline
-    alone. Only what is no result, as a page of the guide, has no headline. Where what `render` prints `is_file`, to be redirected
-    to one, the headline goes to stderr, and the file is what is left where it is to be quiet.
+    A reader gets the headline, then the notes as warnings, then the page that `render` is, or what it prints; where it is to be
+    quiet, the headline alone. Only what is no result, as a page of the guide, has no headline. Where what `render` prints
+    `is_file`, to be redirected to one, the headline goes to stderr, and the file is what is left where it is to be quiet.
     """
+    if headline is not None:
+        _SAID.set(headline.says)
     whole = body if headline is None else {**body, "headline": body_of(headline)}
     if as_json:
         sys.stdout.write(json.dumps(plain(whole), allow_nan=False) + "\n")
@@ -96,8 +100,18 @@ def emit(
         to.print()
         for rest in headline.rest:
             to.print(f"... {rest}", soft_wrap=True)
-    render(to)
+    if isinstance(render, Page):
+        print_page(to, render)
+    else:
+        render(to)
     return whole
+
+
+def said() -> str:
+    """Return the verdict of the last result, and forget it."""
+    verdict = _SAID.get()
+    _SAID.set("")
+    return verdict
 
 
 def print_headline(to: Console, headline: Headline) -> None:
@@ -122,9 +136,11 @@ def print_page(to: Console, page: Page) -> None:
         if i and (isinstance(block, Block) or block.startswith("\n")):
             to.print()
         if isinstance(block, Block):
-            to.print(table(block.title, block.columns, block.rows, left=block.left))
+            to.print(table(block))
         else:
-            to.print(block.removeprefix("\n"))
+            to.print(block.removeprefix("\n"), soft_wrap=isinstance(block, Whole))
+    for line in page.closing:
+        to.print(line, soft_wrap=True)
 
 
 class Rows(Table):
@@ -156,28 +172,30 @@ class Rows(Table):
             yield ""
 
 
-def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[RenderableType]], *, left: int = 1) -> Table:
-    """Return a table whose first `left` columns are words; those behind them are to the right, and whole if of numbers."""
+def table(block: Block) -> Table:
+    """Return the table of a block: its columns behind those of words are to the right, and whole if of numbers."""
     made = Rows(
-        title=title or None,
+        title=block.title or None,
         title_justify="left",
         title_style="bold",
         box=None,
         pad_edge=False,
         padding=(0, 2, 0, 0),
-        show_header=any(columns),
+        show_header=any(block.columns),
     )
-    rows = list(rows)
-    for i, column in enumerate(columns):
-        whole = i >= left and any(_is_number(cell) for row in rows for cell in row[i : i + 1])
-        made.add_column(column, justify="left" if i < left else "right", header_style="dim", overflow="fold", no_wrap=whole)
-    for row in rows:
+    for i, column in enumerate(block.columns or [""] * len(block.rows[0])):
+        whole = i >= block.left and any(_is_number(cell) for row in block.rows for cell in row[i : i + 1])
+        side: JustifyMethod = "left" if i < block.left else "right"
+        made.add_column(column, justify=side, header_style="dim", overflow="fold", no_wrap=whole)
+    if block.kept:
+        made.columns[0].width = min(max(len(row[0]) for row in block.rows), block.kept)
+    for row in block.rows:
         made.add_row(*row)
     return made
 
 
-def _is_number(cell: RenderableType) -> bool:
-    return str(cell).lstrip("+-<>=~.")[:1].isdigit()
+def _is_number(cell: str) -> bool:
+    return cell.lstrip("+-<>=~.")[:1].isdigit()
 
 
 def say(text: str) -> None:

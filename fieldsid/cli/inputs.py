@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fieldsid.errors import FieldsidError, UsageError
 from fieldsid.runtime.pickling import dumps, loads
@@ -19,31 +19,18 @@ if TYPE_CHECKING:
     from fieldsid.logs.channels import ChannelMap
     from fieldsid.logs.run import Run
     from fieldsid.logs.several.sifting import Refused
-    from fieldsid.models.axis import Axis
+    from fieldsid.models.model import Model
 
 STDIN = Path("-")
+AXIS_OPTION = "`--axis {axis}`"
+"""How an axis is stated on a command line."""
 READING = ("pandas", "pyarrow")
 """Libraries whose import takes most of the time of reading the first log; once they are loaded, a worker saves nothing."""
 
 
-def read_runs(
-    paths: Sequence[Path],
-    *,
-    mapping: Path | None = None,
-    start: float | None = None,
-    end: float | None = None,
-    check: Callable[[], None] = lambda: None,
-    meanwhile: Callable[[], None] | None = None,
-    refused: Refused[Path] | None = None,
-) -> list[Run]:
-    """Return the runs of the files, each with a name of its own, cut to `start` .. `end` s where given.
-
-    check validates all other arguments; its errors come before those of a file. meanwhile is what this process does while a
-    forked worker reads the files, where it can be forked and has not read any before. refused is called with each of several
-    files that cannot be read, and the error; without it, and where no file can be read, raises LogError, MappingError, and
-    DataError where the cut leaves nothing. Raises UsageError where two files hold the same data.
-    """
-    (runs,) = read_groups([paths], mapping=mapping, start=start, end=end, check=check, meanwhile=meanwhile, refused=refused)
+def read_runs(paths: Sequence[Path], **how: Any) -> list[Run]:
+    """Return the runs of files as `read_groups` does, of which they are the only group."""
+    (runs,) = read_groups([paths], **how)
     return runs
 
 
@@ -57,7 +44,13 @@ def read_groups(
     meanwhile: Callable[[], None] | None = None,
     refused: Refused[Path] | None = None,
 ) -> list[list[Run]]:
-    """Return the runs of several groups of files, each with a name no other has; as `read_runs` does, for each group."""
+    """Return the runs of each group of files, each with a name no other has, cut to `start` .. `end` s where given.
+
+    check validates all other arguments; its errors come before those of a file. meanwhile is what this process does while a
+    forked worker reads the files, where it can be forked and has not read any before. refused is called with each of several
+    files that cannot be read, and the error; without it, and where no file of a group can be read, raises LogError, MappingError,
+    and DataError where the cut leaves nothing. Raises UsageError where two files hold the same data.
+    """
     from fieldsid.logs.several.run_names import refuse_twice
     from fieldsid.logs.several.sifting import attempt, sifted
 
@@ -95,14 +88,6 @@ def _apart(runs: Sequence[Run], used: Sequence[Path], paths: Sequence[Path]) -> 
 
     own = dict(zip(paths, names_apart([stem_of(path) for path in paths], paths), strict=True))
     return [replace(run, name=own[path]) for run, path in zip(runs, used, strict=True)]
-
-
-def axis_excited(runs: Sequence[Run]) -> Axis:
-    """Return the axis that runs excite; raises what `excited_axis` does."""
-    from fieldsid.logs.segments import excited_axis
-    from fieldsid.models.axis import Axis
-
-    return Axis(excited_axis(runs, written="`--axis {axis}`"))
 
 
 def read_run(path: Path, *, mapping: Path | None = None) -> Run:
@@ -187,3 +172,20 @@ def _read_in_worker(
         meanwhile()
         answer = worker.answer()
     return None if answer is None else loads(answer)
+
+
+def fitted_to(path: Path, model: Model, runs: Iterable[Run]) -> frozenset[str]:
+    """Return the names of the runs that the model of a file was fitted to, without those whose log is only called the same.
+
+    By their hashes. Where the model's own log is gone, or of another format, its name is all there is to go by.
+    """
+    from fieldsid.logs.several.run_names import stem_of
+    from fieldsid.records.named_inputs import inputs_of, sha256_of, sha256_of_named
+
+    own = {(stem_of(p), p.suffix): p for p in inputs_of(path)}
+    pairs = [(r.name, r.source, own.get((stem_of(r.source), r.source.suffix))) for r in runs if r.source is not None]
+    return frozenset(model.runs) - frozenset(
+        name
+        for name, here, there in pairs
+        if there is not None and here.is_file() and there.is_file() and sha256_of(here) != sha256_of_named(there)
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -13,95 +13,55 @@ READ, LIMITS, WRITTEN, ANSWER = "What is read", "Limits", "What is written", "Ho
 GROUPS = ("Arguments", "Options", READ, LIMITS, WRITTEN, ANSWER)
 """The groups of options on a command's page of help, in their order; what a command alone has may have groups of its own."""
 
+
+def argument(metavar: str, says: str) -> Any:
+    """Return an argument: what stands for it on the page of help, and what it is."""
+    return typer.Argument(metavar=metavar, help=says)
+
+
+def option(names: str, metavar: str, says: str, group: str | None = None, **bounds: float) -> Any:
+    """Return an option: its names, what stands for its value, what it does, its group, and the bounds `min` and `max`."""
+    return typer.Option(*names.split(), metavar=metavar or None, help=says, rich_help_panel=group, **bounds)  # type: ignore[arg-type]
+
+
+def flag(names: str, says: str, group: str | None = None) -> Any:
+    """Return an option that takes no value."""
+    return option(names, "", says, group)
+
+
 RunFiles = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="RUN...", help="Runs or log files: .parquet, .csv, .csv.gz, a bag; `-` reads CSV from standard input."
-    ),
+    list[Path], argument("RUN...", "Runs or log files: .parquet, .csv, .csv.gz, a bag; `-` reads CSV from standard input.")
 ]
 LogAndTables = Annotated[
     list[Path],
-    typer.Argument(
-        metavar="LOG",
-        help="A log: CSV, Parquet, ROS 1 or ROS 2 bag, a folder of the tables of one run; with `--join` its tables.",
-    ),
+    argument("LOG", "A log: CSV, Parquet, ROS 1 or ROS 2 bag, a folder of the tables of one run; with `--join` its tables."),
 ]
-ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="A model file written by `sysid identify` or `sysid extend`.")]
-ModelFiles = Annotated[list[Path], typer.Argument(metavar="MODEL...", help="Model files, or one table of parameters over speed.")]
-ValidateRuns = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--validate", metavar="RUN", help="A run the fit does not see; may repeat.", show_default=False, rich_help_panel=READ
-    ),
-]
-AxisOption = Annotated[Axis, typer.Option("--axis", help="The plane to identify.")]
+ModelFile = Annotated[Path, argument("MODEL", "A model file written by `sysid identify` or `sysid extend`.")]
+ModelFiles = Annotated[list[Path], argument("MODEL...", "Model files, or one table of parameters over speed.")]
+ValidateRuns = Annotated[list[Path] | None, option("--validate", "RUN", "A run the fit does not see; may repeat.", READ)]
+AxisOption = Annotated[Axis, option("--axis", "", "The plane to identify.")]
 ExcitedAxis = Annotated[
-    Axis | None,
-    typer.Option("--axis", help="The plane to identify; may be left out where the runs excite one alone.", show_default=False),
+    Axis | None, option("--axis", "", "The plane to identify; may be left out where the runs excite one alone.")
 ]
-Join = Annotated[
-    bool,
-    typer.Option("--join", help="The logs are the tables of one run, each on stamps of its own.", rich_help_panel=READ),
-]
-MappingFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--mapping", "-m", metavar="YAML", help="Which column or topic is which signal.", show_default=False, rich_help_panel=READ
-    ),
-]
-VehicleFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--vehicle", metavar="YAML", help="The vehicle's description and limits.", show_default=False, rich_help_panel=READ
-    ),
-]
-EffectNames = Annotated[
-    str | None,
-    typer.Option("--effects", metavar="A,B", help="Effects in the model: see `sysid effects list`.", show_default=False),
-]
-FigureFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--figure",
-        metavar="FILE",
-        help="Draw a figure: .png, .svg or .pdf, by the suffix.",
-        show_default=False,
-        rich_help_panel=WRITTEN,
-    ),
-]
-FromS = Annotated[
-    float | None,
-    typer.Option("--from", metavar="S", help="Use samples from this time on.", show_default=False, rich_help_panel=READ),
-]
-ToS = Annotated[
-    float | None, typer.Option("--to", metavar="S", help="Use samples up to this time.", show_default=False, rich_help_panel=READ)
-]
-OutputDir = Annotated[
-    Path | None,
-    typer.Option(
-        "-o", "--output", metavar="DIR", help="Folder for what is written.", show_default=False, rich_help_panel=WRITTEN
-    ),
-]
+Join = Annotated[bool, flag("--join", "The logs are the tables of one run, each on stamps of its own.", READ)]
+MappingFile = Annotated[Path | None, option("--mapping -m", "YAML", "Which column or topic is which signal.", READ)]
+VehicleFile = Annotated[Path | None, option("--vehicle", "YAML", "The vehicle's description and limits.", READ)]
+Method = Annotated[str, option("--method", "NAME", "auto, output_error, pem, svf_ls, svf_rls or srivc.")]
+Bandwidth = Annotated[float, option("--lambda", "RAD_S", "Bandwidth of the state-variable filter.", min=0.01)]
+OwnLaw = Annotated[list[str] | None, option("--law", "NAME=c0[,c1]", "A law of your own, c0 + c1 u^2, as `b2=-0.23,-0.33`.")]
+MsgPath = Annotated[Path | None, option("--msg-path", "DIR", "Folder of .msg files for types the bag does not define.")]
+EffectNames = Annotated[str | None, option("--effects", "A,B", "Effects in the model: see `sysid effects list`.")]
+FigureFile = Annotated[Path | None, option("--figure", "FILE", "Draw a figure: .png, .svg or .pdf, by the suffix.", WRITTEN)]
+FromS = Annotated[float | None, option("--from", "S", "Use samples from this time on.", READ)]
+ToS = Annotated[float | None, option("--to", "S", "Use samples up to this time.", READ)]
+OutputDir = Annotated[Path | None, option("-o --output", "DIR", "Folder for what is written.", WRITTEN)]
 FigurePlace = Annotated[
-    Path | None,
-    typer.Option(
-        "-o",
-        "--output",
-        metavar="PLACE",
-        help="Folder for the figures, or the name of one: .png, .svg or .pdf.",
-        show_default=False,
-        rich_help_panel=WRITTEN,
-    ),
+    Path | None, option("-o --output", "PLACE", "Folder for the figures, or the name of one: .png, .svg or .pdf.", WRITTEN)
 ]
-OutputFile = Annotated[
-    Path | None,
-    typer.Option("-o", "--output", metavar="FILE", help="File to write.", show_default=False, rich_help_panel=WRITTEN),
-]
-Force = Annotated[bool, typer.Option("--force", help="Replace files that exist.", rich_help_panel=WRITTEN)]
-JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.", rich_help_panel=ANSWER)]
-Figures = Annotated[
-    bool, typer.Option("--figures/--no-figures", help="Draw figures next to the files that are written.", rich_help_panel=WRITTEN)
-]
+OutputFile = Annotated[Path | None, option("-o --output", "FILE", "File to write.", WRITTEN)]
+Force = Annotated[bool, flag("--force", "Replace files that exist.", WRITTEN)]
+JsonFlag = Annotated[bool, flag("--json", "Print one JSON object instead of text.", ANSWER)]
+Figures = Annotated[bool, flag("--figures/--no-figures", "Draw figures next to the files that are written.", WRITTEN)]
 
 
 def names_of(text: str | None) -> tuple[str, ...]:

@@ -9,12 +9,11 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
 
-import typer
 from rich.live import Live
 
 from fieldsid.artifacts import check_output
 from fieldsid.cli.console import messages, say, shows_progress
-from fieldsid.cli.session import session_of
+from fieldsid.cli.session import session
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
@@ -95,16 +94,15 @@ def _now_and_then(says: str, show: Callable[[str], None], clock: Callable[[], fl
 
 
 @contextmanager
-def compiling(context: typer.Context, *besides: Callable[[], None]) -> Iterator[Warmup]:
+def compiling(*besides: Callable[[], None]) -> Iterator[Warmup]:
     """Compile the kernels in a forked worker while the context runs, the first time on a machine; a terminal shows that.
 
     Yields the warm-up, that of the command's session where it is part of one; see `fitting.jit_warmup.warming_up`.
     """
     from fieldsid.fitting.jit_warmup import warming_up
 
-    session = session_of(context)
-    if session is not None:
-        yield session.warmup
+    if (shared := session()) is not None:
+        yield shared.warmup
         return
     console = messages()
     with warming_up(lambda text: console.print(text) if shows_progress(console) else None, besides) as warmup:
@@ -112,9 +110,9 @@ def compiling(context: typer.Context, *besides: Callable[[], None]) -> Iterator[
 
 
 @contextmanager
-def compiling_first(context: typer.Context) -> Iterator[None]:
+def compiling_first() -> Iterator[None]:
     """Compile the kernels on two cores before the context runs, the first time on a machine."""
-    with compiling(context) as warmup:
+    with compiling() as warmup:
         warmup.compile_now()
         yield
 

@@ -59,18 +59,3 @@ def command_first(arguments: Sequence[str]) -> list[str]:
 def angles() -> Angles:
     """Return the unit that angles are shown in."""
     return IN_DEGREES if voice().is_in_degrees else RADIANS
-
-
-def shown_in(unit: str) -> tuple[float, str]:
-    """Return what a number in a unit is multiplied by to be shown, and the unit it is then in."""
-    return angles().of(unit)
-
-
-def shown_estimate(value: float, std_error: float, interval95: Sequence[float], unit: str) -> tuple[str, str, str]:
-    """Return an estimate as the cells of a table: value with its error, unit, 95 % interval."""
-    return angles().estimate(value, std_error, interval95, unit)
-
-
-def shown_words(text: str) -> str:
-    """Return a sentence with the angles in it as they are shown."""
-    return angles().words(text)

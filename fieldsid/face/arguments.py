@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from os import PathLike
 from pathlib import Path
@@ -40,16 +41,16 @@ def axis_of(axis: Axis | str | None) -> Axis | None:
     return Axis(axis)
 
 
-def axis_excited(runs: Sequence[Run]) -> Axis:
-    """Return the axis that runs excite; raises what `excited_axis` does."""
+def axis_excited(runs: Sequence[Run], written: str = '`axis="{axis}"`') -> Axis:
+    """Return the axis that runs excite; written: how one is stated. Raises what `excited_axis` does."""
     from fieldsid.logs.segments import excited_axis
 
-    return Axis(excited_axis(runs, written='`axis="{axis}"`'))
+    return Axis(excited_axis(runs, written=written))
 
 
 def names_of(names: str | Iterable[str]) -> tuple[str, ...]:
     """Return names given one by one, or as the command line takes them: `a,b` or `a+b`."""
-    parts = names.replace("+", ",").split(",") if isinstance(names, str) else names
+    parts = re.split(r"[,+\s]+", names) if isinstance(names, str) else names
     return tuple(n.strip() for n in parts if n.strip())
 
 
@@ -60,16 +61,19 @@ def vehicle_of(vehicle: Vehicle | File | None) -> Vehicle | None:
     return find_vehicle(Path()) if vehicle is None else load_vehicle(Path(vehicle))
 
 
-def length_of(vehicle: Vehicle | File | None) -> float | None:
-    """Return the length in m of a vehicle as `vehicle_of` finds it, None where it is not stated; raises VehicleError."""
-    known = vehicle_of(vehicle)
-    return None if known is None else known.length_m
+def length_of(vehicle: Vehicle | None) -> float | None:
+    """Return the length of a vehicle in m, None where it is not stated."""
+    return None if vehicle is None else vehicle.length_m
 
 
-def fins_of(vehicle: Vehicle | File | None, axis: Axis) -> PlaneFins | None:
-    """Return the fins that an axis' command is made of, of a vehicle as `vehicle_of` finds it; None where it is one."""
-    known = vehicle_of(vehicle)
-    return None if known is None or known.fins is None else known.fins.of(axis.value)
+def fin_rate_of(vehicle: Vehicle | None) -> float | None:
+    """Return the fastest that the fins of a vehicle turn in rad/s, None where it is not stated."""
+    return None if vehicle is None else vehicle.fin_rate_rad_s
+
+
+def fins_of(vehicle: Vehicle | None, axis: Axis) -> PlaneFins | None:
+    """Return the fins that an axis' command is made of; None where it is one."""
+    return None if vehicle is None or vehicle.fins is None else vehicle.fins.of(axis.value)
 
 
 def signal_limits(vehicle: Vehicle | None) -> dict[str, float]:
@@ -77,36 +81,18 @@ def signal_limits(vehicle: Vehicle | None) -> dict[str, float]:
     return {} if vehicle is None else vehicle.signal_limits
 
 
-def rudder_of(vehicle: Vehicle | None, source: ParameterSource, say: Callable[[str], None]) -> float:
-    """Return the rudder of a turn in rad where none is given: the vehicle's limit, or the largest the models were trained on.
+def fin_limit_of(vehicle: Vehicle | None, source: ParameterSource, say: Callable[[str], None], fin: str = "fin limit") -> float:
+    """Return the largest angle of the fin in rad where none is given: the vehicle's limit, or that of the models' runs.
 
-    say is called with the last. Raises UsageError where there is none.
+    say is called with the last, and what the `fin` is called. Raises UsageError where there is none.
     """
-    if vehicle is not None and vehicle.rudder_max_rad is not None:
-        return vehicle.rudder_max_rad
-    trained = _trained(source)
-    if trained is not None:
-        say(f"rudder: {trained:.4g} rad, the largest in the models' runs; `--fin-max` takes another")
-        return trained
-    raise UsageError(
-        "how far does the rudder go in the turn", found="no --fin-max and no vehicle.yaml", hint="add `--fin-max 0.26`"
-    )
-
-
-def fin_limits_of(
-    given: float | None, fin_rate: float | None, vehicle: Vehicle | None, source: ParameterSource, say: Callable[[str], None]
-) -> tuple[float, float | None]:
-    """Return the limit of the fin (rad), given or found as `rudder_of` does, and of its rate (rad/s), given or the vehicle's."""
-    rate = fin_rate if fin_rate is not None or vehicle is None else vehicle.fin_rate_rad_s
-    if given is not None:
-        return given, rate
     if vehicle is not None and (limit := vehicle.fin_max_rad(source.axis.value)) is not None:
-        return limit, rate
-    trained = _trained(source)
-    if trained is not None:
-        say(f"fin limit: {trained:.4g} rad, the largest in the models' runs; `--fin-max` takes another")
-        return trained, rate
-    raise UsageError("how far does the fin go", found="no --fin-max and no vehicle.yaml", hint="add `--fin-max 0.26`")
+        return limit
+    fins: Sequence[float] = [m.trained["fin_max"] for m in source.models if m.trained.get("fin_max", 0.0) > 0]
+    if not fins:
+        raise UsageError("how far does the fin go", found="no --fin-max and no vehicle.yaml", hint="add `--fin-max 0.26`")
+    say(f"{fin}: {max(fins):.4g} rad, the largest in the models' runs; `--fin-max` takes another")
+    return max(fins)
 
 
 def run_files(source: ParameterSource, say: Callable[[str], None]) -> list[Path]:
@@ -153,8 +139,3 @@ def designed_from(schedule: Schedule, name: str) -> list[Path]:
             hint=f"name them: `sysid schedule verify {name} --model MODEL`",
         )
     return [p for _, p in named if p is not None]
-
-
-def _trained(source: ParameterSource) -> float | None:
-    fins: Sequence[float] = [m.trained["fin_max"] for m in source.models if m.trained.get("fin_max", 0.0) > 0]
-    return max(fins, default=None)

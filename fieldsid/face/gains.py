@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 from fieldsid.face.arguments import (
     File,
     designed_from,
-    fin_limits_of,
+    fin_limit_of,
+    fin_rate_of,
     fins_of,
     length_of,
     own_effects,
-    rudder_of,
     run_files,
     runs_behind,
     vehicle_of,
@@ -71,7 +71,7 @@ def turn_radius(
     return radius_over_speed(
         source,
         speeds_of(speeds) or source.knots,
-        rudder_of(known, source, _say) if rudder_max is None else rudder_max,
+        fin_limit_of(known, source, _say, "rudder") if rudder_max is None else rudder_max,
         runs=runs_mapped(run_files(source, _say) if runs is None else runs, mapping),
         measured=runs_mapped(measured, mapping),
         method=method,
@@ -117,13 +117,12 @@ def design_schedule(
 
     own_effects()
     source, known = source_of(models, law), vehicle_of(vehicle)
-    limit, rate = fin_limits_of(fin_limit, fin_rate, known, source, _say)
     return design(
         source,
-        limit,
+        fin_limit_of(known, source, _say) if fin_limit is None else fin_limit,
         speeds=speeds_of(speeds),
         wish=Wish(controller or usual_controller(source), damping, phase_margin, step, bandwidth, settling, overshoot, fin_use),
-        limits=FinLimits(fin_lag, delay, rate, latency),
+        limits=FinLimits(fin_lag, delay, fin_rate_of(known) if fin_rate is None else fin_rate, latency),
         depth=depth,
         runs=runs_behind(source, _say),
         length=length_of(known),

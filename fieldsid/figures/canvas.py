@@ -7,7 +7,6 @@ call leaves a notebook's own settings as they are.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 
@@ -46,10 +45,12 @@ class Sheet(Figure):
         return out.getvalue()
 
 
-def sheet(width: float = 9.0, height: float = 7.0) -> Figure:
-    """Return an empty figure of a size in inches, with a canvas of its own."""
+def sheet(width: float = 9.0, height: float = 7.0, title: str = "") -> Figure:
+    """Return an empty figure of a size in inches, with a canvas of its own and a title at the left."""
     figure = Sheet(figsize=(width, height), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
+    if title:
+        figure.suptitle(title, x=0.01, ha="left", fontsize=11, parse_math=False)
     return figure
 
 
@@ -121,10 +122,3 @@ def _draw(figure: Figure, path: Path, *, force: bool) -> None:
     kind = kind_of(path)
     with replacing(path, force=force) as temporary, rc_context({"svg.hashsalt": TOOL}):  # else an SVG's ids are drawn at random
         figure.savefig(temporary, format=kind, metadata=dict(KINDS[kind]))
-
-
-def one(draw: Callable[[Axes], None], path: Path, *, width: float = 8.0, height: float = 5.0, force: bool = False) -> Path:
-    """Draw one plot on a sheet of its own and save it; raises ArtifactError."""
-    figure = sheet(width, height)
-    draw(figure.add_subplot())
-    return save(figure, path, force=force)

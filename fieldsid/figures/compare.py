@@ -19,13 +19,12 @@ TITLE_WIDTH = 44
 
 def figure(found: Comparison, model: Model, name: str) -> Figure:
     """Return a sheet with the four panels of the motion, and at the right where the error of each failing channel falls."""
-    sheet = canvas.sheet(13.0, 8.2)
     failing = found.failing
-    halves = sheet.subfigures(1, 2 if failing else 1, squeeze=False, width_ratios=(1.75, 1.0) if failing else None)
     effects = f" with {', '.join(model.effects)}" if model.effects else ""
     title = f"{name}{effects} on {found.run}, {model.axis.value}"
     shaded = f"shaded: the worst stretches of the {failing[0].name}" if failing else "down to the noise"
-    sheet.suptitle(f"{title}\n{facts(found)}; {shaded}", x=0.01, ha="left", fontsize=11)
+    sheet = canvas.sheet(13.0, 8.2, f"{title}\n{facts(found)}; {shaded}")
+    halves = sheet.subfigures(1, 2 if failing else 1, squeeze=False, width_ratios=(1.75, 1.0) if failing else None)
     left = halves[0, 0]
     axes = left.subplots(4, 1, sharex=True, height_ratios=(1.25, 1.25, 0.9, 1.0))
     motion.draw(view_of(found), list(axes))

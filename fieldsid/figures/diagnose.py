@@ -43,12 +43,11 @@ class Bar:
 
 def figure(found: Diagnosis) -> Figure:
     """Return a sheet with the candidates at the left and where the model fails at the right."""
-    sheet = canvas.sheet(13.0, 6.4)
-    left, *right = sheet.subplots(1, 2 if found.where else 1, squeeze=False, width_ratios=(1.25, 1.0) if found.where else None)[0]
     chances = [c.probability for c in found.candidates]
     sure = f", probability {probability(chances[0])}" if found.effects and chances[0] == max(chances) else ""
     says = f"{found.axis.value}, {found.verdict}: {found.says}{sure}"
-    sheet.suptitle(fill(says, TITLE_WIDTH), x=0.01, ha="left", fontsize=11)
+    sheet = canvas.sheet(13.0, 6.4, fill(says, TITLE_WIDTH))
+    left, *right = sheet.subplots(1, 2 if found.where else 1, squeeze=False, width_ratios=(1.25, 1.0) if found.where else None)[0]
     draw(bars_of(found), left, noiseless=found.noiseless)
     for ax in right:
         where.draw(found.where[:MOST_BARS], ax)

@@ -39,8 +39,7 @@ def fall_figure(gains: Sequence[Gain], before: Sequence[str], name: str) -> Figu
     labels = [folded(", ".join(before) or "plain model")]
     labels += [folded(" ".join(f"+{n}" for n in gain.added)) for gain in gains]
     channels = [(c, falls) for c in ("rate", "angle") if (falls := falls_of(gains, c))]
-    sheet = canvas.sheet(max(8.0, 1.6 + 2.6 * len(labels)), 5.2)
-    sheet.suptitle(f"{name}: {summary(gains)}", x=0.01, ha="left", fontsize=11)
+    sheet = canvas.sheet(max(8.0, 1.6 + 2.6 * len(labels)), 5.2, f"{name}: {summary(gains)}")
     axes = sheet.subplots(1, len(channels), squeeze=False)[0]
     for ax, (channel, falls) in zip(axes, channels, strict=True):
         unit = "deg/s" if channel == "rate" else "deg"

@@ -1,10 +1,12 @@
-"""The kinds of files a figure is written as, by the suffix. It imports nothing heavy: a command checks before its work."""
+"""The kinds of files a figure is written as, by the suffix, and figures by their names. It imports nothing heavy."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from fieldsid.errors import UsageError
 
@@ -17,6 +19,11 @@ KINDS: Mapping[str, Mapping[str, str | None]] = MappingProxyType(
     }
 )
 """What each kind says of itself; no date, so that the same figure is the same file."""
+
+
+def sketch(module: str, *of: Any, draw: str = "figure") -> Callable[[], Any]:
+    """Return what draws a figure by a module of `fieldsid.figures`, which is loaded, matplotlib too, when it is drawn."""
+    return lambda: getattr(import_module(f"fieldsid.figures.{module}"), draw)(*of)
 
 
 def is_figure(path: Path) -> bool:

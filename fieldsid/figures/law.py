@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from textwrap import fill
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -51,7 +53,7 @@ def draw_authority(law: ParameterLaw, ax: Axes) -> None:
     _points(ax, law, law.speeds**2, law.values)
     words = law.exponent.says if law.exponent else ""
     canvas.dress(ax, x="u², m²/s²", y=f"|{law.name}|, {UNITS[law.name]}")
-    ax.set_title(_wrapped(f"|{law.name}| ~ {words}" if words else f"|{law.name}|", 66), loc="left", fontsize=10)
+    ax.set_title(fill(f"|{law.name}| ~ {words}" if words else f"|{law.name}|", 66), loc="left", fontsize=10)
     ax.set_xlim(left=0.0)
     top = float(law.values.max())
     ax.set_ylim(0.0, 1.3 * top)
@@ -77,14 +79,3 @@ def _points(ax: Axes, law: ParameterLaw, x: np.ndarray, y: np.ndarray) -> None:
         ax.plot(
             x[odd], y[odd], "o", markersize=13, markerfacecolor="none", markeredgecolor="red", zorder=6, label="does not belong"
         )
-
-
-def _wrapped(text: str, width: int) -> str:
-    lines, line = [], ""
-    for word in text.split():
-        if line and len(line) + 1 + len(word) > width:
-            lines.append(line)
-            line = word
-        else:
-            line = f"{line} {word}".strip()
-    return "\n".join([*lines, line])

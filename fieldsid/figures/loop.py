@@ -20,8 +20,7 @@ MOST_BARS, TITLE_WIDTH = 8, 120
 
 def figure(found: Loop) -> Figure:
     """Return a sheet of four panels, read by rows: fails, where; with what was named, and the error after each step."""
-    sheet = canvas.sheet(13.0, 8.4)
-    sheet.suptitle(fill(headline(found), TITLE_WIDTH), x=0.01, ha="left", fontsize=11)
+    sheet = canvas.sheet(13.0, 8.4, fill(headline(found), TITLE_WIDTH))
     (top, places), (bottom, fall) = sheet.subplots(2, 2, width_ratios=(1.5, 1.0))
     draw_motion(found, top, [(found.start, found.before, canvas.SECOND)])
     top.set_title(f"1. the {found.start} fails: {found.left_by(found.before)}", loc="left", fontsize=10)

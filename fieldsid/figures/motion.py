@@ -46,8 +46,9 @@ class MotionView:
 
 def draw(view: MotionView, axes: Sequence[Axes]) -> None:
     """Draw the four panels, top to bottom: angle, rate, fin, residual."""
-    draw_angle(view, axes[0])
-    draw_rate(view, axes[1])
+    for channel in (0, 1):
+        draw_channel(view, channel, axes[channel])
+    canvas.legend_above(axes[0])
     draw_fin(view, axes[2])
     draw_residual(view, axes[3])
     for ax in axes:
@@ -59,19 +60,12 @@ def draw(view: MotionView, axes: Sequence[Axes]) -> None:
     axes[-1].set_xlabel("time, s")
 
 
-def draw_angle(view: MotionView, ax: Axes) -> None:
-    """Draw the angle in deg."""
-    canvas.dress(ax, y=f"{SYMBOLS[view.record.axis][0]}, deg")
-    canvas.dots(ax, view.record.time, view.measured_angle)
-    ax.plot(view.record.time, np.degrees(view.angle), color=canvas.SIMULATED, linewidth=1.3, label="simulated")
-    canvas.legend_above(ax)
-
-
-def draw_rate(view: MotionView, ax: Axes) -> None:
-    """Draw the rate in deg/s."""
-    canvas.dress(ax, y=f"{SYMBOLS[view.record.axis][1]}, deg/s")
-    canvas.dots(ax, view.record.time, view.measured_rate)
-    ax.plot(view.record.time, np.degrees(view.rate), color=canvas.SIMULATED, linewidth=1.3)
+def draw_channel(view: MotionView, channel: int, ax: Axes) -> None:
+    """Draw a channel, 0 the angle in deg, 1 the rate in deg/s, measured and simulated."""
+    unit, measured, simulated = (("deg", view.measured_angle, view.angle), ("deg/s", view.measured_rate, view.rate))[channel]
+    canvas.dress(ax, y=f"{SYMBOLS[view.record.axis][channel]}, {unit}")
+    canvas.dots(ax, view.record.time, measured)
+    ax.plot(view.record.time, np.degrees(simulated), color=canvas.SIMULATED, linewidth=1.3, label="simulated")
 
 
 def draw_fin(view: MotionView, ax: Axes) -> None:
@@ -103,9 +97,8 @@ def draw_residual(view: MotionView, ax: Axes) -> None:
 
 def panels(view: MotionView, title: str, facts: str = "") -> Figure:
     """Return a sheet with the four panels, a title and a line of facts under it."""
-    figure = canvas.sheet(9.0, 8.2)
+    figure = canvas.sheet(9.0, 8.2, title + (f"\n{facts}" if facts else ""))
     axes = figure.subplots(4, 1, sharex=True, height_ratios=(1.25, 1.25, 0.9, 1.0))
-    figure.suptitle(title + (f"\n{facts}" if facts else ""), x=0.01, ha="left", fontsize=11)
     draw(view, list(axes))
     figure.align_ylabels(list(axes))
     return figure

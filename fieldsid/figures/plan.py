@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from fieldsid.figures import canvas
 from fieldsid.models.axis import Axis
 from fieldsid.planning.output.figure_data import LegFigure
-from fieldsid.runtime.background_tasks import BackgroundTasks
 
 LIMIT: dict[str, Any] = {"color": "#B2182B", "linewidth": 1.1, "linestyle": (0, (4, 2))}
 AREA = "#EAF1F7"
@@ -89,13 +88,11 @@ def _draw_area(view: LegFigure, ax: Axes) -> None:
             ax.axhline(side * width, **LIMIT)
 
 
-def save_plan_figure(
-    views: Sequence[LegFigure], path: Path, *, force: bool = False, tasks: BackgroundTasks | None = None
-) -> Path:
-    """Draw up to six legs, one row each, and save; raises ArtifactError."""
+def figure(views: Sequence[LegFigure]) -> Figure:
+    """Return a sheet of up to six legs, one row each."""
     shown = views[:MOST_LEGS]
-    figure = canvas.sheet(13.0, 0.9 + 2.3 * len(shown))
-    grid = figure.subplots(len(shown), 3, squeeze=False, width_ratios=(1.15, 1.15, 1.0))
+    sheet = canvas.sheet(13.0, 0.9 + 2.3 * len(shown))
+    grid = sheet.subplots(len(shown), 3, squeeze=False, width_ratios=(1.15, 1.15, 1.0))
     for view, row in zip(shown, grid, strict=True):
         draw(view, row)
     for ax, label in zip(grid[-1], ("time, s", "time, s", "along, m"), strict=True):
@@ -104,8 +101,8 @@ def save_plan_figure(
     handles.append(Line2D([], [], label="limit", **LIMIT))
     if any(v.envelope.area_length is not None for v in shown):
         handles.append(Patch(color=AREA, label="area"))
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False, fontsize=9)
-    return canvas.save(figure, path, force=force, tasks=tasks)
+    sheet.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False, fontsize=9)
+    return sheet
 
 
 def _errors(view: LegFigure) -> str:

@@ -58,9 +58,8 @@ def draw(view: TrackView, ax: Axes, index: int) -> None:
 def panels(view: TrackView, of: str) -> Figure:
     """Return a sheet with one panel per parameter; its title says when each settled, and what the estimates are of."""
     count = len(view.names)
-    figure = canvas.sheet(9.0, 1.2 + 1.9 * count)
+    figure = canvas.sheet(9.0, 1.2 + 1.9 * count, f"{of}: {settling(view)}")
     axes = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
-    figure.suptitle(f"{of}: {settling(view)}", x=0.01, ha="left", fontsize=11)
     for i, ax in enumerate(axes):
         draw(view, ax, i)
     canvas.legend_above(axes[0])

@@ -28,9 +28,8 @@ def figure(run: Run) -> Figure:
     shown = [(y, held) for y, names in PANELS if (held := [n for n in names if run.has(n)])]
     if not shown:
         raise DataError(f"run {run.name!r} has nothing to draw", found=", ".join(run.signals) or "no signals")
-    sheet = canvas.sheet(9.0, 1.0 + 1.7 * len(shown))
+    sheet = canvas.sheet(9.0, 1.0 + 1.7 * len(shown), _title(run))
     axes = sheet.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
-    sheet.suptitle(_title(run), x=0.01, ha="left", fontsize=11, parse_math=False)
     for (y, names), ax in zip(shown, axes, strict=True):
         draw(run, names, y, ax)
     axes[-1].set_xlabel("time, s")

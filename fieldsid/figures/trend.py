@@ -25,8 +25,7 @@ OF_FIRST = ("", "%b\n%Y", "%b\n%Y", "%d %b\n%Y", "%H:%M", "%H:%M")
 
 def figure(trends: Sequence[Trend], name: str) -> Figure:
     """Return a sheet with a panel for each parameter, which share the time."""
-    sheet = canvas.sheet(10.0, 1.2 + 2.1 * len(trends))
-    sheet.suptitle(f"{name}: {summary(trends)}", x=0.01, ha="left", fontsize=11)
+    sheet = canvas.sheet(10.0, 1.2 + 2.1 * len(trends), f"{name}: {summary(trends)}")
     axes = sheet.subplots(len(trends), 1, squeeze=False, sharex=True)[:, 0]
     for ax, trend in zip(axes, trends, strict=True):
         draw(trend, ax)

@@ -78,11 +78,7 @@ def finite_number(value: object, name: str, low: float = -LARGEST, high: float =
 
 def number(low: float = -LARGEST, high: float = LARGEST) -> Shape:
     """Return the shape of a finite number within bounds."""
-
-    def look(value: object, place: str) -> None:
-        finite_number(value, place, low, high)
-
-    return look
+    return lambda value, place: finite_number(value, place, low, high)
 
 
 def above_zero(high: float = LARGEST) -> Shape:
@@ -97,12 +93,7 @@ def above_zero(high: float = LARGEST) -> Shape:
 
 def maybe(shape: Shape) -> Shape:
     """Return the shape of what may be nothing too: a number that could not be found is written so."""
-
-    def look(value: object, place: str) -> None:
-        if value is not None:
-            check(value, shape, place)
-
-    return look
+    return lambda value, place: None if value is None else check(value, shape, place)
 
 
 def each(shape: Shape) -> Shape:
@@ -128,20 +119,13 @@ def at_least_one(shape: Shape) -> Shape:
 
 def times(count: int, shape: Shape) -> Shape:
     """Return the shape of a list of so many of one shape."""
-
-    def look(value: object, place: str) -> None:
-        check(value, (shape,) * count, place)
-
-    return look
+    return lambda value, place: check(value, (shape,) * count, place)
 
 
 def one_of(words: Collection[str]) -> Shape:
     """Return the shape of one of some words."""
-
-    def look(value: object, place: str) -> None:
-        _refuse(not isinstance(value, str) or value not in words, value, place, f"one of {', '.join(words)}")
-
-    return look
+    wanted = f"one of {', '.join(words)}"
+    return lambda value, place: _refuse(not isinstance(value, str) or value not in words, value, place, wanted)
 
 
 def anything(_value: object, _place: str) -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from fieldsid.comparison.compare import Comparison, compare_one
 from fieldsid.display import Brief
@@ -21,6 +22,7 @@ from fieldsid.trial_folder.next_step import chosen_models, next_step, single_mod
 from fieldsid.trial_folder.state import MODEL, RUN, FolderState, Item
 from fieldsid.vehicle import Vehicle, find_vehicle
 
+T = TypeVar("T")
 MOST_RUNS, MOST_MODELS = 12, 4
 """Runs and models whose free runs are drawn: what is left out is said."""
 
@@ -92,13 +94,18 @@ def _runs(state: FolderState, vehicle: Vehicle | None, skipped: list[str]) -> li
         said = "those that the model was not fitted to come first, then others evenly by name"
         skipped.append(f"{len(places) - MOST_RUNS} of {len(places)} runs are not drawn: {said}")
         places = _chosen(places, _fitted_to(state))
-    found, limits = [], {} if vehicle is None else vehicle.signal_limits
-    for place in places:
-        try:
-            found.append(load_run(place, fin_max_rad=limits))
-        except FieldsidError as error:
-            skipped.append(f"{place.name}: {error.what}")
-    return found
+    limits = {} if vehicle is None else vehicle.signal_limits
+    tried = (_tried(partial(load_run, p, fin_max_rad=limits), p.name, skipped) for p in places)
+    return [run for run in tried if run is not None]
+
+
+def _tried(read: Callable[[], T], what: str, skipped: list[str]) -> T | None:
+    """Return what can be read; what cannot is None, and why is said."""
+    try:
+        return read()
+    except FieldsidError as error:
+        skipped.append(f"{what}: {error.what}")
+        return None
 
 
 def _fitted_to(state: FolderState) -> set[str]:
@@ -120,7 +127,8 @@ def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]
     best = chosen_models(state, axis)
     if not best:
         return None
-    line = _line(state.folder / best[0], skipped) if len(best) == 1 else ()
+    whole = state.folder / best[0]
+    line = (_tried(lambda: history_of(whole), f"no history of {whole.name}", skipped) or ()) if len(best) == 1 else ()
     ancestors = [g.path for g in reversed(line[:-1]) if g.state != "missing"]
     between = MOST_MODELS - 2
     ancestors = [*ancestors[:between], *ancestors[between:][-1:]]
@@ -128,6 +136,7 @@ def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]
     if len(best) > MOST_MODELS:
         skipped.append(f"{len(best) - MOST_MODELS} of {len(best)} {axis} models are not drawn")
     singles = [state.folder / p for p in single_models(state, axis)]
+    points = singles if len(singles) > 1 else [state.folder / b for b in best]
     shown = tuple(s for p in paths if (s := _shown(state, p, runs, skipped)) is not None)
     if not shown:
         return None
@@ -136,17 +145,9 @@ def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]
         shown,
         line,
         loop_of(line, shown[-1].found, shown[0].found) if ancestors and len(shown) == len(paths) else None,
-        _source(singles if len(singles) > 1 else [state.folder / b for b in best], skipped),
+        _tried(lambda: load_parameter_source(points), "no laws over speed", skipped),
         *(_last(state, kind, axis, skipped) for kind in ("diagnosis", "turn-radius", "schedule")),
     )
-
-
-def _line(path: Path, skipped: list[str]) -> tuple[Generation, ...]:
-    try:
-        return history_of(path)
-    except FieldsidError as error:
-        skipped.append(f"no history of {path.name}: {error.what}")
-        return ()
 
 
 def _shown(state: FolderState, path: Path, runs: Sequence[Run], skipped: list[str]) -> Shown | None:
@@ -155,23 +156,12 @@ def _shown(state: FolderState, path: Path, runs: Sequence[Run], skipped: list[st
     except FieldsidError as error:
         skipped.append(f"{path.name}: {error.what}; {error.found}")
         return None
-    mine, found = [run for run in runs if may_show(run, model.axis)], []
-    for run in mine:
-        try:
-            found.append(compare_one(model, run))
-        except FieldsidError as error:
-            skipped.append(f"{path.name} on {run.name}: {error.what}")
+    mine = [run for run in runs if may_show(run, model.axis)]
+    tried = (_tried(partial(compare_one, model, run), f"{path.name} on {run.name}", skipped) for run in mine)
+    found = [one for one in tried if one is not None]
     inside = path.resolve().is_relative_to(state.folder.resolve())
     name = path.resolve().relative_to(state.folder.resolve()) if inside else path
     return Shown(str(name), model, tuple(found))
-
-
-def _source(paths: Sequence[Path], skipped: list[str]) -> ParameterSource | None:
-    try:
-        return load_parameter_source(paths)
-    except FieldsidError as error:
-        skipped.append(f"no laws over speed: {error.what}")
-        return None
 
 
 def _last(state: FolderState, kind: str, axis: str, skipped: list[str]) -> Item | None:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, TypeVar
+from collections.abc import Callable
+from typing import TypeVar
 
-from fieldsid.display import View
+from fieldsid.display import Frames, View
 from fieldsid.page import Page
 from fieldsid.records.keys import body_of
 from fieldsid.views._words import fact_block, table
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
-
 
 R = TypeVar("R")
 
@@ -23,7 +19,7 @@ def row_view(name: str, line: Callable[[R], str]) -> View[R]:
     def page(row: R) -> Page:
         return Page(line(row), (), (fact_block("Values", body_of(row)),))
 
-    def frames(row: R) -> Mapping[str, Callable[[], DataFrame]]:
+    def frames(row: R) -> Frames:
         return {"row": lambda: table([body_of(row)])}
 
     return View(name, line, page, frames, line)

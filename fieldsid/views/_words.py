@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.page import Block, cut, facts
+from fieldsid.page import Block, counted, cut, facts
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import MANY, RADIANS, Angles, interval, number, with_error
 
@@ -26,9 +26,9 @@ def warned(notes: Iterable[Note]) -> tuple[str, ...]:
     return tuple(f"{n.message} [{n.code}]" for n in notes)
 
 
-def counted(count: int, word: str) -> str:
+def some(count: int, word: str) -> str:
     """Return `1 warning`, `2 warnings`; empty for none."""
-    return "" if count == 0 else f"{count} {word}" if count == 1 else f"{count} {word}s"
+    return counted(count, word) if count else ""
 
 
 def joined(*parts: str) -> str:
@@ -89,6 +89,23 @@ def error_facts(m: GoodnessOfFit, floor: Noise) -> list[tuple[str, str]]:
         for name, unit, rms, noise, fit in channels
         if isfinite(rms)
     ]
+
+
+def merit_blocks(runs: Iterable[tuple[str, float, GoodnessOfFit, Noise]], angles: Angles) -> tuple[Block, str]:
+    """Return how well the free run of each run is followed, of its name, speed, merit and noise, and the units of that."""
+    rows = [
+        (
+            name,
+            number(speed, 3),
+            *(number(angles.factor * v, 2) for v in (m.angle_rms, floor.angle)),
+            number(m.angle_fit, 3),
+            *(number(angles.factor * v, 2) for v in (m.rate_rms, floor.rate)),
+            number(m.rate_fit, 3),
+        )
+        for name, speed, m, floor in runs
+    ]
+    heads = ("run", "m/s", "angle rms", "noise", "fit %", "rate rms", "noise", "fit %")
+    return Block("", tuple(rows), heads), f"angle in {angles.unit}, rate in {angles.unit}/s"
 
 
 def times(ratio: float) -> str:

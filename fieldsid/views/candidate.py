@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from fieldsid.display import View
+from fieldsid.display import Frames, View
 from fieldsid.page import Block, Page, cut, facts
 from fieldsid.rounding import number, probability
 from fieldsid.views._words import percent, table
 from fieldsid.views.diagnosis import candidate_row
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
-
     from fieldsid.diagnosis import Candidate
 
 
@@ -37,7 +34,7 @@ def page(c: Candidate) -> Page:
     return Page(f"Candidate {c.effect}", (), (known, parameters))
 
 
-def frames(c: Candidate) -> Mapping[str, Callable[[], DataFrame]]:
+def frames(c: Candidate) -> Frames:
     """Return the candidate in one row, and its parameters."""
     return {
         "candidate": lambda: table([candidate_row(c)], "effect"),

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from math import degrees, isfinite
+from typing import TYPE_CHECKING
 
-from fieldsid.display import View
+from fieldsid.display import Figures, Frames, View
+from fieldsid.figures.kinds import sketch
 from fieldsid.page import Block, Page, facts, listed
 from fieldsid.records.keys import body_of
 from fieldsid.views._words import table, warned
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
-
-    from fieldsid.change.record import Change
+    from fieldsid.change.record import Change, ParameterChange
 
 
 def line(found: Change) -> str:
@@ -31,19 +31,53 @@ def page(found: Change) -> Page:
             ("effects only before", listed(found.removed)),
         ),
     )
-    parameters = tuple((p.word, p.state, p.says) for p in found.parameters)
-    gains = tuple((f"{g.speed:.2f}", f"{g.old:.4f}", f"{g.new:.4f}", f"{100 * g.change:+.1f} %") for g in found.gains)
-    radius = tuple((f"{r.side}, {r.speed:.2f} m/s", f"{r.old:.2f}", f"{r.new:.2f}") for r in found.radius)
-    blocks = (
-        known,
-        Block("Parameters", parameters, ("", "state", "change"), left=3),
-        Block("Gain kp", gains, ("m/s", "before", "after", "change"), left=0),
-        Block("Turning radius in m", radius, ("", "before", "after")),
+    return Page(found.line, warned(found.notes), (known, *blocks_of(found)))
+
+
+def blocks_of(found: Change, title: str = "") -> Iterator[Block | str]:
+    """Yield the parameters at each speed and over all, the gains and the radius, before and after."""
+    rows = tuple(row for p in found.parameters for row in _rows(p))
+    yield Block(title, rows, ("", "m/s", "before", "after", "change  "))
+    yield "* beyond its errors, all tests together wrong in one comparison of twenty"
+    gains = tuple(
+        (
+            f"{g.speed:.2f}", f"{g.old:.4f}", f"{g.new:.4f}", f"{100 * g.change:+.1f} %",
+            f"{100 * g.interval95[0]:+.1f} .. {100 * g.interval95[1]:+.1f}", f"{g.damping_with_old:.2f}",
+            f"{g.phase_with_old_deg:.0f}",
+        )
+        for g in found.gains
+    )  # fmt: skip
+    yield Block("gain kp", gains, ("m/s", "before", "after", "change", "95 %", "damping", "phase deg"))
+    yield "damping, phase: of the loop as it is now, with the gains of before" if gains else ""
+    turns = tuple(
+        (r.side, f"{r.speed:.2f}", f"{r.old:.2f}", f"{r.new:.2f}", f"{100 * (r.new / r.old - 1):+.1f} %") for r in found.radius
     )
-    return Page(found.line, warned(found.notes), blocks)
+    at = "" if found.rudder is None else f" at {found.rudder:.3g} rad"
+    yield Block(f"turning radius in m{at}", turns, ("side", "m/s", "before", "after", "change"))
 
 
-def frames(found: Change) -> Mapping[str, Callable[[], DataFrame]]:
+def _rows(p: ParameterChange) -> Iterator[tuple[str, ...]]:
+    from fieldsid.change.record import CHANGED, TRIM_ANGLE, shown
+
+    is_trim = p.name == TRIM_ANGLE
+    name = p.word if p.word == p.name else "trim, deg" if is_trim else f"{p.word} {p.name}"
+    scale = degrees(1.0) if is_trim else 1.0
+    for i, a in enumerate(p.speeds):
+        values = (shown(scale * a.old, scale * a.old_std_error), shown(scale * a.new, scale * a.new_std_error))
+        change = _amount(p, a.change, a.std_error) + (" *" if a.is_beyond_errors else "  ")
+        yield name if i == 0 else "", f"{a.speed:.2f}" if isfinite(a.speed) else "all", *values, change
+    if len(p.speeds) > 1:
+        yield "", "all", "", "", _amount(p, p.change, p.std_error) + (" *" if p.state == CHANGED else "  ")
+
+
+def _amount(p: ParameterChange, change: float, error: float) -> str:
+    from fieldsid.change.record import TRIM_ANGLE, shown
+
+    factor = 100.0 if p.is_relative else degrees(1.0) if p.name == TRIM_ANGLE else 1.0
+    return f"{'+' if change > 0 else ''}{shown(factor * change, factor * error)}{' %' if p.is_relative else ''}"
+
+
+def frames(found: Change) -> Frames:
     """Return a row for each parameter, for each gain and for each turn."""
     body = body_of(found)
     parts = ("name", "what", "unit", "is_relative", "change", "std_error", "p_adjusted", "state")
@@ -54,11 +88,9 @@ def frames(found: Change) -> Mapping[str, Callable[[], DataFrame]]:
     }
 
 
-def figures(found: Change) -> Mapping[str, Callable[[], Any]]:
+def figures(found: Change) -> Figures:
     """Return both vehicles at the same fin, the changes and the gains."""
-    from fieldsid.figures.change import figure
-
-    return {"change": lambda: figure(found, ("before", "after"))}
+    return {"change": sketch("change", found, ("before", "after"))}
 
 
 VIEW = View("change", line, page, frames, lambda found: found.axis.value, figures)

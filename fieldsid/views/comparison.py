@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.display import View
+from fieldsid.display import Figures, Frames, View
+from fieldsid.figures.kinds import sketch
 from fieldsid.page import Block, Page, cut, facts
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import number, p_value, times_noise
 from fieldsid.views._words import error_facts, percent, speed_words, table, warned, where_block, where_rows
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
-
     from fieldsid.comparison.compare import Comparison
 
 
@@ -43,7 +41,7 @@ def page(found: Comparison) -> Page:
     return Page(f"Comparison with {cut(found.run, 60)}", warned(found.shown.notes), blocks)
 
 
-def frames(found: Comparison) -> Mapping[str, Callable[[], DataFrame]]:
+def frames(found: Comparison) -> Frames:
     """Return the errors in one row, where they fall, and the motion over time."""
     from fieldsid.views.fit import motion
 
@@ -65,11 +63,9 @@ def frames(found: Comparison) -> Mapping[str, Callable[[], DataFrame]]:
     }
 
 
-def figures(found: Comparison) -> Mapping[str, Callable[[], Any]]:
+def figures(found: Comparison) -> Figures:
     """Return the free run against its measurement, and where the error falls."""
-    from fieldsid.figures.compare import figure
-
-    return {"motion": lambda: figure(found, found.model, "the model")}
+    return {"motion": sketch("compare", found, found.model, "the model")}
 
 
 VIEW = View("comparison", line, page, frames, lambda found: found.run, figures)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.display import View
+from fieldsid.display import Figures, Frames, View
+from fieldsid.figures.kinds import sketch
 from fieldsid.page import Block, Page, cut, paragraph
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import RADIANS, Angles
 from fieldsid.views._candidates import candidates
-from fieldsid.views._words import counted, joined, parameter_rows, table, warned, where_block, where_rows
+from fieldsid.views._words import joined, parameter_rows, some, table, warned, where_block, where_rows
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
-
     from fieldsid.diagnosis import Candidate, Diagnosis
 
 MOST_PLACES, MOST_SPOKEN = 5, 3
@@ -22,7 +21,7 @@ MOST_PLACES, MOST_SPOKEN = 5, 3
 
 def line(found: Diagnosis) -> str:
     """Return axis, verdict and its sentence."""
-    return f"{found.axis.value}, {found.verdict}: {joined(cut(found.says, 280), counted(len(found.notes), 'note'))}"
+    return f"{found.axis.value}, {found.verdict}: {joined(cut(found.says, 280), some(len(found.notes), 'note'))}"
 
 
 def page(found: Diagnosis, angles: Angles = RADIANS) -> Page:
@@ -60,20 +59,13 @@ def _not_tried(found: Diagnosis) -> Iterator[str]:
     yield from paragraph([f"not tried: {', '.join(names)}: {reason}" for reason, names in why.items()])
 
 
-def frames(found: Diagnosis) -> Mapping[str, Callable[[], DataFrame]]:
+def frames(found: Diagnosis) -> Frames:
     """Return the candidates, where the model as it is fails, and the parameters of the model with the named effects."""
     return {
         "candidates": lambda: table(map(candidate_row, found.candidates), "effect"),
         "where": lambda: table(where_rows(found.where)),
         "parameters": lambda: table(parameter_rows(found.model), "parameter"),
     }
-
-
-def figures(found: Diagnosis) -> Mapping[str, Callable[[], Any]]:
-    """Return the candidates' errors, and where the model fails."""
-    from fieldsid.figures.diagnose import figure
-
-    return {"candidates": lambda: figure(found)}
 
 
 def candidate_row(c: Candidate) -> dict[str, Any]:
@@ -91,6 +83,11 @@ def candidate_row(c: Candidate) -> dict[str, Any]:
         "evidence": c.evidence,
         "confusable_with": ", ".join(c.confusable_with),
     }
+
+
+def figures(found: Diagnosis) -> Figures:
+    """Return the candidates' errors, and where the model fails."""
+    return {"candidates": sketch("diagnose", found)}
 
 
 VIEW = View("diagnosis", line, page, frames, lambda found: found.axis.value, figures)

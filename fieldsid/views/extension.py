@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.display import View
+from fieldsid.display import Figures, Frames, View
+from fieldsid.figures.kinds import sketch
 from fieldsid.page import Block, Page, facts, listed
 from fieldsid.rounding import RADIANS, Angles, noise_fall, number
 from fieldsid.views._words import parameter_block, parameter_rows, table, warned
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
-
     from fieldsid.extension import Extension
     from fieldsid.extension.extend import Gain
 
@@ -40,20 +39,18 @@ def page(found: Extension, angles: Angles = RADIANS) -> Page:
     return Page(title, warned(found.notes), blocks)
 
 
-def frames(found: Extension) -> Mapping[str, Callable[[], DataFrame]]:
+def frames(found: Extension) -> Frames:
     """Return the errors before and after, and the parameters of the extended model."""
     return {
-        "errors": lambda: table(_rows(found.gain)),
+        "errors": lambda: table(channels_of(found.gain)),
         "parameters": lambda: table(parameter_rows(found.model), "parameter"),
     }
 
 
-def figures(found: Extension) -> Mapping[str, Callable[[], Any]]:
+def figures(found: Extension) -> Figures:
     """Return the fall of the error towards the noise floor."""
-    from fieldsid.figures.history import fall_figure
-
     before = tuple(e for e in found.model.effects if e not in found.gain.added)
-    return {"errors": lambda: fall_figure([found.gain], before, "the extension")}
+    return {"errors": sketch("history", [found.gain], before, "the extension", draw="fall_figure")}
 
 
 def _fall(found: Extension) -> str:
@@ -70,13 +67,14 @@ def errors(gain: Gain, angles: Angles) -> Block:
     """Return the error before and after of each channel, on unseen and on fitted runs, beside the noise floor."""
     rows = [
         (f"{r['channel']}, {unit}, {r['runs']}", *(number(factor * r[k], 3) for k in ("before", "after", "noise_floor")))
-        for r in _rows(gain)
+        for r in channels_of(gain)
         for factor, unit in [angles.of(r["unit"])]
     ]
     return Block("", tuple(rows), ("rms error", "before", "after", "noise floor"))
 
 
-def _rows(gain: Gain) -> Iterator[dict[str, Any]]:
+def channels_of(gain: Gain) -> Iterator[dict[str, Any]]:
+    """Yield the error of each channel before and after an addition, on unseen and on fitted runs, with its noise floor."""
     for channel, unit, name, floor in (
         ("angle", "rad", "angle_rms_rad", gain.noise_floor.angle),
         ("rate", "rad/s", "rate_rms_rad_s", gain.noise_floor.rate),

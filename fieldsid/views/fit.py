@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from functools import partial
+from collections.abc import Iterator
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.display import View
+from fieldsid.display import Figures, Frames, View
+from fieldsid.figures.kinds import sketch
 from fieldsid.page import Block, Page, facts, listed
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import number, p_value
 from fieldsid.views._words import (
     base_words,
-    counted,
     error_facts,
     joined,
     parameter_block,
     parameter_rows,
+    some,
     table,
     warned,
 )
@@ -39,8 +39,8 @@ def line(fit: Fit) -> str:
 
     model, m = fit.model, goodness_of_fit(fit.predictions)
     how_well = f"rate fit {m.rate_fit:.1f} %" if isfinite(m.rate_fit) else f"angle fit {m.angle_fit:.1f} %"
-    head = joined(model.axis.value, model.method, listed(model.effects), counted(len(fit.predictions), "run"))
-    return f"{head}: {joined(base_words(model), how_well, counted(len(_warnings(fit)), 'warning'))}"
+    head = joined(model.axis.value, model.method, listed(model.effects), some(len(fit.predictions), "run"))
+    return f"{head}: {joined(base_words(model), how_well, some(len(_warnings(fit)), 'warning'))}"
 
 
 def page(fit: Fit) -> Page:
@@ -57,7 +57,7 @@ def page(fit: Fit) -> Page:
             ("effects", listed(model.effects) or "none"),
             ("runs", listed(model.runs)),
             ("samples", f"{sum(len(r) for r in records)} in {seconds:.1f} s"),
-            ("estimated", counted(len(model.free), "parameter")),
+            ("estimated", some(len(model.free), "parameter")),
             *error_facts(goodness_of_fit(fit.predictions), fit.floor),
             ("whiteness", "" if whiteness is None else p_value(whiteness)),
         ),
@@ -66,7 +66,7 @@ def page(fit: Fit) -> Page:
     return Page(f"Fit of the {model.axis.value} axis", warned(_warnings(fit)), blocks)
 
 
-def frames(fit: Fit) -> Mapping[str, Callable[[], DataFrame]]:
+def frames(fit: Fit) -> Frames:
     """Return the parameters, the runs, the correlation of the estimates, and the motion of all runs over time."""
     return {
         "parameters": lambda: table(parameter_rows(fit.model), "parameter"),
@@ -76,13 +76,11 @@ def frames(fit: Fit) -> Mapping[str, Callable[[], DataFrame]]:
     }
 
 
-def figures(fit: Fit) -> Mapping[str, Callable[[], Any]]:
+def figures(fit: Fit) -> Figures:
     """Return the motion of each run by its name, and the estimates over time of a recursive method."""
-    from fieldsid.figures.identify import figure, history_figure
-
-    drawn: dict[str, Callable[[], Any]] = {p.record.name: partial(figure, fit, i) for i, p in enumerate(fit.predictions)}
+    drawn = {p.record.name: sketch("identify", fit, i) for i, p in enumerate(fit.predictions)}
     if fit.history is not None:
-        drawn["over_time"] = partial(history_figure, fit, fit.history)
+        drawn["over_time"] = sketch("identify", fit, fit.history, draw="history_figure")
     return drawn
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from fieldsid.display import View
+from fieldsid.display import Figures, Frames, View
+from fieldsid.figures.kinds import sketch
 from fieldsid.page import Page, cut, facts
 from fieldsid.rounding import interval, number, with_error
 from fieldsid.views._words import speed_words, table
@@ -40,7 +40,7 @@ def page(turn: MeasuredTurn) -> Page:
     return Page(f"Circle of {cut(turn.run, 60)} to {turn.side}", (), (known,))
 
 
-def frames(turn: MeasuredTurn) -> Mapping[str, Callable[[], DataFrame]]:
+def frames(turn: MeasuredTurn) -> Frames:
     """Return the circle in one row, and the track."""
     circle = turn.circle
     row = {
@@ -55,18 +55,16 @@ def frames(turn: MeasuredTurn) -> Mapping[str, Callable[[], DataFrame]]:
     return {"circle": lambda: table([row], "run"), "track": lambda: _track(turn)}
 
 
-def figures(turn: MeasuredTurn) -> Mapping[str, Callable[[], Any]]:
-    """Return the track with its circle."""
-    from fieldsid.figures.turn import track_figure
-
-    return {"track": lambda: track_figure(turn)}
-
-
 def _track(turn: MeasuredTurn) -> DataFrame:
     import pandas as pd
 
     x, y = turn.track
     return pd.DataFrame({"x_m": x, "y_m": y})
+
+
+def figures(turn: MeasuredTurn) -> Figures:
+    """Return the track with its circle."""
+    return {"track": sketch("turn", turn, draw="track_figure")}
 
 
 VIEW = View("measured_turn", line, page, frames, lambda turn: turn.run, figures)

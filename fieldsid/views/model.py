@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.display import View
+from fieldsid.display import Frames, View
 from fieldsid.page import Page, facts, listed
 from fieldsid.rounding import number
 from fieldsid.views._words import base_words, joined, parameter_block, parameter_rows, speed_words, table
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
-
     from fieldsid.models.model import Model
 
 
@@ -38,7 +35,7 @@ def page(model: Model) -> Page:
     return Page(f"Model of the {model.axis.value} axis", (), (known, parameter_block(model)))
 
 
-def frames(model: Model) -> Mapping[str, Callable[[], DataFrame]]:
+def frames(model: Model) -> Frames:
     """Return the parameters."""
     return {"parameters": lambda: table(parameter_rows(model), "parameter")}
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.display import View
+from fieldsid.display import Figures, Frames, View
+from fieldsid.figures.kinds import sketch
 from fieldsid.page import Block, Page, cut, facts, listed
 from fieldsid.rounding import number
-from fieldsid.views._words import counted, joined, speed_words, warned
+from fieldsid.views._words import joined, some, speed_words, warned
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def line(run: Run) -> str:
     """Return name, samples, rate, speed and signals."""
     measured = [n for n in run.signals if run.has(n)]
-    words = joined(f"{len(run)} samples", _span(run), speed_words(_speed(run)), counted(len(run.notes), "note"))
+    words = joined(f"{len(run)} samples", _span(run), speed_words(_speed(run)), some(len(run.notes), "note"))
     return f"{cut(run.name, 60)}: {words}; {listed(measured, 5)}"
 
 
@@ -48,19 +48,12 @@ def page(run: Run) -> Page:
     return Page(f"Run {cut(run.name, 60)}", warned(n for n in run.notes if n.code not in EXPLAINING), (known, signals), quiet)
 
 
-def frames(run: Run) -> Mapping[str, Callable[[], DataFrame]]:
+def frames(run: Run) -> Frames:
     """Return the signals over time_s, as `Run.from_frame` takes them back; the notes."""
     from fieldsid.views._words import table
 
     notes: list[dict[str, Any]] = [{"code": n.code, "message": n.message} for n in run.notes]
     return {"signals": lambda: _signals(run), "notes": lambda: table(notes)}
-
-
-def figures(run: Run) -> Mapping[str, Callable[[], Any]]:
-    """Return the signals over time."""
-    from fieldsid.figures.run import figure
-
-    return {"signals": lambda: figure(run)}
 
 
 def read(frame: DataFrame, name: str) -> Run:
@@ -92,6 +85,11 @@ def _speed(run: Run) -> float:
     import numpy as np
 
     return float(np.nanmedian(run["surge_m_s"])) if run.has("surge_m_s") else float("nan")
+
+
+def figures(run: Run) -> Figures:
+    """Return the signals over time."""
+    return {"signals": sketch("run", run)}
 
 
 VIEW = View("run", line, page, frames, lambda run: run.name, figures, read)

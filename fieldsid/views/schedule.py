@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable, Iterator
+from math import degrees, isfinite
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.display import View
+from fieldsid.display import Figures, Frames, View
+from fieldsid.figures.kinds import sketch
 from fieldsid.page import Block, Page, facts, listed
 from fieldsid.records.keys import body_of
-from fieldsid.rounding import number
-from fieldsid.views._words import table
+from fieldsid.rounding import RADIANS, Angles, number
+from fieldsid.views._words import percent, table
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
-
     from fieldsid.schedule import Schedule
+
+SLOWED_SHARE = 0.995
+"""Below it a row's share is not printed as 1.00."""
 
 
 def line(schedule: Schedule) -> str:
@@ -27,44 +30,60 @@ def line(schedule: Schedule) -> str:
 
 
 def page(schedule: Schedule) -> Page:
-    """Return a row of gains for each speed."""
-    rows = tuple(
-        (
-            number(r.speed, 3),
-            *(number(v, 4) for v in (r.gains.kp, r.gains.ki, r.gains.kd)),
-            *(number(v, 3) for v in (r.feed_forward, r.fin_limit)),
-            f"{r.phase_margin_deg:.0f}",
-            "yes" if r.supported else "no",
-            r.binds,
-        )
-        for r in schedule.rows
-    )
-    heads = ("m/s", "kp", "ki", "kd", "forward rad", "fin rad", "phase deg", "data", "bound by")
+    """Return what was asked for, and a row of gains for each speed."""
     known = facts(
         "Statistics",
         (
             ("damping", number(schedule.damping, 3)),
             ("phase margin", f"{number(schedule.phase_margin_deg, 3)} deg wished"),
             ("effects", listed(schedule.provenance.get("effects", ()))),
-            ("signs", str(schedule.provenance.get("sign_convention", ""))),
             ("law", str(schedule.provenance.get("law", ""))),
             ("fins", "; ".join(schedule.fins_said)),
         ),
     )
-    blocks = (known, Block("Gains", rows, heads, left=0))
-    return Page(f"Schedule of the {schedule.axis.value} axis, {schedule.kind}", (), blocks)
+    return Page(f"Schedule of the {schedule.axis.value} axis, {schedule.kind}", (), (known, *blocks_of(schedule)))
 
 
-def frames(schedule: Schedule) -> Mapping[str, Callable[[], DataFrame]]:
+def blocks_of(schedule: Schedule, angles: Angles = RADIANS, lost: Iterable[str] = ()) -> Iterator[Block | str]:
+    """Yield the gains of each speed, and what they were designed with; lost: what of the models was not counted."""
+    from fieldsid.schedule.verdict import fin_of
+    from fieldsid.schedule.verify import steps_of
+
+    rows = tuple(
+        (
+            number(r.speed, 3),
+            number(r.gains.kp),
+            *(number(v, 3) for v in (r.gains.ki, r.gains.kd, angles.factor * r.feed_forward, angles.factor * r.fin_limit)),
+            *((number(r.depth_gain, 3),) if schedule.depth else ()),
+            percent(r.fin_use).replace(" ", ""),
+            f"{r.phase_margin_deg:.0f}",
+            f"{r.settling:.1f}" if isfinite(r.settling) else "never",
+            percent(r.draws_held).replace(" ", ""),
+            "yes" if r.supported else "no",
+        )
+        for r in schedule.rows
+    )
+    depth, known = ("kz",) if schedule.depth else (), schedule.provenance
+    heads = ("m/s", "kp", "ki", "kd", "forward", "fin", *depth, "asks", "phase", "settle s", "held", "data")
+    title = f"{schedule.axis.value}, {schedule.kind}: gains per speed, forward and fin in {angles.unit}"
+    yield Block(title, rows, heads, left=0)
+    yield f"signs: {known['sign_convention']}" if "sign_convention" in known else ""
+    yield f"counted with: {'; '.join((fin_of(schedule.actuator), *(str(v) for v in [known.get('speed_lost')] if v), *lost))}"
+    for binds in dict.fromkeys(r.binds for r in schedule.rows):
+        yield f"bound by {binds}: {', '.join(number(r.speed, 3) for r in schedule.rows if r.binds == binds)} m/s"
+    if "draws" in known:
+        worst = f"the worst of 95 % of {known['draws']} draws of {known.get('draws_of', 'the models')}"
+        step = f"{degrees(steps_of(schedule)[1]):.0f} deg step"
+        yield f"asks: of the fin by a {step}; phase, settle: {worst}; held: those that come to rest from that step"
+    if rejected := known.get("draws_rejected"):
+        yield f"up to {100 * rejected:.0f} % of the draws were rejected as outside what is physical, and drawn anew"
+    if slowed := sum(r.slowed < SLOWED_SHARE for r in schedule.rows):
+        yield f"{slowed} of {len(schedule.rows)} rows were slowed for lag, delay, margin or the draws (1 is the formula's)"
+
+
+def frames(schedule: Schedule) -> Frames:
     """Return a row of gains for each speed."""
     return {"rows": lambda: table((body_of(r) for r in schedule.rows), "speed_m_s")}
-
-
-def figures(schedule: Schedule) -> Mapping[str, Callable[[], Any]]:
-    """Return gains, feed-forward and phase margin over speed."""
-    from fieldsid.figures.schedule import gains_figure
-
-    return {"gains": lambda: gains_figure(schedule)}
 
 
 def system(schedule: Schedule, speed: float | None) -> Any:
@@ -74,6 +93,11 @@ def system(schedule: Schedule, speed: float | None) -> Any:
     if speed is None:
         return {row.speed: controller_system(row, schedule.axis) for row in schedule.rows}
     return controller_system(schedule.at(speed), schedule.axis)
+
+
+def figures(schedule: Schedule) -> Figures:
+    """Return gains, feed-forward and phase margin over speed."""
+    return {"gains": sketch("schedule", schedule, draw="gains_figure")}
 
 
 VIEW = View("schedule", line, page, frames, lambda schedule: schedule.axis.value, figures, system=system)

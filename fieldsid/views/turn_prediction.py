@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from math import degrees
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from fieldsid.display import View
+from fieldsid.display import Figures, Frames, View
+from fieldsid.figures.kinds import sketch
 from fieldsid.page import Block, Page, cut
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import RADIANS, Angles, number, with_error
-from fieldsid.views._words import counted, joined, table, warned
+from fieldsid.views._words import joined, some, table, warned
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
-
     from fieldsid.turning import TurnPrediction
 
 
@@ -26,7 +24,7 @@ def line(found: TurnPrediction) -> str:
     radii = f"{'95 % in ' if any(r.band_only for r in found.rows) else ''}{low} .. {high} m"
     span = f"{radii} at {min(speeds):.2f} .. {max(speeds):.2f} m/s"
     trust = ", ".join(dict.fromkeys(r.trust for r in found.rows))
-    more = joined(trust, counted(len(found.measured), "measured circle"), counted(len(found.notes), "warning"))
+    more = joined(trust, some(len(found.measured), "measured circle"), some(len(found.notes), "warning"))
     return f"rudder {found.rudder_max:.4g} rad, {_methods(found)}: radius {span}, {more}"
 
 
@@ -80,20 +78,18 @@ def _circles(found: TurnPrediction, angles: Angles) -> Block:
     return Block("measured circles, and what the other runs alone predict", rows, heads)
 
 
-def frames(found: TurnPrediction) -> Mapping[str, Callable[[], DataFrame]]:
+def frames(found: TurnPrediction) -> Frames:
     """Return a row for each speed and side, and the measured circles."""
     return {"rows": lambda: table(map(body_of, found.rows)), "measured": lambda: table(map(body_of, found.measured))}
 
 
-def figures(found: TurnPrediction) -> Mapping[str, Callable[[], Any]]:
-    """Return radius and u-turn time over speed."""
-    from fieldsid.figures.turn import figure
-
-    return {"radius": lambda: figure(found)}
-
-
 def _methods(found: TurnPrediction) -> str:
     return ", ".join(sorted({r.method for r in found.rows}))
+
+
+def figures(found: TurnPrediction) -> Figures:
+    """Return radius and u-turn time over speed."""
+    return {"radius": sketch("turn", found)}
 
 
 VIEW = View("turn_prediction", line, page, frames, _methods, figures)

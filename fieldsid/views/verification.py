@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from math import degrees, inf, isnan
+from typing import TYPE_CHECKING
 
-from fieldsid.display import View
-from fieldsid.page import Block, Page, facts
+from fieldsid.display import Figures, Frames, View
+from fieldsid.figures.kinds import sketch
+from fieldsid.page import Block, Page, Whole, facts
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import number
 from fieldsid.views._words import table
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
-
     from fieldsid.schedule import Verification
+    from fieldsid.schedule.check import Check, StepCheck
 
 
 def line(found: Verification) -> str:
@@ -26,22 +27,7 @@ def line(found: Verification) -> str:
 
 
 def page(found: Verification) -> Page:
-    """Return a row for each speed, with the settling time of one constant gain."""
-    rows = tuple(
-        (
-            number(a.speed, 3),
-            f"{a.phase_deg:.0f}",
-            f"{a.phase_least_deg:.0f}",
-            _decibels(a.gain_least_db),
-            number(a.delay_least_s, 2),
-            f"{100 * a.overshoot:.0f}",
-            f"{100 * a.overshoot_most:.0f}",
-            number(a.settling, 3),
-            number(b.settling, 3),
-        )
-        for a, b in zip(found.scheduled, found.constant, strict=True)
-    )
-    heads = ("m/s", "phase deg", "least", "gain margin", "delay s", "over %", "most", "settles s", "constant gain s")
+    """Return the worst of all, and what each speed comes to."""
     worst = found.worst
     least = facts(
         "Least margins and most overshoot, over all speeds and the identified set",
@@ -53,10 +39,66 @@ def page(found: Verification) -> Page:
         ),
     )
     title = f"Verification of the {found.schedule.axis.value} schedule, {found.schedule.kind}"
-    return Page(title, (), (least, Block("Margins and steps", rows, heads, left=0)))
+    return Page(title, (), (least, *blocks_of(found)))
 
 
-def frames(found: Verification) -> Mapping[str, Callable[[], DataFrame]]:
+def blocks_of(found: Verification) -> Iterator[Block | str]:
+    """Yield the margins and steps of each speed, and what a bent fin, a disturbance and a step of depth do."""
+    from fieldsid.schedule.verdict import against_constant
+
+    checks = found.scheduled
+    small, usual, large = (degrees(step.size) for step in checks[0].steps)
+    heads = (
+        "m/s", "phase", "least", "dB", "delay", "over", "most", f"{small:.0f}", f"{usual:.0f}", "most", f"{large:.0f}", "const",
+        "knot",
+    )  # fmt: skip
+    rows = tuple(_row(a, b) for a, b in zip(checks, found.constant, strict=True))
+    yield Block("deg, dB, s of margin; overshoot %; s to settle by step in deg", rows, heads, left=0)
+    yield Whole(against_constant(found))
+    bent, unknown = max(abs(c.bent_error) for c in checks), max(abs(c.bent_error_unknown) for c in checks)
+    yield f"a fin 3 deg off: steady error {degrees(bent):.2f} deg with the feed-forward, {degrees(unknown):.2f} deg without"
+    if found.spread:
+        off = degrees(max(c.steps[1].off for c in checks))
+        yield f"the trim is known so far that a straight course is held to {off:.2f} deg by 95 % of the draws"
+    if found.disturbance > 0:
+        rms, fin = degrees(max(c.leg_rms for c in checks)), degrees(max(c.leg_fin_rms for c in checks))
+        yield f"a straight leg in that disturbance: {rms:.2f} deg rms with {fin:.2f} deg rms of fin"
+    slowest = min(checks, key=lambda c: c.speed_least / c.speed)
+    if slowest.speed_least < 0.99 * slowest.speed:
+        yield f"in the {large:.0f} deg step the speed falls from {slowest.speed:.2f} to {slowest.speed_least:.2f} m/s at most"
+    if depth := [c for c in checks if not isnan(c.depth_settling)]:
+        over, settle = max(100 * c.depth_overshoot for c in depth), max(c.depth_settling for c in depth)
+        yield f"depth step of 2 m: overshoot up to {over:.0f} %, settled within {settle:.0f} s"
+
+
+def _row(check: Check, constant: Check) -> tuple[str, ...]:
+    small, usual, large = check.steps
+    gain = "none" if check.gain_least_db == inf else f"{check.gain_least_db:.1f}"
+    return (
+        number(check.speed, 3),
+        f"{check.phase_deg:.0f}",
+        f"{check.phase_least_deg:.0f}",
+        gain,
+        f"{check.delay_least_s:.2f}",
+        f"{100 * check.overshoot:.0f}",
+        f"{100 * check.overshoot_most:.0f}",
+        _settles(small.settling, small),
+        _settles(usual.settling, usual),
+        _settles(usual.settling_most, usual),
+        _settles(large.settling, large),
+        _settles(constant.settling, constant.steps[1]),
+        "knot" if check.knot else "",
+    )
+
+
+def _settles(seconds: float, step: StepCheck) -> str:
+    """Return how long a step takes to settle; that it was flown so long in vain; nothing where it is not said."""
+    if isnan(seconds):
+        return "-"
+    return f"{seconds:.1f}" if seconds != inf else f">{step.flown:.0f}"
+
+
+def frames(found: Verification) -> Frames:
     """Return the checks of the schedule and those of one constant gain."""
     return {
         "scheduled": lambda: table((body_of(c) for c in found.scheduled), "speed_m_s"),
@@ -64,15 +106,13 @@ def frames(found: Verification) -> Mapping[str, Callable[[], DataFrame]]:
     }
 
 
-def figures(found: Verification) -> Mapping[str, Callable[[], Any]]:
-    """Return gains and margins over speed, with the steps."""
-    from fieldsid.figures.schedule import figure
-
-    return {"steps": lambda: figure(found.schedule, found)}
-
-
 def _decibels(margin: float) -> str:
     return "infinite" if margin == float("inf") else f"{margin:.1f} dB"
+
+
+def figures(found: Verification) -> Figures:
+    """Return gains and margins over speed, with the steps."""
+    return {"steps": sketch("schedule", found.schedule, found)}
 
 
 VIEW = View("verification", line, page, frames, lambda found: found.schedule.axis.value, figures)

@@ -19,7 +19,7 @@ from fieldsid.cli.headlines.headline import LONGEST, Headline
 from fieldsid.cli.headlines.typed import pasted, remember, typed_with
 from fieldsid.cli.help.catalogue import entries
 from fieldsid.cli.trial.parsed import parse
-from fieldsid.cli.voice import shown_in, shown_words, take
+from fieldsid.cli.voice import angles, take
 from fieldsid.logs.run import Note
 from fieldsid.records.keys import body_of
 
@@ -204,11 +204,11 @@ def test_the_line_under_way_goes_on_with_more_words(tmp_path, monkeypatch):
 
 def test_angles_are_shown_in_degrees_on_demand():
     assert take(["identify", "--deg", "run.csv"]) == ["identify", "run.csv"]
-    assert shown_in("rad/s^2") == (pytest.approx(57.29578), "deg/s^2")
-    assert shown_in("1/rad") == (pytest.approx(0.0174533), "1/deg")
-    assert shown_in("1/s") == (1.0, "1/s")
-    assert shown_words("rate: 0.1 .. 0.2 rad/s") == "rate: 5.73 .. 11.5 deg/s"
+    assert angles().of("rad/s^2") == (pytest.approx(57.29578), "deg/s^2")
+    assert angles().of("1/rad") == (pytest.approx(0.0174533), "1/deg")
+    assert angles().of("1/s") == (1.0, "1/s")
+    assert angles().words("rate: 0.1 .. 0.2 rad/s") == "rate: 5.73 .. 11.5 deg/s"
     take(["identify"])
-    assert shown_in("rad") == (1.0, "rad")
-    assert shown_in("1") == (1.0, "")
-    assert shown_words("fin: above 0.12 rad") == "fin: above 0.12 rad"
+    assert angles().of("rad") == (1.0, "rad")
+    assert angles().of("1") == (1.0, "")
+    assert angles().words("fin: above 0.12 rad") == "fin: above 0.12 rad"

@@ -15,6 +15,7 @@ from fieldsid.batch.archive import write_table
 from fieldsid.cli.console import Terminal, print_file, table, words
 from fieldsid.logs import load_run, save_run
 from fieldsid.models.axis import Axis
+from fieldsid.page import Block
 
 NAMES = ("a[/b]x", "c [bold]d", "[link=http:x]y", "\x1b[31mred", "\x1b]0;t\x07", "one\ntwo", "back\x08", "\u202eabc", ":smile:")
 """What a name may hold that a terminal, or what writes to it, would take for something else."""
@@ -28,14 +29,14 @@ def printed(*shown, width=500, **given):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_cell_a_head_and_a_title_are_text(name):
-    out = printed(table(name, (name, "number"), [(name, "1.0")]))
+    out = printed(table(Block(name, ((name, "1.0"),), (name, "number"))))
     shown = name.encode("unicode_escape").decode()
     assert [line.split("  ")[0].rstrip() for line in out.splitlines()] == [shown] * 3
 
 
 @given(st.text(st.characters(codec=None), max_size=30))
 def test_nothing_that_is_printed_steers_a_terminal(text):
-    for shown in (text, words(text), Text(text), table(text, (text,), [(text,)])):
+    for shown in (text, words(text), Text(text), table(Block(text, ((text,),), (text,)))):
         assert all(line.isprintable() for line in printed(shown).split("\n"))
     assert len(printed(text).splitlines()) <= 1
 

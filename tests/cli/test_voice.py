@@ -10,6 +10,7 @@ from rich.console import Console
 
 from fieldsid.cli.console import folded, shows_progress, table
 from fieldsid.cli.voice import Voice, take, voice
+from fieldsid.page import Block
 
 LONG = "run7: " + "the fin was at its limit for a long time, which says less of the authority; " * 3 + "[saturated]"
 
@@ -109,7 +110,9 @@ def on_a_terminal_of(width, made):
 
 def test_a_table_that_does_not_fit_a_narrow_terminal_is_shown_row_by_row_with_its_numbers_whole():
     columns = ("run", "parameter", "value", "95 % interval", "m/s")
-    shown = on_a_terminal_of(40, table("numbers", columns, [("pulses_1.4", "C0", *NUMBERS), ("", "a22", "1", "", "2")], left=2))
+    shown = on_a_terminal_of(
+        40, table(Block("numbers", (("pulses_1.4", "C0", *NUMBERS), ("", "a22", "1", "", "2")), columns, left=2))
+    )
     lines = shown.splitlines()
     assert all(len(line) <= 40 for line in lines)
     assert all(any(line.rstrip().endswith(f"  {n}") for line in lines) for n in NUMBERS)
@@ -119,9 +122,9 @@ def test_a_table_that_does_not_fit_a_narrow_terminal_is_shown_row_by_row_with_it
 
 
 def test_a_table_that_fits_or_a_page_that_is_wide_keeps_its_columns():
-    small = table("", ("run", "m/s"), [("a", "1.4")])
+    small = table(Block("", (("a", "1.4"),), ("run", "m/s")))
     assert on_a_terminal_of(40, small).splitlines()[0].split() == ["run", "m/s"]
-    wide = table("", ("run", "value"), [("r" * 90, "1.4")])
+    wide = table(Block("", (("r" * 90, "1.4"),), ("run", "value")))
     assert on_a_terminal_of(80, wide).splitlines()[0].split() == ["run", "value"]
 
 
@@ -133,7 +136,7 @@ def test_a_table_that_fits_or_a_page_that_is_wide_keeps_its_columns():
 def test_no_number_is_ever_broken_inside_its_cell(width, many, name):
     columns = ("what it is of", *(f"value {i}" for i in range(many)))
     cells = [f"-0.{i:02d}874" if i % 2 else f"-{i}.5 .. {i}.5" for i in range(many)]
-    shown = on_a_terminal_of(width, table("", columns, [(name, *cells)]))
+    shown = on_a_terminal_of(width, table(Block("", ((name, *cells),), columns)))
     assert all(len(line.rstrip()) <= width for line in shown.splitlines())
     for cell in cells:
         assert any(cell in line for line in shown.splitlines()), shown
@@ -141,6 +144,6 @@ def test_no_number_is_ever_broken_inside_its_cell(width, many, name):
 
 def test_a_column_of_words_behind_the_first_is_folded_and_the_numbers_beside_it_are_not():
     rows = [("run7", "2400", "yaw_rad, yaw_rate_rad_s, rudder_rad, surge_m_s, depth_m, pitch_rad, roll_rad, x_m, y_m")]
-    lines = on_a_terminal_of(60, table("", ("run", "samples", "signals"), rows)).splitlines()
+    lines = on_a_terminal_of(60, table(Block("", tuple(rows), ("run", "samples", "signals")))).splitlines()
     assert lines[0].split() == ["run", "samples", "signals"]
     assert any(line.startswith("run7") and "2400" in line for line in lines)

@@ -377,12 +377,14 @@ def in_a_trial(name, *, journal=False):
 def printed(path):
     """Print what a file holds, each line of it as a name: in a table, as a headline's line, a note, a message."""
     from fieldsid.cli.console import complain, out, table, warn, words
+    from fieldsid.page import Block
 
     names = path.read_bytes().decode(errors="surrogateescape").split("\n")
     stream = io.StringIO()
     with contextlib.redirect_stdout(stream), contextlib.redirect_stderr(stream):
         for name in names:
-            out().print(table(name, (name, "number"), [(name, "1.0"), (words(name, "bold"), name)]))
+            out().print(table(Block(name, ((name, "1.0"), ("", name)), (name, "number"))))
+            out().print(words(name, "bold"))
             out().print(name, soft_wrap=True)
             complain(name)
             warn([Note("code", name, {})])

@@ -7,16 +7,15 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.cli.console import emit, table
+from fieldsid.cli.console import emit
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted
-from fieldsid.cli.headlines.words import counted
-from fieldsid.cli.voice import shown_in
+from fieldsid.cli.voice import angles
 from fieldsid.errors import DataError
+from fieldsid.page import Block, Page, counted
+from fieldsid.records.keys import body_of
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fieldsid.change.promise import KeptStep
 
 
@@ -28,7 +27,6 @@ def as_promised(gains: Path, runs: Sequence[Path], reading: Mapping[str, Any], *
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.face.arguments import designed_from, runs_behind
     from fieldsid.plant.parameter_source import load_parameter_source
-    from fieldsid.records.keys import body_of
     from fieldsid.results.comparisons import AsPromised
     from fieldsid.schedule.record import load_schedule
     from fieldsid.schedule.verify import plants_behind
@@ -49,7 +47,7 @@ def as_promised(gains: Path, runs: Sequence[Path], reading: Mapping[str, Any], *
             flown += 1
     told = AsPromised(gains=str(gains), axis=schedule.axis, steps=tuple(steps), skipped_runs=tuple(skips.records))
     headline = _headline(gains, source.paths, runs, steps)
-    result = emit(body_of(told), as_json=as_json, render=lambda to: _render(to, steps), headline=headline)
+    result = emit(body_of(told), as_json=as_json, render=_page(steps), headline=headline)
     skips.end(flown)
     return result
 
@@ -57,7 +55,7 @@ def as_promised(gains: Path, runs: Sequence[Path], reading: Mapping[str, Any], *
 def _headline(gains: Path, models: Sequence[Path], runs: Sequence[Path], steps: Sequence[KeptStep]) -> Headline:
     from fieldsid.change.promise import worst_of
 
-    worst, (times, unit) = worst_of(steps), shown_in("rad")
+    worst, (times, unit) = worst_of(steps), angles().of("rad")
     broken = [s for s in steps if s.broken]
     how = f"overshoot {100 * worst.flown.overshoot:.0f} % (at most {100 * worst.promised.overshoot_most:.0f} %), "
     how += f"settled in {_seconds(worst.flown.settling)} ({_seconds(worst.promised.settling_most)}), "
@@ -75,9 +73,9 @@ def _seconds(value: float) -> str:
     return f"{value:.1f} s" if isfinite(value) else "never"
 
 
-def _render(to: Console, steps: Sequence[KeptStep]) -> None:
-    times, unit = shown_in("rad")
-    rows = [
+def _page(steps: Sequence[KeptStep]) -> Page:
+    times, unit = angles().of("rad")
+    rows = tuple(
         (
             s.run,
             f"{s.start:.1f}",
@@ -89,6 +87,6 @@ def _render(to: Console, steps: Sequence[KeptStep]) -> None:
             ", ".join(s.broken) or "as promised",
         )
         for s in steps
-    ]
+    )
     heads = ("run", "s", "m/s", f"step, {unit}", "overshoot, %", "settled", f"steady, {unit}", "")
-    to.print(table("flown, in brackets at most promised", heads, rows))
+    return Page("", blocks=(Block("flown, in brackets at most promised", rows, heads),))

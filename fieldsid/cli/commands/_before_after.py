@@ -3,29 +3,27 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import degrees, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.change.record import CHANGED, TRIM_ANGLE, shown
-from fieldsid.cli.console import emit, table
+from fieldsid.cli.console import emit
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import typed_with
+from fieldsid.cli.session import drawn_in
 from fieldsid.errors import UsageError
+from fieldsid.figures.kinds import sketch
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import own_kind
+from fieldsid.page import Block, Page, Whole, written
 from fieldsid.records.keys import body_of
+from fieldsid.views.change import blocks_of
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
-    from fieldsid.change.record import Change, ParameterChange
+    from fieldsid.change.record import Change
     from fieldsid.plant.parameter_source import ParameterSource
-
-
-LEVEL = 0.05
+    from fieldsid.results.comparisons import AxisChange
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +42,7 @@ def is_side(path: Path) -> bool:
         return False
 
 
-def before_after(old: Path, new: Path, output: Path | None, *, figures: bool, force: bool, as_json: bool) -> Mapping[str, Any]:
+def before_after(old: Path, new: Path, output: Path | None, *, force: bool, as_json: bool) -> Mapping[str, Any]:
     """Compare two states and print what has changed; return the body."""
     sides = (_side(old), _side(new))
     axes = [a for a in sides[0].files if a in sides[1].files]
@@ -53,9 +51,11 @@ def before_after(old: Path, new: Path, output: Path | None, *, figures: bool, fo
         raise UsageError("there is no axis with models on both sides", found=there, hint="give two models of one axis")
     twice = _in_both(sides)
     found = [_compared(sides, axis) for axis in axes]
-    drawn = [_drawn(c, (old, new), output if figures else None, alone=len(found) == 1, force=force) for c in found]
     from fieldsid.results.comparisons import AxisChange, BeforeAfter
 
+    names = (f"before: {old}", f"after: {new}")
+    plots = {f"before_after_{c.axis.value}": sketch("change", c, names) for c in found}
+    drawn: Sequence[str | None] = drawn_in(output, plots, force=force) or [None] * len(found)
     told = tuple(
         AxisChange(c, tuple(tuple(map(str, s.files[c.axis.value])) for s in sides), f, _next(c, sides))
         for c, f in zip(found, drawn, strict=True)
@@ -66,9 +66,8 @@ def before_after(old: Path, new: Path, output: Path | None, *, figures: bool, fo
     if twice:
         said = f"both sides were fitted to {', '.join(twice)}: a difference is one of the models alone"
         notes.append(Note("shared_runs", said, {}))
-    return emit(
-        body, as_json=as_json, render=lambda to: _render(to, found, changes), headline=_headline(found, changes), notes=notes
-    )
+    page = Page("", blocks=tuple(b for t in told for b in _blocks(t, title=t.change.axis.value if len(told) > 1 else "")))
+    return emit(body, as_json=as_json, render=page, headline=_headline(found, changes), notes=notes)
 
 
 def _headline(found: Sequence[Change], changes: Sequence[Mapping[str, Any]]) -> Headline:
@@ -117,6 +116,7 @@ def _in_both(sides: Sequence[Side]) -> list[str]:
 def _compared(sides: Sequence[Side], axis: str) -> Change:
     from fieldsid.change.compare import compare_models
     from fieldsid.cli.user_effects import check_effects
+    from fieldsid.face.arguments import fin_rate_of
     from fieldsid.plant.parameter_source import load_parameter_source
     from fieldsid.schedule.linear_plant import FinLimits
     from fieldsid.vehicle import find_vehicle
@@ -127,19 +127,8 @@ def _compared(sides: Sequence[Side], axis: str) -> Change:
     folders = [s.given if s.given.is_dir() else Path() for s in reversed(sides)]
     vehicle = next((v for f in (*folders, Path()) if (v := find_vehicle(f)) is not None), None)
     limit = None if vehicle is None else vehicle.fin_max_rad(axis)
-    stated = FinLimits(rate=None if vehicle is None else vehicle.fin_rate_rad_s)
+    stated = FinLimits(rate=fin_rate_of(vehicle))
     return compare_models(sources[0], sources[1], fin_limit=limit, stated=stated)
-
-
-def _drawn(found: Change, names: tuple[Path, Path], folder: Path | None, *, alone: bool, force: bool) -> str | None:
-    if folder is None:
-        return None
-    from fieldsid.figures.canvas import save
-    from fieldsid.figures.change import figure
-    from fieldsid.figures.kinds import figure_at
-
-    sheet = figure(found, (f"before: {names[0]}", f"after: {names[1]}"))
-    return str(save(sheet, figure_at(folder, f"before_after_{found.axis.value}", is_one=alone), force=force))
 
 
 def _next(found: Change, sides: Sequence[Side]) -> str | None:
@@ -164,66 +153,6 @@ def _runs(model: Path) -> list[str]:
     return [str(p) for p in inputs_of(model)]
 
 
-def _render(to: Console, found: Sequence[Change], changes: Sequence[Mapping[str, Any]]) -> None:
-    for i, (change, body) in enumerate(zip(found, changes, strict=True)):
-        if i:
-            to.print()
-        _render_one(to, change, body, title=change.axis.value if len(found) > 1 else "")
-
-
-def _render_one(to: Console, found: Change, body: Mapping[str, Any], *, title: str) -> None:
-    to.print(table(title, ("", "m/s", "before", "after", "change  "), [r for p in found.parameters for r in _rows(p)]))
-    to.print("* beyond its errors, all tests together wrong in one comparison of twenty")
-    _render_gains(to, found)
-    _render_radius(to, found)
-    if body["figure"]:
-        to.print(f"figure: {body['figure']}", soft_wrap=True)
-
-
-def _rows(p: ParameterChange) -> list[tuple[str, ...]]:
-    name = p.word if p.word == p.name else "trim, deg" if p.name == TRIM_ANGLE else f"{p.word} {p.name}"
-    scale = degrees(1.0) if p.name == TRIM_ANGLE else 1.0
-    rows: list[tuple[str, ...]] = [
-        (
-            name if i == 0 else "",
-            f"{a.speed:.2f}" if isfinite(a.speed) else "all",
-            shown(scale * a.old, scale * a.old_std_error),
-            shown(scale * a.new, scale * a.new_std_error),
-            _amount(p, a.change, a.std_error) + (" *" if a.p_adjusted < LEVEL else "  "),
-        )
-        for i, a in enumerate(p.speeds)
-    ]
-    if len(p.speeds) > 1:
-        rows.append(("", "all", "", "", _amount(p, p.change, p.std_error) + (" *" if p.state == CHANGED else "  ")))
-    return rows
-
-
-def _amount(p: ParameterChange, change: float, error: float) -> str:
-    factor = 100.0 if p.is_relative else degrees(1.0) if p.name == TRIM_ANGLE else 1.0
-    return f"{'+' if change > 0 else ''}{shown(factor * change, factor * error)}{' %' if p.is_relative else ''}"
-
-
-def _render_gains(to: Console, found: Change) -> None:
-    if not found.gains:
-        return
-    rows = [
-        (
-            f"{g.speed:.2f}", f"{g.old:.4f}", f"{g.new:.4f}", f"{100 * g.change:+.1f} %",
-            f"{100 * g.interval95[0]:+.1f} .. {100 * g.interval95[1]:+.1f}", f"{g.damping_with_old:.2f}",
-            f"{g.phase_with_old_deg:.0f}",
-        )
-        for g in found.gains
-    ]  # fmt: skip
-    to.print()
-    to.print(table("gain kp", ("m/s", "before", "after", "change", "95 %", "damping", "phase deg"), rows))
-    to.print("damping, phase: of the loop as it is now, with the gains of before")
-
-
-def _render_radius(to: Console, found: Change) -> None:
-    if not found.radius:
-        return
-    rows = [
-        (r.side, f"{r.speed:.2f}", f"{r.old:.2f}", f"{r.new:.2f}", f"{100 * (r.new / r.old - 1):+.1f} %") for r in found.radius
-    ]
-    to.print()
-    to.print(table(f"turning radius in m at {found.rudder:.3g} rad", ("side", "m/s", "before", "after", "change"), rows))
+def _blocks(told: AxisChange, *, title: str) -> Iterator[Block | str]:
+    yield from blocks_of(told.change, title)
+    yield from map(Whole, written(figure=told.figure))

@@ -8,18 +8,22 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.cli.commands._other_data import fitted_to
-from fieldsid.cli.console import emit, table
+from fieldsid.cli.console import emit
+from fieldsid.cli.inputs import fitted_to
 from fieldsid.cli.progress import get_ready
+from fieldsid.cli.session import drawn_in
+from fieldsid.cli.voice import angles
 from fieldsid.comparison.sufficient import pooled
 from fieldsid.errors import UsageError
+from fieldsid.figures.kinds import sketch
+from fieldsid.page import Block, Page, Whole, written
+from fieldsid.records.keys import body_of
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.comparison.compare import Comparison
     from fieldsid.extension import Loop
+    from fieldsid.results.comparisons import ComparedSeveral
 
 MOST_PLACES = 3
 CLOSE = 1.05
@@ -53,14 +57,16 @@ def several_models(
     ready = partial(get_ready, "fieldsid.comparison.compare")
     logs = read_runs(runs, check=effects, meanwhile=ready, refused=skips.skip, **reading)
     from fieldsid.comparison.compare import compare
-    from fieldsid.records.keys import body_of
     from fieldsid.results.comparisons import ComparedSeveral, OneOfSeveral, compared_run
 
     found_of = [compare(m, logs, unfit=skips.skip if i == 0 else None) for i, m in enumerate(models)]
     names = _names(paths)
     fitted_of = [fitted_to(p, m, logs) for p, m in zip(paths, models, strict=True)]
     loop = _loop(paths, found_of)
-    figures = tuple(_drawn(found_of, names, loop, output, force=force))
+    plots = {} if loop is None else {"loop": sketch("loop", loop)}
+    of_runs = zip(*found_of, strict=True)
+    plots |= {f"models_on_{of_run[0].run}": sketch("several", of_run, names) for of_run in of_runs}
+    figures = tuple(drawn_in(output, plots, force=force))
     least = min(range(len(paths)), key=lambda i: pooled(c.over_noise for c in found_of[i]))
     several = tuple(
         OneOfSeveral(
@@ -86,9 +92,7 @@ def several_models(
 
     headline = of_several(body, names, files_of(logs), inputs_of(Path(str(body["best"]))), close=CLOSE)
     notes = left_out(logs, models[0].axis)
-    result = emit(
-        body, as_json=as_json, render=lambda to: _render(to, body, found_of, names, loop), headline=headline, notes=notes
-    )
+    result = emit(body, as_json=as_json, render=_page(told, found_of, names), headline=headline, notes=notes)
     skips.end(len(found_of[0]))
     return result
 
@@ -107,17 +111,13 @@ def _loop(paths: Sequence[Path], found_of: Sequence[Sequence[Comparison]]) -> Lo
     return loop_of((replace(line[0], step=None), *line[1:]), found_of[places.index(line[0].path.resolve())], found_of[last])
 
 
-def _render_loop(to: Console, loop: Loop) -> None:
-    """Say where the first model fails and print the error on fitted and unseen runs after each addition."""
-    from fieldsid.cli.voice import shown_words
-
-    places = [f"{shown_words(p.condition)} (rms {p.rms_ratio:.2f} x)" for p in loop.where[:MOST_PLACES]]
-    if places:
-        to.print(f"{loop.before.run}: the {loop.start} fails most at {', '.join(places)}", soft_wrap=True)
+def _loop_blocks(loop: Loop) -> tuple[Block | str, ...]:
+    """Return where the first model fails, and the error on fitted and unseen runs after each addition."""
+    places = [f"{angles().words(p.condition)} (rms {p.rms_ratio:.2f} x)" for p in loop.where[:MOST_PLACES]]
+    fails = Whole(f"{loop.before.run}: the {loop.start} fails most at {', '.join(places)}" if places else "")
     of = "" if loop.is_noiseless else ", over the noise floor"
-    rows = [(s.added, *s.says) for s in loop.steps]
-    to.print()
-    to.print(table(f"the error step by step{of}", ("", "fitted", "unseen"), rows))
+    rows = tuple((s.added, *s.says) for s in loop.steps)
+    return fails, Block(f"the error step by step{of}", rows, ("", "fitted", "unseen"))
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
@@ -125,36 +125,8 @@ def _names(paths: Sequence[Path]) -> list[str]:
     return [s if stems.count(s) == 1 else str(p) for s, p in zip(stems, paths, strict=True)]
 
 
-def _drawn(
-    found_of: Sequence[Sequence[Comparison]], names: Sequence[str], loop: Loop | None, folder: Path | None, *, force: bool
-) -> list[str]:
-    if folder is None:
-        return []
-    from fieldsid.figures.canvas import save
-    from fieldsid.figures.kinds import figure_at
-    from fieldsid.figures.loop import figure as loop_figure
-    from fieldsid.figures.several import figure
-    from fieldsid.runtime.background_tasks import BackgroundTasks
-
-    alone = len(found_of[0]) == 1 and loop is None
-    with BackgroundTasks() as own:
-        whole = [] if loop is None else [save(loop_figure(loop), figure_at(folder, "loop", is_one=False), force=force, tasks=own)]
-        return [str(path) for path in whole] + [
-            str(
-                save(figure(of_run, names), figure_at(folder, f"models_on_{of_run[0].run}", is_one=alone), force=force, tasks=own)
-            )
-            for of_run in zip(*found_of, strict=True)
-        ]
-
-
-def _render(
-    to: Console, body: Mapping[str, Any], found_of: Sequence[Sequence[Comparison]], names: Sequence[str], loop: Loop | None
-) -> None:
-    if loop is not None:
-        _render_loop(to, loop)
-        to.print()
-    runs = [c.run for c in found_of[0]]
-    rows = [(run, *(f"{found[i].over_noise:.2f}" for found in found_of)) for i, run in enumerate(runs)]
-    to.print(table("error over the noise", ("run", *names), rows))
-    for path in body["figures"]:
-        to.print(f"figure: {path}", soft_wrap=True)
+def _page(told: ComparedSeveral, found_of: Sequence[Sequence[Comparison]], names: Sequence[str]) -> Page:
+    rows = tuple((of_run[0].run, *(f"{c.over_noise:.2f}" for c in of_run)) for of_run in zip(*found_of, strict=True))
+    errors = Block("error over the noise", rows, ("run", *names))
+    loop = () if told.loop is None else _loop_blocks(told.loop)
+    return Page("", blocks=(*loop, errors), closing=written(figure=told.figures))

@@ -6,7 +6,7 @@ import os
 import sys
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,47 +14,33 @@ import typer
 
 from fieldsid.cli.console import emit, progress, say
 from fieldsid.cli.exit_codes import GATE_FAILED
-from fieldsid.cli.options import AxisOption, FigureFile, Force, JsonFlag, MappingFile, VehicleFile
+from fieldsid.cli.options import AxisOption, FigureFile, Force, JsonFlag, MappingFile, Method, VehicleFile, argument, flag, option
+from fieldsid.cli.session import drawn_at
+from fieldsid.figures.kinds import sketch
+from fieldsid.page import Page, written
+from fieldsid.records.keys import body_of
+from fieldsid.rounding import number, with_error
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fieldsid.batch.archive import Work
-    from fieldsid.batch.trend import Trend
-    from fieldsid.models.axis import Axis
     from fieldsid.results.trial import NotUsed
 
-Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Logs, and folders of logs; runs that were imported, too.")]
-Folder = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder of the table and of each log's answer.")]
-Method = Annotated[str, typer.Option("--method", metavar="NAME", help="auto, output_error, pem, svf_ls, svf_rls or srivc.")]
-Diagnose = Annotated[bool, typer.Option("--diagnose/--no-diagnose", help="Ask of each run which effect is missing.")]
-Whole = Annotated[bool, typer.Option("--whole", help="Take logs as one run each, and use all of it.")]
-Workers = Annotated[
-    int | None, typer.Option("--workers", metavar="N", min=1, help="Processes on this machine; one a core.", show_default=False)
-]
-Scheduler = Annotated[
-    str | None,
-    typer.Option("--scheduler", metavar="tcp://...", help="Work on this Dask cluster (extra `cluster`).", show_default=False),
-]
-Timeout = Annotated[float, typer.Option("--timeout", metavar="S", min=0.1, help="Longest time for one log.")]
-Memory = Annotated[float, typer.Option("--memory", metavar="MB", min=100.0, help="Most memory of one process.")]
-WithTrend = Annotated[bool, typer.Option("--trend", help="Say and draw where parameters changed over the runs' dates.")]
 
 MOST_REASONS = 8
 
 
 def command(
-    logs: Logs,
+    logs: Annotated[list[Path], argument("LOG...", "Logs, and folders of logs; runs that were imported, too.")],
     axis: AxisOption,
-    output: Folder = Path("batch"),
+    output: Annotated[Path, option("-o --output", "DIR", "Folder of the table and of each log's answer.")] = Path("batch"),
     method: Method = "auto",
-    diagnose: Diagnose = True,
-    whole: Whole = False,
-    trend: WithTrend = False,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    timeout: Timeout = 600.0,
-    memory: Memory = 4000.0,
+    diagnose: Annotated[bool, flag("--diagnose/--no-diagnose", "Ask of each run which effect is missing.")] = True,
+    whole: Annotated[bool, flag("--whole", "Take logs as one run each, and use all of it.")] = False,
+    trend: Annotated[bool, flag("--trend", "Say and draw where parameters changed over the runs' dates.")] = False,
+    workers: Annotated[int | None, option("--workers", "N", "Processes on this machine; one a core.", min=1)] = None,
+    scheduler: Annotated[str | None, option("--scheduler", "tcp://...", "Work on this Dask cluster (extra `cluster`).")] = None,
+    timeout: Annotated[float, option("--timeout", "S", "Longest time for one log.", min=0.1)] = 600.0,
+    memory: Annotated[float, option("--memory", "MB", "Most memory of one process.", min=100.0)] = 4000.0,
     mapping: MappingFile = None,
     vehicle: VehicleFile = None,
     figure: FigureFile = None,
@@ -70,13 +56,12 @@ def command(
     """
     from fieldsid.batch.archive import all_rows, write_table
     from fieldsid.batch.task import Settings, Task, logs_in
+    from fieldsid.batch.trend import trends_of
     from fieldsid.cli.inputs import mapping_of
     from fieldsid.cli.progress import refuse_closed, refuse_figure
-    from fieldsid.records.keys import body_of
     from fieldsid.results.trial import Batch
 
     refuse_closed(output)
-    drawn = figure or (output / f"trend_{axis.value}.png" if trend else None)
     refuse_figure(figure, force=force)
     found = _logs(logs_in(logs), output)
     mapping_of(mapping)
@@ -93,12 +78,10 @@ def command(
     with progress("logs", len(tasks)) as step:
         rows, known = all_rows(output, tasks, work, step)
     parquet, table = write_table(output, axis, rows)
-    trends = _trends(rows, axis) if trend or figure is not None else ()
-    if drawn is not None and trends:
-        from fieldsid.figures.canvas import save
-        from fieldsid.figures.trend import figure as trend_figure
-
-        save(trend_figure(trends, axis.value), drawn, force=force or figure is None)
+    trends = trends_of([dict(r) for r in rows], axis) if trend or figure is not None else ()
+    place = figure or output / f"trend_{axis.value}.png"
+    plot = sketch("trend", trends, axis.value)
+    drawn = drawn_at(place if trends else None, plot, force=force or figure is None)
     unusable = [row for row in rows if row["status"] != "done"]
     body = body_of(
         Batch(
@@ -114,12 +97,12 @@ def command(
             effects=dict(Counter(r["effects"] for r in rows if r.get("effects")).most_common()),
             skipped_runs=tuple(_not_used(r) for r in unusable),
             trend=trends,
-            figure=str(drawn) if drawn is not None and trends else None,
+            figure=drawn,
         )
     )
     from fieldsid.cli.headlines.trial import of_batch
 
-    result = emit(body, as_json=as_json, render=lambda to: _render(to, body), headline=of_batch(body, trend=trend))
+    result = emit(body, as_json=as_json, render=_page(body), headline=of_batch(body, trend=trend))
     if (trend or figure is not None) and not trends:
         say(f"no trend: fewer than 6 runs of different dates know a parameter of {axis.value}")
     if trends and (dated := sum(row.get("time_from") == "file" for row in rows)):
@@ -150,19 +133,10 @@ def _work(workers: int | None, scheduler: str | None, timeout: float, memory: fl
         return partial(run_on_cluster, scheduler=scheduler), scheduler
     from fieldsid.batch.local_pool import run_here
 
-    count = workers or _cores()
+    cores = len(os.sched_getaffinity(0)) if sys.platform.startswith("linux") else os.cpu_count()
+    count = workers or cores or 1
     said = f"{count} process{'es' * (count != 1)} of this machine"
     return partial(run_here, workers=count, timeout_s=timeout, memory_mb=memory), said
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if sys.platform.startswith("linux") else os.cpu_count() or 1
-
-
-def _trends(rows: Sequence[Mapping[str, Any]], axis: Axis) -> tuple[Trend, ...]:
-    from fieldsid.batch.trend import trends_of
-
-    return trends_of([dict(r) for r in rows], axis)
 
 
 def _not_used(row: Mapping[str, Any]) -> NotUsed:
@@ -172,30 +146,23 @@ def _not_used(row: Mapping[str, Any]) -> NotUsed:
     return NotUsed(row["run"], row["log"], what, found, hint, row["status"])
 
 
-def _render(to: Console, body: Mapping[str, Any]) -> None:
-    bad = body["skipped_runs"]
-    for t in body["trend"]:
-        _render_trend(to, t)
+def _page(body: Mapping[str, Any]) -> Page:
     why: dict[str, list[str]] = {}  # what was said, by that without the names of file and run
-    for row in bad:
+    for row in body["skipped_runs"]:
         why.setdefault(row["what"].replace(row["file"], "").replace(row["run"], ""), []).append(row["what"])
-    for said in list(why.values())[:MOST_REASONS]:
-        more = f"; the same of {len(said) - 1} more" if len(said) > 1 else ""
-        to.print(f"not used: {said[0]}{more}", soft_wrap=True)
+    told = [line for t in body["trend"] for line in _trend(t)]
+    shown = [(said[0], len(said) - 1) for said in list(why.values())[:MOST_REASONS]]
+    told += [f"not used: {said}" + (f"; the same of {more} more" if more else "") for said, more in shown]
     if len(why) > MOST_REASONS:
-        to.print(f"and for {len(why) - MOST_REASONS} other reasons: see the column `what`")
-    to.print(f"table: {body['table']} and {body['csv']}", soft_wrap=True)
-    if body["figure"]:
-        to.print(f"figure: {body['figure']}", soft_wrap=True)
+        told.append(f"and for {len(why) - MOST_REASONS} other reasons: see the column `what`")
+    return Page("", closing=(*told, *written(table=f"{body['table']} and {body['csv']}", figure=body["figure"])))
 
 
-def _render_trend(to: Console, trend: Mapping[str, Any]) -> None:
-    from fieldsid.rounding import number, with_error
-
+def _trend(trend: Mapping[str, Any]) -> Iterator[str]:
     for c in trend["changes"]:
         by = f"{number(c['after'] - c['before'], 2)} {trend['parameter']}"
         if c["before"]:
             by = f"{with_error(100.0 * c['share'], 100.0 * c['std_error'] / abs(c['before']))} %"
-        to.print(f"{trend['parameter']} changed by {by} on {c['start_utc'][:10]}, from `{c['run']}` on", soft_wrap=True)
+        yield f"{trend['parameter']} changed by {by} on {c['start_utc'][:10]}, from `{c['run']}` on"
     if not trend["changes"]:
-        to.print(f"{trend['parameter']}: no change beyond errors and scatter in {trend['runs']} runs")
+        yield f"{trend['parameter']}: no change beyond errors and scatter in {trend['runs']} runs"

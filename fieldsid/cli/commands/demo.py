@@ -5,27 +5,24 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from contextlib import contextmanager, nullcontext, redirect_stderr, redirect_stdout
 from pathlib import Path
 from textwrap import fill
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from fieldsid.cli.app import run
 from fieldsid.cli.console import WIDTH, emit
 from fieldsid.cli.headlines.trial import of_demo
-from fieldsid.cli.options import Force, JsonFlag, OutputDir
+from fieldsid.cli.options import Force, JsonFlag, OutputDir, flag, option
 from fieldsid.cli.progress import compiling
 from fieldsid.cli.session import Session
 from fieldsid.cli.voice import voice
 from fieldsid.errors import ArtifactError
+from fieldsid.page import Page, written
 from fieldsid.runtime.background_tasks import BackgroundTasks
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fieldsid.demo.steps import Step
     from fieldsid.demo.trial import Trial
     from fieldsid.fitting.jit_warmup import Warmup
@@ -47,15 +44,11 @@ SHORT_OPENING = (
 BRIEF, VERBOSE, SILENT = "brief", "verbose", "silent"
 """How much of the tour is told while it goes on."""
 
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print each command with all that it says, and what it means.")]
-EffectName = Annotated[str, typer.Option("--effect", metavar="NAME", help="The effect to hide: see `sysid effects list`.")]
-
 
 def command(
-    context: typer.Context,
-    effect: EffectName = HIDDEN,
+    effect: Annotated[str, option("--effect", "NAME", "The effect to hide: see `sysid effects list`.")] = HIDDEN,
     output: OutputDir = None,
-    verbose: Verbose = False,
+    verbose: Annotated[bool, flag("--verbose -v", "Print each command with all that it says, and what it means.")] = False,
     force: Force = False,
     as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
@@ -68,11 +61,13 @@ def command(
     """
     began = perf_counter()
     told = SILENT if as_json or voice().is_quiet else VERBOSE if verbose else BRIEF
-    with compiling(context, _compile_loops) as warmup:
+    with compiling(_compile_loops) as warmup:
         body = _tour(effect, output, began, warmup, force=force, told=told)
     if told != SILENT:
         sys.stdout.write("\n")
-    return emit(body, as_json=as_json, render=lambda to: _render(to, body, figures=verbose), headline=of_demo(body))
+    figures = written(figure=[f for f in body["files"] if verbose and f.endswith(".png")])
+    page = Page("", closing=(*figures, "`sysid --help` lists every command."))
+    return emit(body, as_json=as_json, render=page, headline=of_demo(body))
 
 
 def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, force: bool, told: str) -> dict[str, Any]:
@@ -137,9 +132,11 @@ def _taken(place: int, step: Step, known: Mapping[str, str], session: Session, *
     words = words_of(step.line, known)
     if told == VERBOSE:
         sys.stdout.write(f"\n{place}. {step.title}\n$ sysid {' '.join(words)}\n\n")
+        sys.stdout.flush()
     began = perf_counter()
-    with _aloud() if told == VERBOSE else _silence():
+    with nullcontext() if told == VERBOSE else _silence():
         result = run([*expanded(words), *(["--force"] if force else [])], session)
+    sys.stderr.flush()
     meaning = step.means(result)
     if told == BRIEF:
         said = f"{place:2d}. {step.title}{'' if step.title.endswith('?') else ':'} {step.brief(result)}"
@@ -157,13 +154,6 @@ def _silence() -> Iterator[None]:
         yield
 
 
-@contextmanager
-def _aloud() -> Iterator[None]:
-    sys.stdout.flush()
-    yield
-    sys.stderr.flush()
-
-
 def _told(text: str, told: str) -> None:
     if told != SILENT:
         sys.stdout.write(f"\n{fill(text, WIDTH, break_on_hyphens=False)}\n" + ("\n" if told == BRIEF else ""))
@@ -179,9 +169,3 @@ def _flown(trial: Trial, folder: Path, leg: Leg) -> str:
         f"The vehicle flies it at {leg.speed:.1f} m/s and {trial.learning} at {others} m/s, to learn from, then "
         f"{trial.judging} at {judging} m/s, to judge by. Its logs are in {folder}/trial."
     )
-
-
-def _render(to: Console, body: Mapping[str, Any], *, figures: bool) -> None:
-    for file in (f for f in body["files"] if figures and f.endswith(".png")):
-        to.print(f"figure: {file}", soft_wrap=True)
-    to.print("`sysid --help` lists every command.")

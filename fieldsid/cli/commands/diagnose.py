@@ -8,48 +8,50 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from fieldsid.cli.console import emit, print_page, table
-from fieldsid.cli.options import ExcitedAxis, FigureFile, Force, JsonFlag, MappingFile, OutputFile, RunFiles, ValidateRuns
+from fieldsid.cli.console import emit
+from fieldsid.cli.options import (
+    ExcitedAxis,
+    FigureFile,
+    Force,
+    JsonFlag,
+    MappingFile,
+    OutputFile,
+    RunFiles,
+    ValidateRuns,
+    flag,
+    option,
+)
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, refuse_figure, trying
-from fieldsid.cli.session import tasks_of
+from fieldsid.cli.session import drawn_at
 from fieldsid.cli.voice import angles
 from fieldsid.display import page_of
 from fieldsid.errors import UsageError
+from fieldsid.page import Block, Page, written
+from fieldsid.records.keys import body_of
+from fieldsid.views._words import times
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fieldsid.diagnosis import Diagnosis
     from fieldsid.logs.run import Run
     from fieldsid.models.axis import Axis
     from fieldsid.models.model import Model
     from fieldsid.results.diagnoses import Applied, Diagnosed
 
-KnownModel = Annotated[
-    Path | None, typer.Option("--model", metavar="MODEL", help="A model whose effects are known already.", show_default=False)
-]
-Thorough = Annotated[
-    bool, typer.Option("--thorough", help="Go on for as long as there is something to try, half a minute where much is left.")
-]
-Apply = Annotated[
-    bool,
-    typer.Option("--apply", help="Add what is named, an effect at a time, each a model in `models/` with its errors."),
-]
-
 
 def command(
-    context: typer.Context,
     runs: RunFiles,
     axis: ExcitedAxis = None,
     validate: ValidateRuns = None,
-    model: KnownModel = None,
+    model: Annotated[Path | None, option("--model", "MODEL", "A model whose effects are known already.")] = None,
     mapping: MappingFile = None,
     output: OutputFile = None,
     figure: FigureFile = None,
-    thorough: Thorough = False,
-    apply: Apply = False,
+    thorough: Annotated[
+        bool, flag("--thorough", "Go on for as long as there is something to try, half a minute where much is left.")
+    ] = False,
+    apply: Annotated[
+        bool, flag("--apply", "Add what is named, an effect at a time, each a model in `models/` with its errors.")
+    ] = False,
     force: Force = False,
     as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
@@ -61,7 +63,7 @@ def command(
 
     Example: sysid diagnose runs/pulses_*.parquet --axis yaw --validate runs/zigzag.parquet
     """
-    from fieldsid.cli.inputs import axis_excited, files_of, read_groups
+    from fieldsid.cli.inputs import AXIS_OPTION, files_of, read_groups
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.cli.user_effects import check_effects
 
@@ -71,12 +73,12 @@ def command(
     skips, ready = Skips(), partial(get_ready, "fieldsid.diagnosis")
     held = partial(check_effects, [(model, known)] if model and known else [])
     training, unseen = read_groups([runs, validate or []], mapping=mapping, check=held, meanwhile=ready, refused=skips.skip)
-    axis = known.axis if known else axis or axis_excited(training)
     from fieldsid.diagnosis import diagnose
-    from fieldsid.records.keys import body_of
+    from fieldsid.face.arguments import axis_excited
     from fieldsid.results.diagnoses import Diagnosed
 
-    with compiling_first(context), trying("diagnosing") as report:
+    axis = known.axis if known else axis or axis_excited(training, AXIS_OPTION)
+    with compiling_first(), trying("diagnosing") as report:
         found = diagnose(training, axis, unseen, model=known, report=report, thorough=thorough, unfit=skips.skip)
     training, unseen = skips.left_of(training), skips.left_of(unseen)
     inputs = [*files_of([*training, *unseen]), *([model] if model else [])]
@@ -88,14 +90,14 @@ def command(
         known=() if known is None else known.effects,
         skipped_runs=tuple(skips.records),
     )
-    told = replace(told, file=_saved(told, output, inputs, force=force), figure=_drawn(found, figure, context, force=force))
+    told = replace(told, file=_saved(told, output, inputs, force=force), figure=drawn_at(figure, found.plot, force=force))
     if apply:
-        told = replace(told, applied=_applied(context, found, (known, model), training, unseen, force=force))
+        told = replace(told, applied=_applied(found, (known, model), training, unseen, force=force))
     body = body_of(told)
     from fieldsid.cli.headlines.missing import Searched, of_diagnosis
 
     headline = of_diagnosis(body, Searched(files_of(training), files_of(unseen), model, thorough))
-    result = emit(body, as_json=as_json, render=lambda to: _render(to, found, body), headline=headline, notes=found.notes)
+    result = emit(body, as_json=as_json, render=_page(found, body), headline=headline, notes=found.notes)
     skips.end(len(training) + len(unseen))
     return result
 
@@ -117,23 +119,13 @@ def _saved(told: Diagnosed, path: Path | None, inputs: Sequence[Path], *, force:
     if path is None:
         return None
     from fieldsid.artifacts import save_record
-    from fieldsid.records.keys import body_of
 
     kept = {k: v for k, v in body_of(told).items() if k not in ("schema", "applied", "file", "figure")}
     return str(save_record(path, "fieldsid/diagnosis/1", kept, inputs=inputs, force=force))
 
 
-def _drawn(found: Diagnosis, path: Path | None, context: typer.Context, *, force: bool) -> str | None:
-    if path is None:
-        return None
-    from fieldsid.figures.canvas import save
-    from fieldsid.figures.diagnose import figure
-
-    return str(save(figure(found), path, force=force, tasks=tasks_of(context)))
-
-
 def _applied(
-    context: typer.Context, found: Diagnosis, model: tuple[Model | None, Path | None], training: Sequence[Run],
+    found: Diagnosis, model: tuple[Model | None, Path | None], training: Sequence[Run],
     unseen: Sequence[Run], *, force: bool,
 ) -> tuple[Applied, ...]:  # fmt: skip
     """Extend the model diagnosed by each named effect in turn, write each model, and return what each step has changed."""
@@ -153,7 +145,7 @@ def _applied(
         if not path.exists() or force:
             save_model(known, path, inputs=files_of(training), force=force)
     targets = step_files(path, found.effects, force=force)
-    with compiling_first(context), trying("adding what was found") as report:
+    with compiling_first(), trying("adding what was found") as report:
         steps = extend_in_steps(known, found.effects, training, unseen, report=report)
     save_steps(steps, targets, path, (training, unseen), force=force)
     return tuple(
@@ -161,27 +153,20 @@ def _applied(
     )
 
 
-def _render_applied(to: Console, applied: Sequence[Mapping[str, Any]]) -> None:
-    """Print the error on fitted and unseen runs before the first step and after each."""
-    from fieldsid.cli.headlines.words import times
+def _page(found: Diagnosis, body: Mapping[str, Any]) -> Page:
+    """Return the page of the diagnosis, with the error before the first addition and after each where effects were added."""
+    applied = body["applied"]
+    models = [step["model"] for step in applied]
+    closing = (*written(model=models), *written(file=body["file"], figure=body["figure"]))
+    return Page("", blocks=(*page_of(found, angles()).blocks, _steps(applied)), closing=closing)
+
+
+def _steps(applied: Sequence[Mapping[str, Any]]) -> Block:
     from fieldsid.comparison.sufficient import over_noise
 
     def row(name: str, errors: Mapping[str, Any], floor: Mapping[str, Any]) -> tuple[str, ...]:
         return (name, *(times(over_noise(errors[side], floor)) for side in ("train", "validation")))
 
-    if not applied:
-        return
-    rows = [row("as it is", applied[0]["before"], applied[0]["noise_floor"])]
+    rows = [row("as it is", step["before"], step["noise_floor"]) for step in applied[:1]]
     rows += [row(f"+ {step['effect']}", step["after"], step["noise_floor"]) for step in applied]
-    to.print()
-    to.print(table("the error step by step, over the noise floor", ("", "fitted", "unseen"), rows))
-    for step in applied:
-        to.print(f"model: {step['model']}", soft_wrap=True)
-
-
-def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
-    print_page(to, page_of(found, angles()))
-    _render_applied(to, body["applied"])
-    for key in ("file", "figure"):
-        if body[key]:
-            to.print(f"{key}: {body[key]}", soft_wrap=True)
+    return Block("the error step by step, over the noise floor", tuple(rows), ("", "fitted", "unseen"))

@@ -9,70 +9,64 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, table
+from fieldsid.cli.console import emit
 from fieldsid.cli.headlines.missing import of_catalogue, of_effect, of_new_effect
 from fieldsid.cli.headlines.typed import pasted
-from fieldsid.cli.options import Force, JsonFlag
+from fieldsid.cli.options import Force, JsonFlag, argument, option
 from fieldsid.cli.progress import refuse_existing
 from fieldsid.cli.user_effects import OWN_EFFECTS, load_own_effects
 from fieldsid.errors import UsageError
 from fieldsid.models.axis import Axis
+from fieldsid.page import Block, Page, Whole, paragraph, written
+from fieldsid.records.keys import body_of
+from fieldsid.rounding import in_unit
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fieldsid.models.effect import Effect, Variant
     from fieldsid.results.effects import Form
 
 command = typer.Typer(help="List the physical effects, show one, start one of your own.\n\nExample: sysid effects show servo_lag")
 
-EffectName = Annotated[str, typer.Argument(metavar="NAME", help="Name of an effect, as in `sysid effects list`.")]
-OneAxis = Annotated[Axis | None, typer.Option("--axis", help="Only the effects of this plane.", show_default=False)]
-NewName = Annotated[
-    str, typer.Argument(metavar="NAME", help="Name that yours shall have: a small letter, then letters, digits, _.")
-]
-NewAxis = Annotated[Axis, typer.Option("--axis", help="The plane that it acts on.")]
-NewFile = Annotated[
-    Path | None,
-    typer.Option(
-        "-o", "--output", metavar="FILE", help="YAML file to write; effects/NAME.yaml if not given.", show_default=False
-    ),
-]
-
 
 @command.command("list", short_help="List every effect by stage.")
-def list_(axis: OneAxis = None, as_json: JsonFlag = False) -> Mapping[str, Any]:
+def list_(
+    axis: Annotated[Axis | None, option("--axis", "", "Only the effects of this plane.")] = None, as_json: JsonFlag = False
+) -> Mapping[str, Any]:
     """List every effect by its stage of the signal path: actuator, hydrodynamics, sensor.
 
     Example: sysid effects list --axis yaw
     """
     from fieldsid.effects import all_effects
-    from fieldsid.records.keys import body_of
     from fieldsid.results.effects import Catalogue, Described
 
     known = all_effects(axis).values()
     body = body_of(Catalogue(axis, tuple(map(Described, known))))
-    return emit(body, as_json=as_json, render=lambda to: _render_list(to, known), headline=of_catalogue(body))
+    return emit(body, as_json=as_json, render=_list_page(known), headline=of_catalogue(body))
 
 
 @command.command("show", short_help="Show all that is known of one effect.")
-def show(name: EffectName, as_json: JsonFlag = False) -> Mapping[str, Any]:
+def show(
+    name: Annotated[str, argument("NAME", "Name of an effect, as in `sysid effects list`.")], as_json: JsonFlag = False
+) -> Mapping[str, Any]:
     """Show one effect: equation, coefficients, telltale, what excites it, what it is mistaken for, source.
 
     Example: sysid effects show servo_lag
     """
     from fieldsid.effects import pick_effect
-    from fieldsid.records.keys import body_of
     from fieldsid.results.effects import Described, ShownEffect
 
     effect = pick_effect(name)
     body = body_of(ShownEffect(Described(effect)))
-    return emit(body, as_json=as_json, render=lambda to: _render_one(to, effect), headline=of_effect(body))
+    return emit(body, as_json=as_json, render=_page(effect), headline=of_effect(body))
 
 
 @command.command("new", short_help="Start an effect of your own.")
 def new(
-    name: NewName, axis: NewAxis = Axis.YAW, output: NewFile = None, force: Force = False, as_json: JsonFlag = False
+    name: Annotated[str, argument("NAME", "Name that yours shall have: a small letter, then letters, digits, _.")],
+    axis: Annotated[Axis, option("--axis", "", "The plane that it acts on.")] = Axis.YAW,
+    output: Annotated[Path | None, option("-o --output", "FILE", "YAML file to write; effects/NAME.yaml if not given.")] = None,
+    force: Force = False,
+    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Write a file for an effect of your own, to be edited: a YAML file with a moment as an expression.
 
@@ -81,7 +75,6 @@ def new(
     Example: sysid effects new tether_drag --axis yaw
     """
     from fieldsid.artifacts import write_text
-    from fieldsid.records.keys import body_of
     from fieldsid.results.effects import NewEffect
 
     path = output or Path(OWN_EFFECTS) / f"{name}.yaml"
@@ -90,8 +83,8 @@ def new(
     write_text(path, _started(name, axis, path), force=force)
     load_own_effects()  # what was broken in a file that is replaced is so no more
     body = body_of(NewEffect(name, axis, str(path)))
-    headline = of_new_effect(body, _look_at(path, name))
-    return emit(body, as_json=as_json, render=lambda to: to.print(f"effect: {path}", soft_wrap=True), headline=headline)
+    page = Page("", closing=written(effect=str(path)))
+    return emit(body, as_json=as_json, render=page, headline=of_new_effect(body, _look_at(path, name)))
 
 
 def _refuse_name(name: str, path: Path) -> None:
@@ -147,17 +140,13 @@ def _changes(name: str, axis: Axis) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _render_list(to: Console, known: Iterable[Effect]) -> None:
+def _list_page(known: Iterable[Effect]) -> Page:
     from fieldsid.models.effect import Stage
 
-    for stage in Stage:
-        rows = [(e.name, "+".join(e.axes), e.says) for e in known if e.stage is stage]
-        if rows:
-            to.print(table(stage.capitalize(), ("effect", "axes", "in plain words"), rows, left=3))
-            to.print()
-    for effect in known:
-        if effect.definition is not None:
-            to.print(f"{effect.name} is not built in: {effect.origin}", soft_wrap=True)
+    stages = {stage: tuple((e.name, "+".join(e.axes), e.says) for e in known if e.stage is stage) for stage in Stage}
+    blocks = (Block(stage.capitalize(), rows, ("effect", "axes", "in plain words"), left=3) for stage, rows in stages.items())
+    own = [f"{e.name} is not built in: {e.origin}" for e in known if e.definition is not None]
+    return Page("", blocks=(*blocks, *paragraph(own, Whole)))
 
 
 def _form_in_words(effect: Effect, form: Form, asked: Variant) -> str:
@@ -166,11 +155,10 @@ def _form_in_words(effect: Effect, form: Form, asked: Variant) -> str:
     return form.says + (f" ({', '.join(own)})" if own else "")
 
 
-def _render_one(to: Console, effect: Effect) -> None:
+def _page(effect: Effect) -> Page:
     from fieldsid.results.effects import Described
-    from fieldsid.rounding import in_unit
 
-    facts = [
+    facts = (
         ("stage", f"{effect.stage}, {' and '.join(effect.axes)}"),
         ("equation", effect.equation),
         ("telltale", effect.telltale),
@@ -183,11 +171,9 @@ def _render_one(to: Console, effect: Effect) -> None:
         ("log must have", ", ".join(effect.needs) or "nothing more"),
         ("source", effect.source),
         ("origin", effect.origin),
-    ]
-    to.print(table("", ("", ""), facts, left=2))
-    rows = [
+    )
+    rows = tuple(
         (c.name, in_unit(c.unit), f"{c.low:g} .. {c.high:g}", c.says + (" (each run its own)" if c.per_run else ""))
         for c in effect.every
-    ]
-    to.print()
-    to.print(table("", ("coefficient", "unit", "range", "is"), rows, left=4))
+    )
+    return Page("", blocks=(Block("", facts, left=2), Block("", rows, ("coefficient", "unit", "range", "is"), left=4)))

@@ -2,57 +2,42 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from fieldsid.cli.console import emit, print_page, table
+from fieldsid.cli.console import emit
 from fieldsid.cli.headlines.missing import left_says, of_extension, of_undoing
 from fieldsid.cli.headlines.typed import pasted, repeated
 from fieldsid.cli.headlines.words import used
-from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, ValidateRuns
+from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, ValidateRuns, argument, flag, option
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, trying
 from fieldsid.cli.skipped_logs import Skips
-from fieldsid.cli.voice import angles, shown_in
+from fieldsid.cli.voice import angles
 from fieldsid.comparison.sufficient import is_noise
 from fieldsid.errors import ArtifactError, UsageError
-from fieldsid.page import Page
+from fieldsid.page import Block, Page, paragraph, written
+from fieldsid.records.keys import body_of
+from fieldsid.rounding import number, with_error
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fieldsid.extension import Extension
-    from fieldsid.extension.extend import Gain
     from fieldsid.models.model import Model
     from fieldsid.results.extensions import AddedCoefficient, Extended, LeftOver
 
 MUCH, SMALL = 100.0, 1e-3
 """A standard error so many times the value, or the smallest value that counts, is no knowledge."""
 
-LearnedRuns = Annotated[
-    list[Path] | None, typer.Argument(metavar="RUN...", help="The runs that the model and the effects are fitted to.")
-]
-Added = Annotated[
-    list[str] | None,
-    typer.Option("--add", metavar="EFFECT", help="An effect to add: see `sysid effects list`; may repeat.", show_default=False),
-]
-Keep = Annotated[bool, typer.Option("--keep", help="Keep the addition even where the error on unseen runs does not fall.")]
-Undo = Annotated[bool, typer.Option("--undo", help="Go back: give the model that this one was extended from.")]
-
 
 def command(
-    context: typer.Context,
     model: ModelFile,
-    runs: LearnedRuns = None,
-    add: Added = None,
+    runs: Annotated[list[Path] | None, argument("RUN...", "The runs that the model and the effects are fitted to.")] = None,
+    add: Annotated[list[str] | None, option("--add", "EFFECT", "An effect to add: see `sysid effects list`; may repeat.")] = None,
     validate: ValidateRuns = None,
-    keep: Keep = False,
-    undo: Undo = False,
+    keep: Annotated[bool, flag("--keep", "Keep the addition even where the error on unseen runs does not fall.")] = False,
+    undo: Annotated[bool, flag("--undo", "Go back: give the model that this one was extended from.")] = False,
     mapping: MappingFile = None,
     output: OutputFile = None,
     force: Force = False,
@@ -73,47 +58,17 @@ def command(
                 "`--undo` takes the model alone", found="runs or options beside it", hint=f"sysid extend {model} --undo"
             )
         return _undone(model, output, force=force, as_json=as_json)
-    from fieldsid.records.keys import body_of
-
-    skips = Skips()
-    told = _extended(
-        context, model, runs or [], _names(add), validate or [], skips, keep=keep, mapping=mapping, output=output, force=force
-    )
-    body = body_of(told)
-    result = emit(
-        body, as_json=as_json, render=lambda to: _render(to, told.gain, body), headline=of_extension(body), notes=told.notes
-    )
-    skips.end(len(runs or []) + len(validate or []) - len(skips.records))
-    return result
-
-
-def _names(given: Sequence[str] | None) -> list[str]:
-    """Return the effects of all `--add`, each of which may hold several as `a,b` or `a+b`."""
-    return [n for text in given or [] for n in re.split(r"[,+\s]+", text) if n]
-
-
-def _extended(
-    context: typer.Context,
-    path: Path,
-    runs: Sequence[Path],
-    names: Sequence[str],
-    validate: Sequence[Path],
-    skips: Skips,
-    *,
-    keep: bool,
-    mapping: Path | None,
-    output: Path | None,
-    force: bool,
-) -> Extended:
     from fieldsid.cli.inputs import model_first, read_groups
+    from fieldsid.face.arguments import names_of
     from fieldsid.models.model import load_model
 
-    path, runs = model_first(path, runs)
+    path, runs = model_first(model, runs or [])
     if not runs:
         raise UsageError(
             "there is no run to fit to", found=f"sysid extend {path}", hint=f"sysid extend {path} RUN... --add EFFECT"
         )
-    known, names = load_model(path), list(dict.fromkeys(names))
+    skips, validate = Skips(), validate or []
+    known, names = load_model(path), list(dict.fromkeys(n for given in add or [] for n in names_of(given)))
     targets = step_files(path, names, output, force=force) if names else []
     check, ready = partial(_check, path, known, names), partial(get_ready, "fieldsid.extension")
     training, unseen = read_groups([runs, validate], mapping=mapping, check=check, meanwhile=ready, refused=skips.skip)
@@ -122,23 +77,23 @@ def _extended(
     from fieldsid.records.named_inputs import sha256_of
     from fieldsid.results.extensions import Extended, MadeFrom
 
-    with compiling_first(context), trying("extending") as report:
+    with compiling_first(), trying("extending") as report:
         steps = extend_in_steps(known, names, training, unseen, report=report, unfit=skips.skip)
     found = whole_of(steps)
     training, unseen = skips.left_of(training), skips.left_of(unseen)
     kept = found.pays or keep
     if kept:
         save_steps(steps, targets, path, (training, unseen), force=force)
-    model = targets[-1] if kept else path
-    left, next_ = _left(found, model, known, runs, validate, kept=kept)
-    return Extended(
+    now = targets[-1] if kept else path
+    left, next_ = _left(found, now, known, runs, validate, kept=kept)
+    told = Extended(
         gain=found.gain,
         axis=known.axis,
         log_evidence=found.evidence,
         pays=found.pays,
         kept=kept,
         kept_by=kept_by(found) if kept else None,
-        model=str(model),
+        model=str(now),
         effects=found.model.effects if kept else known.effects,
         parent=MadeFrom(str(path), sha256_of(path)),
         coefficients=_coefficients(found),
@@ -147,6 +102,10 @@ def _extended(
         next=next_,
         skipped_runs=tuple(skips.records),
     )
+    body = body_of(told)
+    result = emit(body, as_json=as_json, render=_page(told, body), headline=of_extension(body), notes=told.notes)
+    skips.end(len(runs) + len(validate) - len(skips.records))
+    return result
 
 
 def step_files(parent: Path, effects: Sequence[str], last: Path | None = None, *, force: bool = False) -> list[Path]:
@@ -199,7 +158,6 @@ def _undone(path: Path, output: Path | None, *, force: bool, as_json: bool) -> M
     from fieldsid.artifacts import replacing
     from fieldsid.extension import CHANGED, MISSING, history_of, parent_of
     from fieldsid.models.model import load_model
-    from fieldsid.records.keys import body_of
     from fieldsid.results.extensions import Undone
 
     parent = parent_of(path)
@@ -221,28 +179,21 @@ def _undone(path: Path, output: Path | None, *, force: bool, as_json: bool) -> M
         gain=step.gain if step else None, undone=str(path), model=str(back), effects=load_model(back).effects, parent=parent
     )
     body = body_of(undone)
-    return emit(body, as_json=as_json, render=lambda to: _render_undone(to, body), headline=of_undoing(body))
+    page = Page("", closing=(f"model: {back}; {path} stays where it is",))
+    return emit(body, as_json=as_json, render=page, headline=of_undoing(body))
 
 
-def _render_undone(to: Console, body: Mapping[str, Any]) -> None:
-    to.print(f"model: {body['model']}; {body['undone']} stays where it is", soft_wrap=True)
-
-
-def _render(to: Console, gain: Gain, body: Mapping[str, Any]) -> None:
+def _page(told: Extended, body: Mapping[str, Any]) -> Page:
     from fieldsid.views.extension import errors
 
-    print_page(to, Page("", blocks=(errors(gain, angles()),)))
-    to.print()
-    found = [
-        (n, _value(factor * c["value"], factor * c["std_error"], at_bound=c["at_bound"]), unit)
-        for n, c in body["coefficients"].items()
-        for factor, unit in [shown_in(c["unit"])]
-    ]
-    to.print(table("", ("coefficient", "value", "unit"), found, left=2))
-    to.print()
-    to.print(_verdict(body))
-    to.print(left_says(body))
-    to.print(f"model: {body['model']}", soft_wrap=True)
+    found = tuple(
+        (name, _value(factor * c.value, factor * c.std_error, at_bound=c.at_bound), unit)
+        for name, c in told.coefficients.items()
+        for factor, unit in [angles().of(c.unit)]
+    )
+    coefficients = Block("", found, ("coefficient", "value", "unit"), left=2)
+    says = paragraph([_verdict(body), left_says(body)])
+    return Page("", blocks=(errors(told.gain, angles()), coefficients, *says), closing=written(model=told.model))
 
 
 def _verdict(body: Mapping[str, Any]) -> str:
@@ -256,8 +207,6 @@ def _verdict(body: Mapping[str, Any]) -> str:
 
 def _value(value: float, error: float, *, at_bound: bool) -> str:
     """Return a value with its error, or why it has none."""
-    from fieldsid.rounding import number, with_error
-
     if at_bound:
         return f"{number(value)} (at its bound)"
     known = error < MUCH * max(abs(value), SMALL)

@@ -6,10 +6,8 @@ import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from fieldsid.cli.console import emit
-from fieldsid.cli.options import JsonFlag
+from fieldsid.cli.options import JsonFlag, argument
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,13 +19,13 @@ WIDEST = 100
 KEEPS_STYLES = "FRX"
 """Options of `less` where the user has set none: show colours, and leave at once where a page fits the screen."""
 
-Topic = Annotated[
-    str | None,
-    typer.Argument(metavar="TOPIC", help="A page, such as `trial` or `effects/servo_lag`; the contents if not given."),
-]
 
-
-def command(topic: Topic = None, as_json: JsonFlag = False) -> Mapping[str, Any]:
+def command(
+    topic: Annotated[
+        str | None, argument("TOPIC", "A page, such as `trial` or `effects/servo_lag`; the contents if not given.")
+    ] = None,
+    as_json: JsonFlag = False,
+) -> Mapping[str, Any]:
     """Show a page of the guide: on a terminal in a pager, else as text.
 
     The pages are Markdown files that are installed with the program, so that no network is needed. An effect, a command, the code

@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from math import isfinite
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
-import typer
-
-from fieldsid.cli.console import emit, say, table
+from fieldsid.cli.console import emit, say
 from fieldsid.cli.options import FigureFile, Force, JsonFlag, ModelFile
 from fieldsid.cli.progress import refuse_figure
-from fieldsid.cli.session import tasks_of
-from fieldsid.cli.voice import shown_in
+from fieldsid.cli.session import drawn_at
+from fieldsid.cli.voice import angles
+from fieldsid.figures.kinds import sketch
 from fieldsid.logs.run import Note
+from fieldsid.page import Block, Page, Whole, paragraph, written
+from fieldsid.records.keys import body_of
+from fieldsid.rounding import number
+from fieldsid.views.extension import channels_of
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
-    from fieldsid.extension import Generation
+    from fieldsid.extension import Gain, Generation, Step
 
 KEPT = {"unseen": "unseen data are predicted better", "evidence": "the evidence pays for it", "--keep": "kept because of --keep"}
 
 
-def command(
-    context: typer.Context, model: ModelFile, figure: FigureFile = None, force: Force = False, as_json: JsonFlag = False
-) -> Mapping[str, Any]:
+def command(model: ModelFile, figure: FigureFile = None, force: Force = False, as_json: JsonFlag = False) -> Mapping[str, Any]:
     """Show how a model came about: its parents, the effects added, and how the error fell towards the noise floor.
 
     Every file's hash is checked against what its child and its data were when it was made.
@@ -38,36 +36,27 @@ def command(
     refuse_figure(figure, force=force)
     known = read_model(model)
     from fieldsid.extension import history_of
-    from fieldsid.records.keys import body_of
     from fieldsid.results.extensions import History
 
     line = history_of(model)
+    steps = [g.step for g in line if g.step]
+    if figure is not None and not steps:
+        say("nothing was added yet: there is no figure to draw")
+    plot = sketch("history", line, model.name)
     body = body_of(
         History(
             model=str(model),
             axis=known.axis,
             generations=line,
             intact=all(g.state == "intact" and not (g.step and g.step.changed_data) for g in line),
-            figure=_drawn(line, model, figure, context, force=force),
+            figure=drawn_at(figure if steps else None, plot, force=force),
         )
     )
     from fieldsid.cli.headlines.models import of_history
     from fieldsid.records.named_inputs import inputs_of
 
     headline = of_history(body, inputs_of(model))
-    return emit(body, as_json=as_json, render=lambda to: _render(to, line, body), headline=headline, notes=_notes(line))
-
-
-def _drawn(line: Sequence[Generation], model: Path, path: Path | None, context: typer.Context, *, force: bool) -> str | None:
-    if path is None:
-        return None
-    if not any(g.step for g in line):
-        say("nothing was added yet: there is no figure to draw")
-        return None
-    from fieldsid.figures.canvas import save
-    from fieldsid.figures.history import figure
-
-    return str(save(figure(line, model.name), path, force=force, tasks=tasks_of(context)))
+    return emit(body, as_json=as_json, render=_page(line, steps, body), headline=headline, notes=_notes(line))
 
 
 def _notes(line: Sequence[Generation]) -> list[Note]:
@@ -82,45 +71,28 @@ def _notes(line: Sequence[Generation]) -> list[Note]:
     return found
 
 
-def _render(to: Console, line: Sequence[Generation], body: Mapping[str, Any]) -> None:
+def _page(line: Sequence[Generation], steps: Sequence[Step], body: Mapping[str, Any]) -> Page:
     first = line[0]
-    to.print(f"starts from {', '.join(first.effects) or 'the plain model'}: {first.path}", soft_wrap=True)
-    to.print()
-    rows = [row for g in line if g.step for row in _rows(g)]
-    if rows:
-        to.print(table("", ("added", "error of", "before", "after", "noise", "x floor"), rows, left=2))
-    to.print()
-    for g in line:
-        if g.step:
-            judged = ("judged on " if g.step.gain.unseen else "fitted to ") + ", ".join(g.step.gain.judged_on)
-            kept = KEPT.get(g.step.kept_by, g.step.kept_by)
-            to.print(f"+ {', '.join(g.step.gain.added)}: {kept}; {judged}", soft_wrap=True)
-    to.print(f"model: {body['model']}", soft_wrap=True)
-    if body["figure"]:
-        to.print(f"figure: {body['figure']}", soft_wrap=True)
+    added = [row for step in steps for row in _rows(step.gain)]
+    kept = []
+    for step in steps:
+        judged = ("judged on " if step.gain.unseen else "fitted to ") + ", ".join(step.gain.judged_on)
+        kept.append(f"+ {', '.join(step.gain.added)}: {KEPT.get(step.kept_by, step.kept_by)}; {judged}")
+    blocks: tuple[Block | str, ...] = (
+        Whole(f"starts from {', '.join(first.effects) or 'the plain model'}: {first.path}"),
+        Block("", tuple(added), ("added", "error of", "before", "after", "noise", "x floor"), left=2),
+        *paragraph(kept, Whole),
+    )
+    return Page("", blocks=blocks, closing=written(model=body["model"], figure=body["figure"]))
 
 
-def _rows(g: Generation) -> list[tuple[str, ...]]:
-    """Return a row for each channel of one addition, the pooled error over the floor on the first."""
-    from fieldsid.rounding import number
-
-    if g.step is None:
-        return []
-    gain, (times, angle) = g.step.gain, shown_in("rad")
-    before, after = (p.validation if gain.unseen else p.train for p in (gain.before, gain.after))
-    channels = [
-        (name, b, a, floor)
-        for name, b, a, floor in (
-            (f"angle, {angle}", before.angle_rms_rad, after.angle_rms_rad, gain.noise_floor.angle),
-            (f"rate, {angle}/s", before.rate_rms_rad_s, after.rate_rms_rad_s, gain.noise_floor.rate),
-        )
-        if isfinite(b)
-    ]
-    words = [f"+ {n}" for n in gain.added]
-    words += [""] * (len(channels) - len(words))
-    over = [f"{gain.over_floor[0]:.2f} -> {gain.over_floor[1]:.2f}", *([""] * (len(words) - 1))]
-    channels += [("", float("nan"), float("nan"), float("nan"))] * (len(words) - len(channels))
-    return [
-        (w, name, *(number(times * v, 3) if name else "" for v in (b, a, floor)), x)
-        for w, (name, b, a, floor), x in zip(words, channels, over, strict=True)
-    ]
+def _rows(gain: Gain) -> Iterator[tuple[str, ...]]:
+    """Yield a row for each channel of one addition, the pooled error over the floor on the first."""
+    judged = "unseen" if gain.unseen else "fitted"
+    channels = [r for r in channels_of(gain) if r["runs"] == judged]
+    over = f"{gain.over_floor[0]:.2f} -> {gain.over_floor[1]:.2f}"
+    for name, r in zip_longest((f"+ {n}" for n in gain.added), channels, fillvalue=None):
+        times, unit = angles().of(r["unit"]) if r else (1.0, "")
+        errors = [number(times * r[k], 3) if r else "" for k in ("before", "after", "noise_floor")]
+        yield name or "", f"{r['channel']}, {unit}" if r else "", *errors, over
+        over = ""

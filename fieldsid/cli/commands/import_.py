@@ -6,48 +6,32 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from fieldsid.cli.options import Force, FromS, Join, JsonFlag, MappingFile, ToS, VehicleFile
+from fieldsid.cli.options import Force, FromS, Join, JsonFlag, MappingFile, MsgPath, ToS, VehicleFile, argument, flag, option
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
-    from fieldsid.logs.importing import Imported, Importer
+    from fieldsid.logs.importing import Importer
 
 
 def command(
-    logs: Annotated[
-        list[Path], typer.Argument(metavar="LOG...", help="Logs: tables, bags, MATLAB, MOOS, PX4, ArduPilot, gliders.")
-    ],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="DIR|FILE", help="Folder for the runs, or the file of a single one.")
-    ],
+    logs: Annotated[list[Path], argument("LOG...", "Logs: tables, bags, MATLAB, MOOS, PX4, ArduPilot, gliders.")],
+    output: Annotated[Path, option("-o --output", "DIR|FILE", "Folder for the runs, or the file of a single one.")],
     join: Join = False,
     mapping: MappingFile = None,
     channel: Annotated[
-        list[str] | None,
-        typer.Option("--channel", metavar="SIGNAL=COLUMN:UNIT", help="Map one signal; counts more than the mapping; may repeat."),
+        list[str] | None, option("--channel", "SIGNAL=COLUMN:UNIT", "Map one signal; counts more than the mapping; may repeat.")
     ] = None,
-    msg_path: Annotated[
-        Path | None, typer.Option("--msg-path", metavar="DIR", help="Folder of .msg files for types the bag does not define.")
-    ] = None,
+    msg_path: MsgPath = None,
     vehicle: VehicleFile = None,
     from_s: FromS = None,
     to_s: ToS = None,
-    max_gap: Annotated[
-        float,
-        typer.Option("--max-gap", metavar="S", help="Longest gap of a main signal, or 5 of its own steps.", min=0.0),
-    ] = 2.0,
+    max_gap: Annotated[float, option("--max-gap", "S", "Longest gap of a main signal, or 5 of its own steps.", min=0.0)] = 2.0,
     salvage: Annotated[
-        bool, typer.Option("--salvage", help="Take what is left of a damaged log: cut gzip, bad cells, time out of order.")
+        bool, flag("--salvage", "Take what is left of a damaged log: cut gzip, bad cells, time out of order.")
     ] = False,
     whole: Annotated[
-        bool, typer.Option("--whole", help="Keep what is not under way: on deck, at the surface, idle; one run for each log.")
+        bool, flag("--whole", "Keep what is not under way: on deck, at the surface, idle; one run for each log.")
     ] = False,
-    format_: Annotated[
-        str, typer.Option("--format", metavar="parquet|csv|csv.gz", help="Kind of file in the folder.")
-    ] = "parquet",
+    format_: Annotated[str, option("--format", "parquet|csv|csv.gz", "Kind of file in the folder.")] = "parquet",
     force: Force = False,
     as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
@@ -61,9 +45,11 @@ def command(
     from fieldsid.cli.console import alike, emit, tracked, warn
     from fieldsid.cli.inputs import between, mapping_of, one_run
     from fieldsid.cli.skipped_logs import Skips
+    from fieldsid.face.arguments import signal_limits, vehicle_of
     from fieldsid.logs.importing import Importer
     from fieldsid.logs.several.run_names import refuse_twice
     from fieldsid.logs.several.sifting import attempt, sifted
+    from fieldsid.page import Block, Page
     from fieldsid.records.keys import body_of
     from fieldsid.results.logs import Import
 
@@ -73,7 +59,7 @@ def command(
     importer = Importer(
         mapping_of(mapping), tuple(channel or ()), msg_path, between(from_s, to_s), max_gap, salvage, whole, tuple(joined)
     )
-    limits = _fin_limits(vehicle)
+    limits = signal_limits(vehicle_of(vehicle))
     there = [] if force or importer != Importer(importer.mapping) else _already(importer, logs, output, format_, mapping)
     logs = [log for log in logs if log not in there]
     targets = dict(zip(logs, importer.targets(logs, output, format_, force=force), strict=True))
@@ -91,13 +77,10 @@ def command(
     from fieldsid.logs.segments import plane_of
 
     notes = alike(((n.code, n.data.get("signal")), item.run.name, n) for item in done for n in item.warnings)
-    result = emit(
-        body,
-        as_json=as_json,
-        render=lambda c: _render(done, c),
-        headline=of_import(body, plane_of([d.run for d in done])),
-        notes=notes,
-    )
+    headline = of_import(body, plane_of([d.run for d in done]))
+    rows = tuple((d.file, str(d.samples), f"{d.duration_s:.2f}", f"{d.rate_hz:.4g}", str(len(d.signals))) for d in done)
+    page = Page("", blocks=(Block("", rows, ("run", "samples", "s", "Hz", "signals")),))
+    result = emit(body, as_json=as_json, render=page, headline=headline, notes=notes)
     if as_json:  # a run is used for long: what is odd about it is said however it is asked for
         warn(notes)
     skips.end(len(done))
@@ -122,18 +105,3 @@ def _already(importer: Importer, logs: list[Path], output: Path, form: str, mapp
     if found:
         say(f"already imported: {', '.join(map(str, found))}")
     return found
-
-
-def _fin_limits(vehicle: Path | None) -> dict[str, float]:
-    from fieldsid.face.arguments import signal_limits, vehicle_of
-
-    return signal_limits(vehicle_of(vehicle))
-
-
-def _render(done: list[Imported], console: Console) -> None:
-    from fieldsid.cli.console import table
-
-    if not done:
-        return
-    rows = [(d.file, str(d.samples), f"{d.duration_s:.2f}", f"{d.rate_hz:.4g}", str(len(d.signals))) for d in done]
-    console.print(table("", ("run", "samples", "s", "Hz", "signals"), rows))

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-import typer
-
-from fieldsid.cli.options import JsonFlag
-
-if TYPE_CHECKING:
-    from rich.console import Console
+from fieldsid.cli.options import JsonFlag, argument, option
 
 
 def command(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the trial, and of the folder to make.")],
-    template: Annotated[str, typer.Option("--template", metavar="KIND", help="Kind of vehicle: torpedo or surface.")] = "torpedo",
+    name: Annotated[str, argument("NAME", "Name of the trial, and of the folder to make.")],
+    template: Annotated[str, option("--template", "KIND", "Kind of vehicle: torpedo or surface.")] = "torpedo",
     as_json: JsonFlag = False,
 ) -> None:
     """Make a trial folder with a vehicle.yaml, a mapping.yaml and notes to fill in; nothing is ever replaced.
@@ -28,6 +23,7 @@ def command(
     """
     from fieldsid.cli.console import emit
     from fieldsid.cli.headlines.trial import of_trial
+    from fieldsid.page import Page
     from fieldsid.records.keys import body_of
     from fieldsid.results.trial import Init
     from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, append
@@ -40,10 +36,5 @@ def command(
     verdict = f"a trial folder for a {template} vehicle"
     append(folder, Entry(time, words, 0, 0.0, verdict, (), tuple(hashes.stamp(f) for f in files)))
     files = [*files, folder / JOURNAL]
-
-    def render(console: Console) -> None:
-        for file in files:
-            console.print(str(file), soft_wrap=True)
-
     body = body_of(Init(name, template, tuple(map(str, files))))
-    emit(body, as_json=as_json, render=render, headline=of_trial(body))
+    emit(body, as_json=as_json, render=Page("", closing=tuple(map(str, files))), headline=of_trial(body))

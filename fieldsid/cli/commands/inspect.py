@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from fieldsid.cli.options import Force, Join, JsonFlag, LogAndTables, MappingFile
+from fieldsid.cli.options import Force, Join, JsonFlag, LogAndTables, MappingFile, MsgPath, option
+from fieldsid.page import Block
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -20,11 +19,9 @@ def command(
     logs: LogAndTables,
     join: Join = False,
     mapping: MappingFile = None,
-    msg_path: Annotated[
-        Path | None, typer.Option("--msg-path", metavar="DIR", help="Folder of .msg files for types the bag does not define.")
-    ] = None,
+    msg_path: MsgPath = None,
     write_mapping: Annotated[
-        Path | None, typer.Option("--write-mapping", metavar="FILE", help="Write the mapping, for `sysid import --mapping`.")
+        Path | None, option("--write-mapping", "FILE", "Write the mapping, for `sysid import --mapping`.")
     ] = None,
     force: Force = False,
     as_json: JsonFlag = False,
@@ -46,23 +43,20 @@ def command(
     written = write_proposal(found, write_mapping, force=force) if write_mapping is not None else None
     result = inspected(found, written)
     body = body_of(result)
-    emit(body, as_json=as_json, render=lambda console: _render(found, result, console), headline=of_inspection(body, mapping))
+    emit(body, as_json=as_json, render=lambda to: _render(found, result, to), headline=of_inspection(body, mapping))
 
 
-def _render(found: Inspection, result: Inspected, console: Console) -> None:
+def _render(found: Inspection, result: Inspected, to: Console) -> None:
     from fieldsid.cli.console import table, words
 
-    rows = [(c.name, c.type, str(c.count), c.rate, c.holds) for c in result.shown]
-    console.print(table("", ("channel", "type", "samples", "Hz", "holds"), rows, left=2))
+    rows = tuple((c.name, c.type, str(c.count), c.rate, c.holds) for c in result.shown)
+    to.print(table(Block("", rows, ("channel", "type", "samples", "Hz", "holds"), left=2)))
     if result.more_channels:
-        console.print(f"and {result.more_channels} more channels")
-    console.print()
-    console.print(words("mapping" + (" (canonical names, none is needed)" if found.needs_none else " (proposed)"), "bold"))
-    for line in found.yaml().rstrip().split("\n"):
-        console.print(line)
-    console.print()
-    console.print(words("findings", "bold"))
-    for note in found.notes:
-        console.print(f"- {note.message} [{note.code}]")
-    if not found.notes:
-        console.print("- none")
+        to.print(f"and {result.more_channels} more channels")
+    kind = "canonical names, none is needed" if found.needs_none else "proposed"
+    findings = [f"- {note.message} [{note.code}]" for note in found.notes] or ["- none"]
+    for title, lines in ((f"mapping ({kind})", found.yaml().rstrip().split("\n")), ("findings", findings)):
+        to.print()
+        to.print(words(title, "bold"))
+        for line in lines:
+            to.print(line)

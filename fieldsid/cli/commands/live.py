@@ -14,7 +14,7 @@ import typer
 from fieldsid.cli.console import emit, out, say
 from fieldsid.cli.exit_codes import GATE_FAILED
 from fieldsid.cli.live.feed import Feed
-from fieldsid.cli.options import AxisOption, JsonFlag, MappingFile, VehicleFile
+from fieldsid.cli.options import AxisOption, Bandwidth, JsonFlag, MappingFile, VehicleFile, argument, flag, option
 from fieldsid.cli.voice import voice
 from fieldsid.errors import UsageError
 
@@ -28,112 +28,37 @@ if TYPE_CHECKING:
 SOURCE, GOAL, BESIDE = "Where the samples come from", "What is to be reached", "What a second process works out"
 """The groups of its own options on the page of help."""
 
-Log = Annotated[
-    Path | None,
-    typer.Argument(
-        metavar="LOG", help="A log to replay or follow; `-` reads JSON lines from standard input.", show_default=False
-    ),
-]
-Factor = Annotated[
-    float,
-    typer.Option(
-        "--speed",
-        metavar="FACTOR",
-        min=0.0,
-        help="How many times as fast as logged to replay; 0 does not wait.",
-        rich_help_panel=SOURCE,
-    ),
-]
-Follow = Annotated[
-    bool, typer.Option("--follow", "-f", help="Go on as the log grows: CSV, MCAP, a bag's folder.", rich_help_panel=SOURCE)
-]
-Port = Annotated[
-    int | None,
-    typer.Option(
-        "--udp",
-        metavar="PORT",
-        min=1,
-        max=65535,
-        help="Take JSON lines as UDP on this machine.",
-        show_default=False,
-        rich_help_panel=SOURCE,
-    ),
-]
-Idle = Annotated[
-    float | None,
-    typer.Option(
-        "--idle", metavar="S", min=0.1, help="End when nothing has come for so long.", show_default=False, rich_help_panel=SOURCE
-    ),
-]
-PlanFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--plan",
-        metavar="YAML",
-        help="The accuracy to reach is what this plan promised.",
-        show_default=False,
-        rich_help_panel=GOAL,
-    ),
-]
-Want = Annotated[
-    str | None,
-    typer.Option(
-        "--want",
-        metavar="A=5%,...",
-        help="The accuracy to reach; 5 % of each but the trim.",
-        show_default=False,
-        rich_help_panel=GOAL,
-    ),
-]
-StateFile = Annotated[
-    Path | None,
-    typer.Option("--state", metavar="FILE", help="Go on from this file, if there; saved every second.", show_default=False),
-]
-Every = Annotated[float, typer.Option("--every", metavar="S", min=0.1, help="Seconds of the log between two looks.")]
-Bandwidth = Annotated[float, typer.Option("--lambda", metavar="RAD_S", min=0.01, help="Bandwidth of the state-variable filter.")]
-Forgetting = Annotated[float, typer.Option("--forgetting", min=0.5, max=1.0, help="Forgetting factor; 1 forgets nothing.")]
-UntilEnough = Annotated[
-    bool, typer.Option("--until-enough", help="End at enough data; exit code 1 where that is not reached.", rich_help_panel=GOAL)
-]
-
-GainsFlag = Annotated[
-    bool, typer.Option("--gains", help="Design gains for the speed that is flown, once settled.", rich_help_panel=BESIDE)
-]
-Loaded = Annotated[
-    Path | None,
-    typer.Option(
-        "--schedule", metavar="YAML", help="The gains loaded, and what they were designed for.", show_default=False,
-        rich_help_panel=BESIDE,
-    ),
-]  # fmt: skip
-DepthFlag = Annotated[bool, typer.Option("--depth", help="With the depth loop above pitch.", rich_help_panel=BESIDE)]
-Diagnose = Annotated[
-    bool,
-    typer.Option("--diagnose", help="Diagnose what was flown whenever a maneuver ends.", rich_help_panel=BESIDE),
-]
 
 SAVE_EVERY_S = 1.0
 
 
 def command(
     axis: AxisOption,
-    log: Log = None,
-    speed: Factor = 1.0,
-    follow: Follow = False,
-    udp: Port = None,
-    idle: Idle = None,
-    plan: PlanFile = None,
-    want: Want = None,
-    state: StateFile = None,
-    every: Every = 1.0,
-    until_enough: UntilEnough = False,
-    gains: GainsFlag = False,
-    schedule: Loaded = None,
-    depth: DepthFlag = False,
-    diagnose: Diagnose = False,
+    log: Annotated[Path | None, argument("LOG", "A log to replay or follow; `-` reads JSON lines from standard input.")] = None,
+    speed: Annotated[
+        float, option("--speed", "FACTOR", "How many times as fast as logged to replay; 0 does not wait.", SOURCE, min=0.0)
+    ] = 1.0,
+    follow: Annotated[bool, flag("--follow -f", "Go on as the log grows: CSV, MCAP, a bag's folder.", SOURCE)] = False,
+    udp: Annotated[
+        int | None, option("--udp", "PORT", "Take JSON lines as UDP on this machine.", SOURCE, min=1, max=65535)
+    ] = None,
+    idle: Annotated[float | None, option("--idle", "S", "End when nothing has come for so long.", SOURCE, min=0.1)] = None,
+    plan: Annotated[Path | None, option("--plan", "YAML", "The accuracy to reach is what this plan promised.", GOAL)] = None,
+    want: Annotated[str | None, option("--want", "A=5%,...", "The accuracy to reach; 5 % of each but the trim.", GOAL)] = None,
+    state: Annotated[Path | None, option("--state", "FILE", "Go on from this file, if there; saved every second.")] = None,
+    every: Annotated[float, option("--every", "S", "Seconds of the log between two looks.", min=0.1)] = 1.0,
+    until_enough: Annotated[
+        bool, flag("--until-enough", "End at enough data; exit code 1 where that is not reached.", GOAL)
+    ] = False,
+    gains: Annotated[bool, flag("--gains", "Design gains for the speed that is flown, once settled.", BESIDE)] = False,
+    schedule: Annotated[
+        Path | None, option("--schedule", "YAML", "The gains loaded, and what they were designed for.", BESIDE)
+    ] = None,
+    depth: Annotated[bool, flag("--depth", "With the depth loop above pitch.", BESIDE)] = False,
+    diagnose: Annotated[bool, flag("--diagnose", "Diagnose what was flown whenever a maneuver ends.", BESIDE)] = False,
     vehicle: VehicleFile = None,
     bandwidth: Bandwidth = 4.0,
-    forgetting: Forgetting = 1.0,
+    forgetting: Annotated[float, option("--forgetting", "", "Forgetting factor; 1 forgets nothing.", min=0.5, max=1.0)] = 1.0,
     mapping: MappingFile = None,
     as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from fieldsid.cli.console import emit, progress, say
-from fieldsid.cli.options import LIMITS, WRITTEN, Figures, Force, JsonFlag, OutputDir, VehicleFile, names_of
+from fieldsid.cli.options import LIMITS, WRITTEN, Figures, Force, JsonFlag, OutputDir, VehicleFile, flag, names_of, option
 from fieldsid.cli.progress import compiling, refuse_closed, refuse_existing
-from fieldsid.cli.session import tasks_of
-from fieldsid.cli.voice import shown_in
+from fieldsid.cli.session import drawn_at
+from fieldsid.cli.voice import angles
+from fieldsid.figures.kinds import sketch
 from fieldsid.models.axis import Axis
+from fieldsid.page import Block, Page
+from fieldsid.records.keys import body_of
+from fieldsid.rounding import number, with_error
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
-    from fieldsid.models.model import Model
     from fieldsid.planning.design.leg import Expected
     from fieldsid.planning.design.plan import Plan
-    from fieldsid.planning.request import PlanRequest
 
 Text = str | None
 
@@ -31,84 +29,59 @@ GOAL, FLOWN, KNOWN = "What to learn", "How it is flown", "What is known before"
 """The groups of its own options on the page of help."""
 
 
-def _option(name: str, metavar: str, says: str, group: str) -> Any:
-    return typer.Option(name, metavar=metavar, help=says, show_default=False, rich_help_panel=group)
-
-
-Speeds = Annotated[Text, _option("--speeds", "M_S,..", "`1.0,1.4,1.8` or `1.0:1.8:0.4`; the prior's own if not given.", GOAL)]
-Believed = Annotated[Path | None, _option("--model", "YAML", "What is known before: a model or a prior file.", KNOWN)]
-PlannedAxis = Annotated[Axis | None, _option("--axis", "AXIS", "The plane to plan for; yaw, or that of a diagnosis.", GOAL)]
-PriorName = Annotated[Text, _option("--prior", "NAME", "A prior that is shipped, torpedo where no model is given.", KNOWN)]
-Want = Annotated[
-    Text,
-    _option(
-        "--want",
-        "a22=5%,..",
-        "Standard errors to reach at every speed, in shares of the value; of the trim, in shares of full fin.",
-        GOAL,
-    ),
-]
-Minutes = Annotated[float | None, _option("--minutes", "MIN", "Time there is for all legs, turns included.", LIMITS)]
-Area = Annotated[Text, _option("--area", "LxW", "Length along the leg and width across it, m.", LIMITS)]
-DepthBand = Annotated[Text, _option("--depth-band", "M:M", "Shallowest and deepest, m; entered at the middle.", LIMITS)]
-MaxHeading = Annotated[Text, _option("--max-heading", "ANGLE", "Largest deviation of heading; 60deg in yaw, or `none`.", LIMITS)]
-MaxTrack = Annotated[float | None, _option("--max-track", "M", "Largest distance from the leg's line.", LIMITS)]
-MaxPitch = Annotated[Text, _option("--max-pitch", "ANGLE", "Largest pitch; 30deg in pitch, or `none`.", LIMITS)]
-MaxRoll = Annotated[Text, _option("--max-roll", "ANGLE", "Largest roll, `20deg`.", LIMITS)]
-FinMax = Annotated[Text, _option("--fin-max", "ANGLE", "Fin limit; the vehicle's own if not given, else 0.26 rad.", LIMITS)]
-FinRate = Annotated[Text, _option("--fin-rate", "ANGLE", "Fin rate limit per second; the vehicle's own if not given.", LIMITS)]
-Share = Annotated[
-    float, typer.Option("--risk", metavar="SHARE", help="Accepted probability of leaving the envelope.", rich_help_panel=LIMITS)
-]
-WindowS = Annotated[
-    float | None, _option("--window", "S", "Length of the part that is identified on; 33, to separate 60.", FLOWN)
-]
-RunUpS = Annotated[float, typer.Option("--run-up", metavar="S", help="Straight run before it.", rich_help_panel=FLOWN)]
-RateHz = Annotated[float, typer.Option("--rate", metavar="HZ", help="The vehicle's command rate.", rich_help_panel=FLOWN)]
-Radius = Annotated[
-    bool, typer.Option("--radius", help="Add full-fin circles, so that the turn radius is measured.", rich_help_panel=GOAL)
-]
-OpenLoop = Annotated[
-    bool,
-    typer.Option("--open-loop", help="Leave out maneuvers that follow the motion, such as the zig-zag.", rich_help_panel=FLOWN),
-]
-Separate = Annotated[Text, _option("--separate", "A,B", "What tells these effects apart; `none` is the plain model.", GOAL)]
-FromDiagnosis = Annotated[Path | None, _option("--from", "YAML", "A diagnosis: tell its rivals apart.", GOAL)]
-Course = Annotated[
-    Text, _option("--course", "ANGLE", "Compass course of the legs, `90deg`: a MOOS helm then watches headings.", FLOWN)
-]
-Write = Annotated[Text, _option("--write", "csv,..", "Some of csv, ros2, moos, dune, ardupilot; else all.", WRITTEN)]
-Seed = Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the search and of the draws.", rich_help_panel=FLOWN)]
-
-
 def command(
-    context: typer.Context,
-    axis: PlannedAxis = None,
-    speeds: Speeds = None,
+    axis: Annotated[Axis | None, option("--axis", "AXIS", "The plane to plan for; yaw, or that of a diagnosis.", GOAL)] = None,
+    speeds: Annotated[
+        Text, option("--speeds", "M_S,..", "`1.0,1.4,1.8` or `1.0:1.8:0.4`; the prior's own if not given.", GOAL)
+    ] = None,
     vehicle: VehicleFile = None,
-    model: Believed = None,
-    prior: PriorName = None,
-    want: Want = None,
-    minutes: Minutes = None,
-    area: Area = None,
-    depth_band: DepthBand = None,
-    max_heading: MaxHeading = None,
-    max_track: MaxTrack = None,
-    max_pitch: MaxPitch = None,
-    max_roll: MaxRoll = None,
-    fin_max: FinMax = None,
-    fin_rate: FinRate = None,
-    risk: Share = 0.05,
-    window: WindowS = None,
-    run_up: RunUpS = 10.0,
-    rate: RateHz = 20.0,
-    radius: Radius = False,
-    open_loop: OpenLoop = False,
-    separate: Separate = None,
-    diagnosis: FromDiagnosis = None,
-    course: Course = None,
-    write: Write = None,
-    seed: Seed = 1,
+    model: Annotated[Path | None, option("--model", "YAML", "What is known before: a model or a prior file.", KNOWN)] = None,
+    prior: Annotated[Text, option("--prior", "NAME", "A prior that is shipped, torpedo where no model is given.", KNOWN)] = None,
+    want: Annotated[
+        Text,
+        option(
+            "--want",
+            "a22=5%,..",
+            "Standard errors to reach at every speed, in shares of the value; of the trim, in shares of full fin.",
+            GOAL,
+        ),
+    ] = None,
+    minutes: Annotated[float | None, option("--minutes", "MIN", "Time there is for all legs, turns included.", LIMITS)] = None,
+    area: Annotated[Text, option("--area", "LxW", "Length along the leg and width across it, m.", LIMITS)] = None,
+    depth_band: Annotated[
+        Text, option("--depth-band", "M:M", "Shallowest and deepest, m; entered at the middle.", LIMITS)
+    ] = None,
+    max_heading: Annotated[
+        Text, option("--max-heading", "ANGLE", "Largest deviation of heading; 60deg in yaw, or `none`.", LIMITS)
+    ] = None,
+    max_track: Annotated[float | None, option("--max-track", "M", "Largest distance from the leg's line.", LIMITS)] = None,
+    max_pitch: Annotated[Text, option("--max-pitch", "ANGLE", "Largest pitch; 30deg in pitch, or `none`.", LIMITS)] = None,
+    max_roll: Annotated[Text, option("--max-roll", "ANGLE", "Largest roll, `20deg`.", LIMITS)] = None,
+    fin_max: Annotated[
+        Text, option("--fin-max", "ANGLE", "Fin limit; the vehicle's own if not given, else 0.26 rad.", LIMITS)
+    ] = None,
+    fin_rate: Annotated[
+        Text, option("--fin-rate", "ANGLE", "Fin rate limit per second; the vehicle's own if not given.", LIMITS)
+    ] = None,
+    risk: Annotated[float, option("--risk", "SHARE", "Accepted probability of leaving the envelope.", LIMITS)] = 0.05,
+    window: Annotated[
+        float | None, option("--window", "S", "Length of the part that is identified on; 33, to separate 60.", FLOWN)
+    ] = None,
+    run_up: Annotated[float, option("--run-up", "S", "Straight run before it.", FLOWN)] = 10.0,
+    rate: Annotated[float, option("--rate", "HZ", "The vehicle's command rate.", FLOWN)] = 20.0,
+    radius: Annotated[bool, flag("--radius", "Add full-fin circles, so that the turn radius is measured.", GOAL)] = False,
+    open_loop: Annotated[
+        bool, flag("--open-loop", "Leave out maneuvers that follow the motion, such as the zig-zag.", FLOWN)
+    ] = False,
+    separate: Annotated[
+        Text, option("--separate", "A,B", "What tells these effects apart; `none` is the plain model.", GOAL)
+    ] = None,
+    diagnosis: Annotated[Path | None, option("--from", "YAML", "A diagnosis: tell its rivals apart.", GOAL)] = None,
+    course: Annotated[
+        Text, option("--course", "ANGLE", "Compass course of the legs, `90deg`: a MOOS helm then watches headings.", FLOWN)
+    ] = None,
+    write: Annotated[Text, option("--write", "csv,..", "Some of csv, ros2, moos, dune, ardupilot; else all.", WRITTEN)] = None,
+    seed: Annotated[int, option("--seed", "N", "Seed of the search and of the draws.", FLOWN)] = 1,
     output: OutputDir = None,
     figures: Figures = True,
     force: Force = False,
@@ -126,7 +99,6 @@ def command(
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.planning.jit_warmup import SHARED_KERNELS, compile_planning
     from fieldsid.planning.request import EnvelopeLimits, PlanRequest, planned
-    from fieldsid.records.keys import body_of
     from fieldsid.results.plans import Planned
 
     _check_write(write, output)
@@ -137,7 +109,7 @@ def command(
         axis, speeds, vehicle, model, prior, want, minutes, limiting, window, run_up, rate, radius,
         names_of(separate), diagnosis, seed, open_loop, course,
     )  # fmt: skip
-    with compiling(context) as warmup, progress("planning", asked.legs) as step:
+    with compiling() as warmup, progress("planning", asked.legs) as step:
 
         def ready() -> None:
             compile_planning()
@@ -146,7 +118,21 @@ def command(
         made = planned(asked, step, ready)
     if model is not None:
         check_effects([(model, made.model)])
-    files = [] if output is None else _written(made.plan, made.model, asked, output, write, context, figures=figures, force=force)
+    files: list[Path] = []
+    if output is not None:
+        from fieldsid.planning.output.command_files import unwritten, write_all
+        from fieldsid.planning.output.figure_data import figure_data
+        from fieldsid.planning.output.plan_file import save_plan
+
+        inputs = [p for p in (model, vehicle, diagnosis) if p is not None]
+        files = [save_plan(made.plan, output / "plan.yaml", inputs=inputs, force=force)]
+        files += write_all(made.plan, output, names_of(write), force=force)
+        for line in unwritten(made.plan):
+            say(line)
+        if figures:
+            files.append(output / "plan.png")
+            views = [figure_data(made.plan, leg, made.model) for leg in made.plan.legs]
+            drawn_at(files[-1], sketch("plan", views), force=force)
     told: dict[str, Any] = {}
     if made.found:
         best = max(made.found, key=lambda s: s.expected_log_odds)
@@ -154,7 +140,7 @@ def command(
     body = body_of(Planned(made.plan, tuple(map(str, files)), **told))
     from fieldsid.cli.headlines.trial import of_plan
 
-    return emit(body, as_json=as_json, render=lambda to: _render(to, made.plan, body), headline=of_plan(body, model))
+    return emit(body, as_json=as_json, render=_page(made.plan, told.get("says", ())), headline=of_plan(body, model))
 
 
 def _check_write(write: str | None, output: Path | None) -> None:
@@ -167,40 +153,9 @@ def _check_write(write: str | None, output: Path | None) -> None:
         raise UsageError("`--write` says what, `-o` where", found=f"--write {write}", hint="add `-o DIR`")
 
 
-def _written(
-    plan: Plan,
-    model: Model,
-    asked: PlanRequest,
-    folder: Path,
-    write: str | None,
-    context: typer.Context,
-    *,
-    figures: bool,
-    force: bool,
-) -> list[Path]:
-    from fieldsid.planning.output.command_files import unwritten, write_all
-    from fieldsid.planning.output.plan_file import save_plan
-
-    inputs = [p for p in (asked.model, asked.vehicle, asked.diagnosis) if p is not None]
-    files = [save_plan(plan, folder / "plan.yaml", inputs=inputs, force=force)]
-    files += write_all(plan, folder, names_of(write), force=force)
-    for line in unwritten(plan):
-        say(line)
-    if figures:
-        from fieldsid.figures.plan import save_plan_figure
-        from fieldsid.planning.output.figure_data import figure_data
-
-        views = [figure_data(plan, leg, model) for leg in plan.legs]
-        files.append(save_plan_figure(views, folder / "plan.png", force=force, tasks=tasks_of(context)))
-    return files
-
-
-def _render(to: Console, plan: Plan, body: Mapping[str, Any]) -> None:
-    from fieldsid.cli.console import table
-    from fieldsid.rounding import number
-
-    times, angle = shown_in("rad")
-    rows = [
+def _page(plan: Plan, says: Iterable[str]) -> Page:
+    times, angle = angles().of("rad")
+    rows = tuple(
         (
             number(leg.speed, 3),
             leg.candidate.maneuver,
@@ -211,35 +166,36 @@ def _render(to: Console, plan: Plan, body: Mapping[str, Any]) -> None:
             *(number(v, 2) for v in _reached(leg.excursions, times)),
         )
         for leg in plan.legs
-    ]
-    columns = ("speed", "maneuver", "passes", "min", "m", "risk", f"angle {angle}", "side m")
-    to.print(table(f"{plan.vehicle}, {plan.axis.value}: what to fly", columns, rows, left=2))
-    errors = [(number(leg.speed, 3), name, *_bought(e, leg.passes)) for leg in plan.legs for name, e in leg.expected.items()]
-    to.print(table("what it buys", ("speed", "parameter", "expected", "error", "at worst", "pulses need"), errors, left=2))
-    to.print(
-        f"{plan.minutes:.1f} minutes, {plan.metres:.0f} m; risk of leaving the envelope at most {plan.break_probability:.1%}"
     )
-    _render_limits(to, plan)
-    for line in body.get("says", ()):
-        to.print(line)
+    columns = ("speed", "maneuver", "passes", "min", "m", "risk", f"angle {angle}", "side m")
+    errors = tuple((number(leg.speed, 3), name, *_bought(e, leg.passes)) for leg in plan.legs for name, e in leg.expected.items())
+    heads = ("speed", "parameter", "expected", "error", "at worst", "pulses need")
+    blocks: tuple[Block | str, ...] = (
+        Block(f"{plan.vehicle}, {plan.axis.value}: what to fly", rows, columns, left=2),
+        Block("what it buys", errors, heads, left=2),
+        f"{plan.minutes:.1f} minutes, {plan.metres:.0f} m; risk of leaving the envelope at most {plan.break_probability:.1%}",
+        *_limits(plan),
+        *says,
+    )
+    return Page("", blocks=blocks)
 
 
-def _render_limits(to: Console, plan: Plan) -> None:
-    """Say every limit, and which of them no draw of the prior was tried on."""
+def _limits(plan: Plan) -> Iterator[str]:
+    """Yield every limit, and which of them no draw of the prior was tried on."""
     from fieldsid.models.axis import Axis
     from fieldsid.planning.safety.envelope import NOT_LIMITED, limits_said
 
     limits = limits_said(plan.envelope)
-    to.print("limits: " + "; ".join(f"{name} {words}" for name, words in limits.items()))
+    yield "limits: " + "; ".join(f"{name} {words}" for name, words in limits.items())
     for leg in plan.legs:
         own = limits_said(leg.envelope_in(plan.envelope))
         other = [f"{name} {words}" for name, words in own.items() if words != limits[name]]
         if other:
-            to.print(f"{leg.candidate.maneuver} at {leg.speed:g} m/s: {'; '.join(other)}")
+            yield f"{leg.candidate.maneuver} at {leg.speed:g} m/s: {'; '.join(other)}"
     unseen = ("pitch", "depth") if plan.axis is Axis.YAW else ("heading", "track", "roll")
     watched = [name for name in unseen if limits[name] != NOT_LIMITED]
     if watched:
-        to.print(f"not in the risk, only to be watched in flight: {', '.join(watched)}")
+        yield f"not in the risk, only to be watched in flight: {', '.join(watched)}"
 
 
 def _reached(excursions: Mapping[str, float], times: float) -> tuple[float, float]:
@@ -251,7 +207,6 @@ def _reached(excursions: Mapping[str, float], times: float) -> tuple[float, floa
 def _bought(e: Expected, passes: int) -> tuple[str, str, str, str]:
     """Return what is expected of a parameter, its error, that at worst, and what the paper's pulses need for it."""
     from fieldsid.planning.design.leg import error_in_words
-    from fieldsid.rounding import with_error
 
     if not isfinite(e.std_error):  # the maneuver does not show it
         return with_error(e.value, e.std_error), "-", "-", _against(e.baseline, e.std_error, passes)

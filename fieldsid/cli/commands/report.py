@@ -7,29 +7,27 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from fieldsid.cli.console import emit
-from fieldsid.cli.options import Force, JsonFlag
+from fieldsid.cli.options import Force, JsonFlag, argument, option
 from fieldsid.cli.progress import get_ready
 from fieldsid.logs.run import Note
+from fieldsid.page import Page
+from fieldsid.records.keys import body_of
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fieldsid.trial_folder.state import FolderState
 
-Files = Annotated[
-    list[Path] | None,
-    typer.Argument(metavar="[FOLDER|FILE...]", help="A trial folder, or files of one; the folder it is run in if not given."),
-]
-Page = Annotated[
-    Path | None,
-    typer.Option("-o", "--output", metavar="FILE", help="report.html in the folder if not given; .pdf is printed by a browser."),
-]
 
-
-def command(files: Files = None, output: Page = None, force: Force = False, as_json: JsonFlag = False) -> Mapping[str, Any]:
+def command(
+    files: Annotated[
+        list[Path] | None, argument("[FOLDER|FILE...]", "A trial folder, or files of one; the folder it is run in if not given.")
+    ] = None,
+    output: Annotated[
+        Path | None, option("-o --output", "FILE", "report.html in the folder if not given; .pdf is printed by a browser.")
+    ] = None,
+    force: Force = False,
+    as_json: JsonFlag = False,
+) -> Mapping[str, Any]:
     """Write what a trial has come to into one file: HTML that needs no network, or PDF.
 
     Verdicts first; the runs with the doctor's findings; each model against its measurement, to zoom and read off; where it fails;
@@ -43,7 +41,6 @@ def command(files: Files = None, output: Page = None, force: Force = False, as_j
     given = files or [Path()]
     state = _state(given)
     path = output or state.folder / "report.html"
-    from fieldsid.records.keys import body_of
     from fieldsid.reporting.write import check_report, written
     from fieldsid.results.trial import Report, ReportVerdict
 
@@ -64,8 +61,8 @@ def command(files: Files = None, output: Page = None, force: Force = False, as_j
     from fieldsid.cli.headlines.trial import of_report
 
     notes = [Note("not_in_report", line, {}) for line in context["skipped"]]
-    headline = of_report(body, state.folder)
-    return emit(body, as_json=as_json, render=lambda to: _render(to, body), headline=headline, notes=notes)
+    page = Page("", closing=tuple(f"{v['what']}: {v['says']}" for v in context["verdicts"][1:]))
+    return emit(body, as_json=as_json, render=page, headline=of_report(body, state.folder), notes=notes)
 
 
 def _state(given: Sequence[Path]) -> FolderState:
@@ -82,8 +79,3 @@ def _state(given: Sequence[Path]) -> FolderState:
     above = Path(os.path.commonpath([p.resolve().parent for p in given]))
     here = Path()
     return state_of(here if above == here.resolve() else above, files=given)
-
-
-def _render(to: Console, body: Mapping[str, Any]) -> None:
-    for v in body["verdicts"][1:]:
-        to.print(f"{v['what']}: {v['says']}", soft_wrap=True)

@@ -9,17 +9,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.commands._schedule_tables import render_design, render_export, render_verify
 from fieldsid.cli.console import emit, print_file, say
 from fieldsid.cli.headlines.gains import caveat, of_design, of_export, of_patch, of_verification
-from fieldsid.cli.options import LIMITS, Force, JsonFlag, ModelFiles, OutputFile, VehicleFile
+from fieldsid.cli.options import LIMITS, Force, JsonFlag, ModelFiles, OutputFile, OwnLaw, VehicleFile, argument, flag, option
 from fieldsid.cli.progress import refuse_existing, refuse_figure
-from fieldsid.cli.session import tasks_of
+from fieldsid.cli.session import drawn_at
+from fieldsid.cli.voice import angles
+from fieldsid.figures.kinds import sketch
+from fieldsid.page import Page, written
+from fieldsid.records.keys import body_of
+from fieldsid.views.schedule import blocks_of as design_blocks
+from fieldsid.views.verification import blocks_of as verify_blocks
 
 if TYPE_CHECKING:
-    from fieldsid.plant.parameter_source import ParameterSource
+    from rich.console import Console
+
     from fieldsid.schedule.record import Schedule
-    from fieldsid.schedule.verify import Verification
 
 command = typer.Typer(
     help="Gains per speed: design them, verify them, write them for the vehicle's software.\n\n"
@@ -27,131 +32,56 @@ command = typer.Typer(
 )
 
 ANSWERED = "The answer asked"
-ScheduleFile = Annotated[Path, typer.Argument(metavar="SCHEDULE", help="A schedule written by `sysid schedule design`.")]
-Controller = Annotated[
-    str | None,
-    typer.Option("--controller", metavar="KIND", help="p, pd, pi, pid or lqr; pd where the runs have a rate, else p."),
-]
-Settling = Annotated[
-    str | None,
-    typer.Option(
-        "--settling", metavar="TIME", help="Settle within this, `4s`, or `quickest`; if not given as the slowest speed can.",
-        rich_help_panel=ANSWERED,
-    ),
-]  # fmt: skip
-Bandwidth = Annotated[
-    str | None,
-    typer.Option("--bandwidth", metavar="RATE", help="Bandwidth in place of a time, `1rad/s`.", rich_help_panel=ANSWERED),
-]
-Overshoot = Annotated[
-    str | None, typer.Option("--overshoot", metavar="SHARE", help="The most overshoot, `10%`.", rich_help_panel=ANSWERED)
-]
-Step = Annotated[
-    str | None,
-    typer.Option(
-        "--step", metavar="ANGLE", help="The error that may ask for the whole fin: 20 deg of yaw, 10 of pitch if not given.",
-        rich_help_panel=ANSWERED,
-    ),
-]  # fmt: skip
-FinUse = Annotated[
-    str | None,
-    typer.Option("--fin-use", metavar="SHARE", help="Of the fin that step may ask for, `80%`.", rich_help_panel=ANSWERED),
-]
-Damping = Annotated[
-    float | None,
-    typer.Option("--damping", help="Damping ratio of the loop: that of the overshoot, else 0.7071.", rich_help_panel=ANSWERED),
-]
-PhaseWanted = Annotated[
-    str, typer.Option("--phase-margin", metavar="ANGLE", help="Phase margin to keep, `45deg`.", rich_help_panel=ANSWERED)
-]
-Speeds = Annotated[
-    str | None, typer.Option("--speeds", metavar="LIST", help="Speeds of the rows, m/s; those of the models if not given.")
-]
-FinLimit = Annotated[
-    str | None,
-    typer.Option(
-        "--fin-max",
-        metavar="ANGLE",
-        help="Largest fin angle, `15deg`; if not given the vehicle's limit, else the models' largest.",
-        rich_help_panel=LIMITS,
-    ),
-]
-FinRate = Annotated[
-    str | None,
-    typer.Option(
-        "--fin-rate", metavar="ANGLE", help="Fastest fin per s; the vehicle's or model's if not given.", rich_help_panel=LIMITS
-    ),
-]
-FinLag = Annotated[
-    str | None,
-    typer.Option("--fin-lag", metavar="TIME", help="Time constant, `0.2s`; the model's if not given.", rich_help_panel=LIMITS),
-]
-Delay = Annotated[
-    str | None,
-    typer.Option(
-        "--delay", metavar="TIME", help="Dead time from command to fin; the model's if not given.", rich_help_panel=LIMITS
-    ),
-]
-Latency = Annotated[
-    str | None,
-    typer.Option(
-        "--latency", metavar="TIME", help="The autopilot's own, sensor to command, with half its period.", rich_help_panel=LIMITS
-    ),
-]
-Depth = Annotated[bool, typer.Option("--depth", help="Add the depth loop above pitch.")]
-OwnLaw = Annotated[
-    list[str] | None, typer.Option("--law", metavar="NAME=c0[,c1]", help="A law of your own, c0 + c1 u^2, as `b2=-0.23,-0.33`.")
-]
-Models = Annotated[
-    list[Path] | None,
-    typer.Option("--model", metavar="MODEL", help="Models to verify on; those it was designed from if not given."),
-]
-MarginFigure = Annotated[
-    Path | None, typer.Option("-o", "--output", metavar="FILE", help="Draw a figure: .png, .svg or .pdf, by the suffix.")
-]
-NeedPhase = Annotated[
-    str | None, typer.Option("--require-phase-margin", metavar="ANGLE", help="Exit 1 when any speed has less, `40deg`.")
-]
-NeedGain = Annotated[
-    str | None, typer.Option("--require-gain-margin", metavar="DB", help="Exit 1 when any speed has less, `6dB`.")
-]
-NeedDelay = Annotated[
-    str | None, typer.Option("--require-delay-margin", metavar="TIME", help="Exit 1 when any speed has less, `0.3s`.")
-]
-MostOvershoot = Annotated[
-    str | None, typer.Option("--max-overshoot", metavar="SHARE", help="Exit 1 when any step has more, `20%`.")
-]
+ScheduleFile = Annotated[Path, argument("SCHEDULE", "A schedule written by `sysid schedule design`.")]
 TARGETS = ", ".join(m.name for m in iter_modules([str(Path(__file__).parents[2] / "exports")]) if not m.name.startswith("_"))
-To = Annotated[str, typer.Option("--to", metavar="TARGET", help=f"One of {TARGETS}.")]
-Node = Annotated[
-    str | None, typer.Option("--node", metavar="NAME", help="What the gains go under: node, section, prefix or process.")
-]
-Template = Annotated[
-    Path | None, typer.Option("--template", metavar="FILE", help="A template of your own, see templates/exports/.")
-]
-Into = Annotated[Path | None, typer.Option("--into", metavar="YAML", help="An existing YAML file to put the gains into.")]
-Key = Annotated[str | None, typer.Option("--key", metavar="A.B.C", help="The key in that file that holds the gains.")]
-Write = Annotated[bool, typer.Option("--write", help="Change the file of `--into` (a backup is kept), not only show how.")]
 
 
 @command.command("design", short_help="Gains per speed from models, a fit file or a table.")
 def design(
     models: ModelFiles,
-    controller: Controller = None,
-    settling: Settling = None,
-    bandwidth: Bandwidth = None,
-    overshoot: Overshoot = None,
-    step: Step = None,
-    fin_use: FinUse = None,
-    damping: Damping = None,
-    phase_margin: PhaseWanted = "45deg",
-    speeds: Speeds = None,
-    fin_limit: FinLimit = None,
-    fin_rate: FinRate = None,
-    fin_lag: FinLag = None,
-    delay: Delay = None,
-    latency: Latency = None,
-    depth: Depth = False,
+    controller: Annotated[
+        str | None, option("--controller", "KIND", "p, pd, pi, pid or lqr; pd where the runs have a rate, else p.")
+    ] = None,
+    settling: Annotated[
+        str | None,
+        option("--settling", "TIME", "Settle within this, `4s`, or `quickest`; if not given as the slowest speed can.", ANSWERED),
+    ] = None,
+    bandwidth: Annotated[str | None, option("--bandwidth", "RATE", "Bandwidth in place of a time, `1rad/s`.", ANSWERED)] = None,
+    overshoot: Annotated[str | None, option("--overshoot", "SHARE", "The most overshoot, `10%`.", ANSWERED)] = None,
+    step: Annotated[
+        str | None,
+        option("--step", "ANGLE", "The error that may ask for the whole fin: 20 deg of yaw, 10 of pitch if not given.", ANSWERED),
+    ] = None,
+    fin_use: Annotated[str | None, option("--fin-use", "SHARE", "Of the fin that step may ask for, `80%`.", ANSWERED)] = None,
+    damping: Annotated[
+        float | None, option("--damping", "", "Damping ratio of the loop: that of the overshoot, else 0.7071.", ANSWERED)
+    ] = None,
+    phase_margin: Annotated[str, option("--phase-margin", "ANGLE", "Phase margin to keep, `45deg`.", ANSWERED)] = "45deg",
+    speeds: Annotated[
+        str | None, option("--speeds", "LIST", "Speeds of the rows, m/s; those of the models if not given.")
+    ] = None,
+    fin_limit: Annotated[
+        str | None,
+        option(
+            "--fin-max",
+            "ANGLE",
+            "Largest fin angle, `15deg`; if not given the vehicle's limit, else the models' largest.",
+            LIMITS,
+        ),
+    ] = None,
+    fin_rate: Annotated[
+        str | None, option("--fin-rate", "ANGLE", "Fastest fin per s; the vehicle's or model's if not given.", LIMITS)
+    ] = None,
+    fin_lag: Annotated[
+        str | None, option("--fin-lag", "TIME", "Time constant, `0.2s`; the model's if not given.", LIMITS)
+    ] = None,
+    delay: Annotated[
+        str | None, option("--delay", "TIME", "Dead time from command to fin; the model's if not given.", LIMITS)
+    ] = None,
+    latency: Annotated[
+        str | None, option("--latency", "TIME", "The autopilot's own, sensor to command, with half its period.", LIMITS)
+    ] = None,
+    depth: Annotated[bool, flag("--depth", "Add the depth loop above pitch.")] = False,
     law: OwnLaw = None,
     vehicle: VehicleFile = None,
     output: OutputFile = None,
@@ -170,28 +100,28 @@ def design(
     from fieldsid.angles import FASTEST_FIN, FIN, FIN_RATE, HEADING, TILT, parse_angle, parse_margin
     from fieldsid.cli.inputs import models_among
     from fieldsid.cli.user_effects import check_effects
-    from fieldsid.face.arguments import fins_of, length_of, runs_behind
+    from fieldsid.face.arguments import fin_limit_of, fin_rate_of, fins_of, length_of, runs_behind, vehicle_of
     from fieldsid.face.quantities import BANDWIDTH, parse_quantity, parse_share
     from fieldsid.face.speeds import speeds_of
     from fieldsid.plant.parameter_source import load_parameter_source
-    from fieldsid.records.keys import body_of
     from fieldsid.results.gains import Design
     from fieldsid.schedule.linear_plant import FinLimits
     from fieldsid.schedule.make import design_schedule, usual_controller
     from fieldsid.schedule.record import save_schedule
+    from fieldsid.schedule.verdict import lost
     from fieldsid.schedule.wish import QUICKEST, Wish
 
     refuse_existing(output, force=force)
     given = None if fin_limit is None else parse_angle(fin_limit, "--fin-max", FIN)
-    fastest = None if fin_rate is None else parse_angle(fin_rate, "--fin-rate", FIN_RATE, FASTEST_FIN)
+    known = vehicle_of(vehicle)
+    fastest = fin_rate_of(known) if fin_rate is None else parse_angle(fin_rate, "--fin-rate", FIN_RATE, FASTEST_FIN)
     margin = parse_margin(phase_margin, "--phase-margin")
     models = models_among(models)
     source = load_parameter_source(models, laws=law or ())
     check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
-    limit, rate = _limits(given, fastest, vehicle, source)
     schedule = design_schedule(
         source,
-        limit,
+        fin_limit_of(known, source, say) if given is None else given,
         speeds=speeds_of(speeds),
         wish=Wish(
             controller or usual_controller(source),
@@ -203,35 +133,37 @@ def design(
             overshoot=None if overshoot is None else parse_share(overshoot, "--overshoot"),
             fin_use=None if fin_use is None else parse_share(fin_use, "--fin-use"),
         ),
-        limits=FinLimits(_time(fin_lag, "--fin-lag"), _time(delay, "--delay"), rate, _time(latency, "--latency")),
+        limits=FinLimits(_time(fin_lag, "--fin-lag"), _time(delay, "--delay"), fastest, _time(latency, "--latency")),
         depth=depth,
         runs=runs_behind(source, say),
-        length=length_of(vehicle),
-        fins=fins_of(vehicle, source.axis),
+        length=length_of(known),
+        fins=fins_of(known, source.axis),
     )
     inputs = [p for p in source.paths if p.is_file()]
-    written = None if output is None else str(save_schedule(schedule, output, inputs=inputs, force=force))
-    body = body_of(Design(schedule, written))
+    written_to = None if output is None else str(save_schedule(schedule, output, inputs=inputs, force=force))
+    body = body_of(Design(schedule, written_to))
     headline = of_design(body, models, caveat(source.models, models))
-    return emit(
-        body,
-        as_json=as_json,
-        render=lambda to: render_design(to, schedule, source, body),
-        headline=headline,
-        notes=schedule.notes,
-    )
+    page = Page("", blocks=tuple(design_blocks(schedule, angles(), lost(source))), closing=written(schedule=written_to))
+    return emit(body, as_json=as_json, render=page, headline=headline, notes=schedule.notes)
 
 
 @command.command("verify", short_help="Margins and steps over the identified set.")
 def verify(
-    context: typer.Context,
     schedule: ScheduleFile,
-    models: Models = None,
-    require_phase_margin: NeedPhase = None,
-    require_gain_margin: NeedGain = None,
-    require_delay_margin: NeedDelay = None,
-    max_overshoot: MostOvershoot = None,
-    output: MarginFigure = None,
+    models: Annotated[
+        list[Path] | None, option("--model", "MODEL", "Models to verify on; those it was designed from if not given.")
+    ] = None,
+    require_phase_margin: Annotated[
+        str | None, option("--require-phase-margin", "ANGLE", "Exit 1 when any speed has less, `40deg`.")
+    ] = None,
+    require_gain_margin: Annotated[
+        str | None, option("--require-gain-margin", "DB", "Exit 1 when any speed has less, `6dB`.")
+    ] = None,
+    require_delay_margin: Annotated[
+        str | None, option("--require-delay-margin", "TIME", "Exit 1 when any speed has less, `0.3s`.")
+    ] = None,
+    max_overshoot: Annotated[str | None, option("--max-overshoot", "SHARE", "Exit 1 when any step has more, `20%`.")] = None,
+    output: Annotated[Path | None, option("-o --output", "FILE", "Draw a figure: .png, .svg or .pdf, by the suffix.")] = None,
     force: Force = False,
     as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
@@ -249,7 +181,6 @@ def verify(
     from fieldsid.face.arguments import designed_from, runs_behind
     from fieldsid.face.quantities import DECIBEL, parse_quantity, parse_share, parse_time
     from fieldsid.plant.parameter_source import load_parameter_source
-    from fieldsid.records.keys import body_of
     from fieldsid.results.gains import Verified
     from fieldsid.schedule.record import load_schedule
     from fieldsid.schedule.verdict import against_constant, gates_of, rests_on, verdict_of
@@ -280,11 +211,14 @@ def verify(
             scheduled=checked.scheduled,
             constant=checked.constant,
             gates=gates,
-            figure=None if output is None else _draw(known, checked, output, context, force=force),
+            figure=drawn_at(output, sketch("schedule", known, checked), force=force),
         )
     )
     headline = of_verification(body, schedule, models or source.paths)
-    result = emit(body, as_json=as_json, render=lambda to: render_verify(to, checked, body), headline=headline)
+    passed = [g for g in body["gates"] if g["passed"] and not body["passed"]]
+    gates_said = (f"passed: {g['gate']} {g['found']:.3g}, wanted {g['wanted']:.3g}" for g in passed)
+    page = Page("", blocks=(*verify_blocks(checked), *gates_said), closing=written(figure=body["figure"]))
+    result = emit(body, as_json=as_json, render=page, headline=headline)
     if not body["passed"]:
         raise typer.Exit(1)
     return result
@@ -293,12 +227,12 @@ def verify(
 @command.command("export", short_help="Write the gains for the vehicle's software.")
 def export(
     schedule: ScheduleFile,
-    to: To = "yaml",
-    node: Node = None,
-    template: Template = None,
-    into: Into = None,
-    key: Key = None,
-    write: Write = False,
+    to: Annotated[str, option("--to", "TARGET", f"One of {TARGETS}.")] = "yaml",
+    node: Annotated[str | None, option("--node", "NAME", "What the gains go under: node, section, prefix or process.")] = None,
+    template: Annotated[Path | None, option("--template", "FILE", "A template of your own, see templates/exports/.")] = None,
+    into: Annotated[Path | None, option("--into", "YAML", "An existing YAML file to put the gains into.")] = None,
+    key: Annotated[str | None, option("--key", "A.B.C", "The key in that file that holds the gains.")] = None,
+    write: Annotated[bool, flag("--write", "Change the file of `--into` (a backup is kept), not only show how.")] = False,
     output: OutputFile = None,
     force: Force = False,
     as_json: JsonFlag = False,
@@ -312,7 +246,6 @@ def export(
     """
     from fieldsid.errors import UsageError
     from fieldsid.exports import pick_target
-    from fieldsid.records.keys import body_of
     from fieldsid.results.gains import Exported
     from fieldsid.schedule.record import load_schedule
 
@@ -327,7 +260,7 @@ def export(
     text = target.render(known, node or target.node, template)
     body = body_of(Exported(target.name, text, *(() if output is None else _written(output, text, force=force))))
     headline, is_file = of_export(body, schedule), body["file"] is None
-    return emit(body, as_json=as_json, render=lambda out: render_export(out, body), headline=headline, is_file=is_file)
+    return emit(body, as_json=as_json, render=lambda out: _render_export(out, body), headline=headline, is_file=is_file)
 
 
 def _written(output: Path, text: str, *, force: bool) -> tuple[str, str, str | None]:
@@ -345,7 +278,6 @@ def _written(output: Path, text: str, *, force: bool) -> tuple[str, str, str | N
 def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write: bool, as_json: bool) -> Mapping[str, Any]:
     from fieldsid.exports._patch import patch_yaml, write_patch
     from fieldsid.exports._target import columns_of
-    from fieldsid.records.keys import body_of
     from fieldsid.results.gains import Patched
 
     patch = patch_yaml(into, key, columns_of(known))
@@ -361,17 +293,8 @@ def _time(text: str | None, option: str, example: str = "0.1s") -> float | None:
     return None if text is None else parse_time(text, option, example)
 
 
-def _limits(
-    fin_limit: float | None, fin_rate: float | None, vehicle: Path | None, source: ParameterSource
-) -> tuple[float, float | None]:
-    """Return fin limit and fin rate: the options, else the vehicle's, else the largest fin the models were trained on."""
-    from fieldsid.face.arguments import fin_limits_of, vehicle_of
-
-    return fin_limits_of(fin_limit, fin_rate, vehicle_of(vehicle), source, say)
-
-
-def _draw(schedule: Schedule, checked: Verification, path: Path, context: typer.Context, *, force: bool) -> str:
-    from fieldsid.figures.canvas import save
-    from fieldsid.figures.schedule import figure
-
-    return str(save(figure(schedule, checked), path, force=force, tasks=tasks_of(context)))
+def _render_export(to: Console, body: Mapping[str, Any]) -> None:
+    """Print the file written, or the text where there is none."""
+    print_file(to, body["difference"] if body["file"] else body["text"])
+    if body["file"]:
+        to.print(f"exported: {body['file']}" + (f"; as it was: {body['backup']}" if body["backup"] else ""), soft_wrap=True)

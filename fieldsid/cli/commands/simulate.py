@@ -6,43 +6,28 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from fieldsid.cli.console import emit
-from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile
-from fieldsid.cli.voice import shown_in
+from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, option
+from fieldsid.cli.voice import angles
 from fieldsid.errors import UsageError
+from fieldsid.page import Block, Page, written
+from fieldsid.records.keys import body_of
+from fieldsid.rounding import number
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fieldsid.logs.run import Run
     from fieldsid.models.model import Model
-
-ManeuverSpec = Annotated[
-    str | None,
-    typer.Option("--maneuver", metavar="SPEC", help="`zigzag`, or `zigzag:amplitude=15deg,turn=20deg`.", show_default=False),
-]
-FinOf = Annotated[Path | None, typer.Option("--run", metavar="RUN", help="Replay the fin of this run.", show_default=False)]
-Speed = Annotated[
-    float | None, typer.Option("--speed", metavar="M_S", help="Speed; the model's own if not given.", show_default=False)
-]
-FinMax = Annotated[str, typer.Option("--fin-max", metavar="ANGLE", help="Largest fin angle about trim, `20deg` or `0.35rad`.")]
-RateHz = Annotated[float, typer.Option("--rate", metavar="HZ", min=1.0, max=1000.0, help="Samples per second of a maneuver.")]
-NoiseSeed = Annotated[
-    int | None, typer.Option("--noise", metavar="SEED", help="Add the model's sensor noise from this seed.", show_default=False)
-]
 
 
 def command(
     model: ModelFile,
-    maneuver: ManeuverSpec = None,
-    run: FinOf = None,
+    maneuver: Annotated[str | None, option("--maneuver", "SPEC", "`zigzag`, or `zigzag:amplitude=15deg,turn=20deg`.")] = None,
+    run: Annotated[Path | None, option("--run", "RUN", "Replay the fin of this run.")] = None,
     mapping: MappingFile = None,
-    speed: Speed = None,
-    fin_max: FinMax = "0.35rad",
-    rate: RateHz = 20.0,
-    noise: NoiseSeed = None,
+    speed: Annotated[float | None, option("--speed", "M_S", "Speed; the model's own if not given.")] = None,
+    fin_max: Annotated[str, option("--fin-max", "ANGLE", "Largest fin angle about trim, `20deg` or `0.35rad`.")] = "0.35rad",
+    rate: Annotated[float, option("--rate", "HZ", "Samples per second of a maneuver.", min=1.0, max=1000.0)] = 20.0,
+    noise: Annotated[int | None, option("--noise", "SEED", "Add the model's sensor noise from this seed.")] = None,
     output: OutputFile = None,
     force: Force = False,
     as_json: JsonFlag = False,
@@ -56,7 +41,6 @@ def command(
     """
     from fieldsid.cli.headlines.models import of_simulation
     from fieldsid.cli.user_effects import read_model
-    from fieldsid.records.keys import body_of
     from fieldsid.results.logs import SignalRange, Simulation
 
     if (maneuver is None) == (run is None):
@@ -92,7 +76,7 @@ def command(
         )
     )
     headline = of_simulation(body, known.axis.value, maneuver, run)
-    return emit(body, as_json=as_json, render=lambda to: _render(to, body), headline=headline)
+    return emit(body, as_json=as_json, render=_page(body), headline=headline)
 
 
 def _flown(model: Model, spec: str, speed: float | None, fin_max: str, rate: float) -> Run:
@@ -122,16 +106,12 @@ def _replayed(model: Model, path: Path, mapping: Path | None, speed: float | Non
     return replayed(model, record, simulate(model, record))
 
 
-def _render(to: Console, body: Mapping[str, Any]) -> None:
-    from fieldsid.cli.console import table
+def _page(body: Mapping[str, Any]) -> Page:
     from fieldsid.logs.run import COLUMNS
-    from fieldsid.rounding import number
 
-    rows = [
+    rows = tuple(
         (name, *(number(factor * v[k]) for k in ("low", "high", "end")), unit)
         for name, v in body["signals"].items()
-        for factor, unit in [shown_in(COLUMNS[name])]
-    ]
-    to.print(table("", ("signal", "low", "high", "end", "unit"), rows))
-    if body["file"]:
-        to.print(f"run: {body['file']}", soft_wrap=True)
+        for factor, unit in [angles().of(COLUMNS[name])]
+    )
+    return Page("", blocks=(Block("", rows, ("signal", "low", "high", "end", "unit")),), closing=written(run=body["file"]))

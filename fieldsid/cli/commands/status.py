@@ -4,30 +4,27 @@ from __future__ import annotations
 
 import shlex
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from fieldsid.cli.console import emit, table
+from fieldsid.cli.console import emit
 from fieldsid.cli.headlines.trial import of_status
-from fieldsid.cli.headlines.words import counted
-from fieldsid.cli.options import JsonFlag
+from fieldsid.cli.options import JsonFlag, argument
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import stem_of
+from fieldsid.page import Block, Page, Whole, counted, paragraph
+from fieldsid.records.keys import body_of
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fieldsid.trial_folder.state import FolderState, Item
 
 NAMES = {
-    "log": "log", "run": "run", "model": "model", "fit": "laws", "schedule": "gains", "turn-radius": "turning radius",
-    "plan": "plan", "diagnosis": "diagnosis", "vehicle": "vehicle", "mapping": "mapping", "simulated": "simulated run",
+    "vehicle": "vehicle", "mapping": "mapping", "plan": "plan", "log": "log", "run": "run", "model": "model",
+    "diagnosis": "diagnosis", "fit": "laws", "turn-radius": "turning radius", "schedule": "gains", "simulated": "simulated run",
 }  # fmt: skip
-ORDER = ("vehicle", "mapping", "plan", "log", "run", "model", "diagnosis", "fit", "turn-radius", "schedule", "simulated")
+"""Kinds of files in the order they are listed in, and what one is called."""
 MANY_IN_ONE, SEVERAL = ("laws", "gains"), {"diagnosis": "diagnoses", "turning radius": "turning radii"}
 """Files that hold several of what they are named after, and words whose plural is their own."""
 MOST_SOURCES = 2
@@ -36,10 +33,11 @@ WIDEST_NAME = 40
 """Characters up to which a file's name stays in one piece, whatever stands beside it."""
 LAST = 3
 
-Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="The trial folder; the one it is run in if not given.")]
 
-
-def command(folder: Folder = Path(), as_json: JsonFlag = False) -> Mapping[str, Any]:
+def command(
+    folder: Annotated[Path, argument("FOLDER", "The trial folder; the one it is run in if not given.")] = Path(),
+    as_json: JsonFlag = False,
+) -> Mapping[str, Any]:
     """Say what a folder holds, what was made from what, which files are stale, and what to do next.
 
     A file is stale where something that it was made from has changed since, by its hash, or is stale itself. Any folder will do;
@@ -48,7 +46,6 @@ def command(folder: Folder = Path(), as_json: JsonFlag = False) -> Mapping[str, 
     Example: sysid status
     """
     from fieldsid.errors import UsageError
-    from fieldsid.records.keys import body_of
     from fieldsid.results.trial import NextStep, Status
     from fieldsid.trial_folder.fin_limits import contradicted_limits
     from fieldsid.trial_folder.next_step import next_step
@@ -77,12 +74,12 @@ def command(folder: Folder = Path(), as_json: JsonFlag = False) -> Mapping[str, 
             next=NextStep(why, line),
         )
     )
-    return emit(body, as_json=as_json, render=lambda to: _render(to, state, body), headline=of_status(body), notes=notes)
+    return emit(body, as_json=as_json, render=_page(state), headline=of_status(body), notes=notes)
 
 
 def _verdict(state: FolderState) -> str:
     counts = Counter(i.kind for i in state.items)
-    held = ", ".join(_many(counts[k], NAMES[k]) for k in ORDER if counts[k] and k not in ("vehicle", "mapping")) or "nothing yet"
+    held = ", ".join(_many(counts[k], NAMES[k]) for k in NAMES if counts[k] and k not in ("vehicle", "mapping")) or "nothing yet"
     stale = sum(bool(i.stale) for i in state.items)
     name = state.folder.resolve().name
     return f"{name}: {held}; " + (f"{stale} stale" if stale else "nothing is stale")
@@ -94,24 +91,20 @@ def _many(count: int, name: str) -> str:
     return f"1 {name}" if count == 1 else f"{count} {SEVERAL.get(name, name + 's')}"
 
 
-def _render(to: Console, state: FolderState, body: Mapping[str, Any]) -> None:
+def _page(state: FolderState) -> Page:
     used = {s.path for i in state.of_kind("run") for s in i.sources}  # a log that has become a run says no more
     listed = [i for i in state.items if i.kind in NAMES and not (i.kind == "log" and state.place(i).resolve() in used)]
-    shown = sorted(listed, key=lambda i: (ORDER.index(i.kind), i.path))
-    if shown:
-        rows = table("", ("file", "what", "made from", ""), [_row(i) for i in shown], left=4)
-        rows.columns[0].width = min(max(len(i.path) for i in shown), WIDEST_NAME)
-        to.print(rows)
-    kept = [e for e in state.entries if e.verdict][-LAST:]
-    if kept:
-        to.print()
-    for e in kept:
+    shown = sorted(listed, key=lambda i: (list(NAMES).index(i.kind), i.path))
+    told = []
+    for e in [e for e in state.entries if e.verdict][-LAST:]:
         done = "" if e.exit in (0, 1) else "failed: "
         when = datetime.fromisoformat(e.time).astimezone().strftime("%Y-%m-%d %H:%M")
-        to.print(f"{when}  sysid {e.name}: {done}{e.verdict}", soft_wrap=True)
+        told.append(f"{when}  sysid {e.name}: {done}{e.verdict}")
+    files = Block("", tuple(map(_row, shown)), ("file", "what", "made from", ""), left=4, kept=WIDEST_NAME)
+    return Page("", blocks=(files, *paragraph(told, Whole)))
 
 
-def _row(item: Item) -> Sequence[str]:
+def _row(item: Item) -> tuple[str, ...]:
     names = [stem_of(Path(s.named)) for s in item.sources]
     said = ", ".join(names) if len(names) <= MOST_SOURCES else f"{names[0]} and {len(names) - 1} more"
     what = NAMES[item.kind]

@@ -7,63 +7,45 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from fieldsid.cli.console import emit, print_page, say
-from fieldsid.cli.options import Figures, Force, JsonFlag, MappingFile, ModelFiles, OutputDir, VehicleFile
+from fieldsid.cli.console import emit, say
+from fieldsid.cli.options import Figures, Force, JsonFlag, MappingFile, ModelFiles, OutputDir, OwnLaw, VehicleFile, option
 from fieldsid.cli.progress import refuse_closed
-from fieldsid.cli.session import tasks_of
+from fieldsid.cli.session import drawn_in
 from fieldsid.cli.skipped_logs import Skips
 from fieldsid.cli.voice import angles
 from fieldsid.display import page_of
+from fieldsid.figures.kinds import sketch
+from fieldsid.page import Page, written
+from fieldsid.records.keys import body_of
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fieldsid.logs.run import Run
     from fieldsid.plant.parameter_source import ParameterSource
     from fieldsid.results.turning import TurnRadius
-    from fieldsid.turning.prediction import TurnPrediction
-
-Speeds = Annotated[
-    str | None,
-    typer.Option("--speeds", metavar="LIST", help="Speeds in m/s, 0.5:2.5:0.1 or 1.0,1.6; those of the models if not given."),
-]
-RudderMax = Annotated[
-    str | None,
-    typer.Option(
-        "--fin-max",
-        metavar="ANGLE",
-        help="Rudder held in the turn, `15deg`; if not given the vehicle's limit, else the models' largest.",
-    ),
-]
-Measured = Annotated[
-    list[Path] | None,
-    typer.Option("--measured", metavar="RUN", help="Run of a turning circle, to compare with and to learn from; may repeat."),
-]
-Runs = Annotated[
-    list[Path] | None,
-    typer.Option("--runs", metavar="RUN", help="Runs that the turn is fitted to; the models' own if not given."),
-]
-Method = Annotated[str, typer.Option("--method", metavar="NAME", help="auto, maneuvering, simulated, u_turn or steady.")]
-OwnLaw = Annotated[
-    list[str] | None, typer.Option("--law", metavar="NAME=c0[,c1]", help="A law of your own, c0 + c1 u^2, as `b2=-0.23,-0.33`.")
-]
-FinZero = Annotated[
-    str, typer.Option("--fin-zero", metavar="ANGLE", help="Fin offsets below this, `1deg`, are not counted in the formula.")
-]
 
 
 def command(
-    context: typer.Context,
     models: ModelFiles,
-    speeds: Speeds = None,
-    rudder_max: RudderMax = None,
-    measured: Measured = None,
-    runs: Runs = None,
-    method: Method = "auto",
+    speeds: Annotated[
+        str | None, option("--speeds", "LIST", "Speeds in m/s, 0.5:2.5:0.1 or 1.0,1.6; those of the models if not given.")
+    ] = None,
+    rudder_max: Annotated[
+        str | None,
+        option(
+            "--fin-max", "ANGLE", "Rudder held in the turn, `15deg`; if not given the vehicle's limit, else the models' largest."
+        ),
+    ] = None,
+    measured: Annotated[
+        list[Path] | None, option("--measured", "RUN", "Run of a turning circle, to compare with and to learn from; may repeat.")
+    ] = None,
+    runs: Annotated[
+        list[Path] | None, option("--runs", "RUN", "Runs that the turn is fitted to; the models' own if not given.")
+    ] = None,
+    method: Annotated[str, option("--method", "NAME", "auto, maneuvering, simulated, u_turn or steady.")] = "auto",
     law: OwnLaw = None,
-    fin_zero: FinZero = "0.0175rad",
+    fin_zero: Annotated[
+        str, option("--fin-zero", "ANGLE", "Fin offsets below this, `1deg`, are not counted in the formula.")
+    ] = "0.0175rad",
     mapping: MappingFile = None,
     vehicle: VehicleFile = None,
     output: OutputDir = None,
@@ -83,36 +65,38 @@ def command(
     from fieldsid.cli.headlines.gains import caveat, of_turn
     from fieldsid.cli.inputs import models_among, read_runs
     from fieldsid.cli.user_effects import check_effects
-    from fieldsid.face.arguments import length_of
+    from fieldsid.face.arguments import fin_limit_of, length_of, vehicle_of
     from fieldsid.face.speeds import speeds_of
     from fieldsid.plant.parameter_source import load_parameter_source
-    from fieldsid.records.keys import body_of
     from fieldsid.results.turning import TurnRadius
     from fieldsid.turning.radius import turn_radius
 
     refuse_closed(output)
     given = None if rudder_max is None else parse_angle(rudder_max, "--fin-max", FIN)
-    models = models_among(models)
+    models, known = models_among(models), vehicle_of(vehicle)
     source, skips = load_parameter_source(models, laws=law or ()), Skips()
     check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
     prediction = turn_radius(
         source,
         speeds_of(speeds) or source.knots,
-        _rudder(given, vehicle, source),
+        fin_limit_of(known, source, say, "rudder") if given is None else given,
         runs=_runs(runs, source, mapping, skips),
         measured=read_runs(measured, mapping=mapping, refused=skips.skip) if measured else (),
         method=method,
         fin_zero=_fin_zero(fin_zero),
         unfit=skips.skip,
-        length=length_of(vehicle),
+        length=length_of(known),
     )
     found = TurnRadius(prediction=prediction, skipped_runs=tuple(skips.records))
     if output is not None:
-        drawn = _written(found, output, source, context, figures=figures, force=force)
-        found = replace(found, figures=drawn)
+        _save(found, output, source, force=force)
+        plots = {"turn_radius": sketch("turn", prediction)}
+        plots |= {f"circle_{m.turn.run}": sketch("turn", m.turn, draw="track_figure") for m in prediction.measured}
+        found = replace(found, figures=tuple(drawn_in(output if figures else None, plots, force=force)))
     body = body_of(found)
     headline, notes = of_turn(body, models, caveat(source.models, models)), prediction.notes
-    result = emit(body, as_json=as_json, render=lambda to: _render(to, prediction, body), headline=headline, notes=notes)
+    page = Page("", blocks=page_of(prediction, angles()).blocks, closing=written(figure=found.figures))
+    result = emit(body, as_json=as_json, render=page, headline=headline, notes=notes)
     skips.end(len(runs or []) + len(measured or []) - len(skips.records))
     return result
 
@@ -126,13 +110,6 @@ def _fin_zero(text: str) -> float:
         words = "the tolerance of a fin's zero lies in 0 .. 45 deg"
         raise UsageError(words, found=f"--fin-zero {text}", hint="`--fin-zero 0` counts every offset")
     return angle
-
-
-def _rudder(given: float | None, vehicle: Path | None, source: ParameterSource) -> float:
-    """Return the rudder of the turn: the option, the vehicle's limit, or the largest the models were trained on."""
-    from fieldsid.face.arguments import rudder_of, vehicle_of
-
-    return given if given is not None else rudder_of(vehicle_of(vehicle), source, say)
 
 
 def _runs(given: Sequence[Path] | None, source: ParameterSource, mapping: Path | None, skips: Skips) -> Sequence[Run]:
@@ -154,31 +131,9 @@ def _runs(given: Sequence[Path] | None, source: ParameterSource, mapping: Path |
     return [outcome for outcome in outcomes.values() if isinstance(outcome, Run)]
 
 
-def _written(
-    found: TurnRadius,
-    folder: Path,
-    source: ParameterSource,
-    context: typer.Context,
-    *,
-    figures: bool,
-    force: bool,
-) -> tuple[str, ...]:
+def _save(found: TurnRadius, folder: Path, source: ParameterSource, *, force: bool) -> None:
     from fieldsid.artifacts import save_record
-    from fieldsid.figures.canvas import save
-    from fieldsid.figures.turn import figure, track_figure
-    from fieldsid.records.keys import body_of
 
     inputs = [p for p in source.paths if p.is_file()]
     rest = {k: v for k, v in body_of(found).items() if k not in ("schema", "figures")}
     save_record(folder / "turn_radius.yaml", found.SCHEMA, rest, inputs=inputs, force=force)
-    if not figures:
-        return ()
-    prediction = found.prediction
-    drawn = {"turn_radius": figure(prediction)} | {f"circle_{m.turn.run}": track_figure(m.turn) for m in prediction.measured}
-    return tuple(str(save(f, folder / f"{name}.png", force=force, tasks=tasks_of(context))) for name, f in drawn.items())
-
-
-def _render(to: Console, prediction: TurnPrediction, body: Mapping[str, Any]) -> None:
-    print_page(to, page_of(prediction, angles()))
-    for path in body["figures"]:
-        to.print(f"figure: {path}", soft_wrap=True)

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, typed_with
-from fieldsid.cli.headlines.words import Body, counted, named, times
-from fieldsid.cli.voice import shown_in
+from fieldsid.cli.headlines.words import Body, named
+from fieldsid.cli.voice import angles
+from fieldsid.page import counted
 from fieldsid.rounding import MANY, number, with_error
 from fieldsid.trial_folder.journal import is_trial
+from fieldsid.views._words import times
 
 if TYPE_CHECKING:
     from fieldsid.models.model import Model
@@ -71,7 +73,7 @@ def of_turn(body: Body, models: Sequence[Path], caveat: str = "") -> Headline:
     taken = f"taken for {methods.count('measured')} of {len(rows)} turns" if "measured" in methods else "of none of these turns"
     of = counted(len(body["measured"]), "measured circle")
     circles = f"{of}, {taken}" if body["measured"] else "no circle given by `--measured`"
-    times, unit = shown_in("rad")
+    times, unit = angles().of("rad")
     rudder = f"rudder {number(times * body['rudder_max_rad'], 3)} {unit}"
     rests = f"{named([str(m) for m in models])}, {rudder}; {found_by(methods)}, {counted(len(speeds), 'speed')}; {circles}"
     says += ": one and a half circles tell it" if tightest["band_only"] else ""

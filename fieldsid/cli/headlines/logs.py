@@ -7,8 +7,9 @@ from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, typed_with
-from fieldsid.cli.headlines.words import Body, counted, named
+from fieldsid.cli.headlines.words import Body, named
 from fieldsid.logs.run import EXPLAINING
+from fieldsid.page import counted
 from fieldsid.trial_folder.journal import is_trial
 from fieldsid.trial_folder.make import LOGS, MAPPING
 

@@ -9,9 +9,10 @@ from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import Body, counted, named, used
-from fieldsid.cli.voice import shown_in
+from fieldsid.cli.headlines.words import Body, named, used
+from fieldsid.cli.voice import angles
 from fieldsid.comparison.sufficient import is_noise
+from fieldsid.page import counted
 from fieldsid.rounding import MANY, noise_fall, number, times_noise
 
 MODELS = "models"
@@ -142,7 +143,7 @@ def _before_to_after(body: Body) -> str:
 
 
 def _rms(errors: Body) -> str:
-    factor, angle = shown_in("rad")
+    factor, angle = angles().of("rad")
     parts = ((errors["angle_rms_rad"], angle), (errors["rate_rms_rad_s"], f"{angle}/s"))
     return " and ".join(f"{number(factor * float(rms), 2)} {unit}" for rms, unit in parts if rms is not None and isfinite(rms))
 

@@ -7,10 +7,12 @@ from math import isfinite
 from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
-from fieldsid.cli.headlines.typed import is_there, pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import MOST_NAMED, Body, counted, named, used
-from fieldsid.cli.voice import shown_estimate, shown_in, shown_words
+from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
+from fieldsid.cli.headlines.words import MOST_NAMED, Body, named, used
+from fieldsid.cli.voice import angles
 from fieldsid.comparison.sufficient import is_noise, over_noise, pooled
+from fieldsid.page import counted
+from fieldsid.records.named_inputs import is_there
 from fieldsid.rounding import MANY, noise_fall, number, times_noise
 
 NO_NOISE, WHOLE_FIT = "filtered_sensor", 99.0
@@ -47,7 +49,7 @@ def _left(over: float, fit: Body) -> str:
 def _parameters(fit: Body) -> str:
     """Return the numbers of a fit that are not of one run alone."""
     base = list(fit["parameters"].values())[:MOST_NAMED]
-    shown = [(p["shown"], shown_estimate(p["value"], p["std_error"], p["interval95"], p["unit"])) for p in base]
+    shown = [(p["shown"], angles().estimate(p["value"], p["std_error"], p["interval95"], p["unit"])) for p in base]
     return ", ".join(f"{name} = {value} {unit}".rstrip() for name, (value, unit, _) in shown)
 
 
@@ -84,7 +86,7 @@ def of_compare(body: Body, runs: Sequence[Path], inputs: Sequence[Path]) -> Head
     if is_noise(over):
         says += ": nothing is left but the noise"
     elif worst["where"]:
-        says += f"; fails most at {shown_words(worst['where'][0]['condition'])}"
+        says += f"; fails most at {angles().words(worst['where'][0]['condition'])}"
     seen = [e["run"] for e in entries if e["fitted_to"]]
     judged = (
         "which it was not fitted to"
@@ -167,7 +169,7 @@ def of_simulation(body: Body, axis: str, maneuver: str | None, run: Path | None)
     name = "yaw_rad" if axis == "yaw" else "pitch_rad"
     reach = body["signals"][name]
     how = f"the maneuver {maneuver}" if maneuver else f"the fin of {run}"
-    times, unit = shown_in("rad")
+    times, unit = angles().of("rad")
     swing = f"{number(times * reach['low'], 3)} .. {number(times * reach['high'], 3)} {unit}"
     says = f"{body['seconds']:.1f} s, {axis} {swing} under {how}"
     rests = f"{body['model']}, {counted(body['samples'], 'sample')}"

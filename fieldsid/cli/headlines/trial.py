@@ -7,7 +7,8 @@ from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, typed_with
-from fieldsid.cli.headlines.words import Body, counted
+from fieldsid.cli.headlines.words import Body
+from fieldsid.page import counted
 from fieldsid.trial_folder.next_step import PORT
 
 

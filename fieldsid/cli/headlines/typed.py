@@ -6,6 +6,7 @@ import shlex
 from collections.abc import Sequence
 from contextvars import ContextVar
 from itertools import groupby
+from os.path import isfile
 from pathlib import Path
 
 from fieldsid.cli.trial.parsed import parse
@@ -23,8 +24,8 @@ def remember(words: Sequence[str]) -> None:
 def typed_with(*more: str) -> str:
     """Return the command line under way with more words behind it; `--json` is left out."""
     words = [w for w in _WORDS.get() if w != "--json"]
-    groups = [list(group) for _, group in groupby(words, key=lambda w: not w.startswith("-") and _is_file(w))]
-    parts = [part for g in groups for part in ([g] if len(g) > FEW and _is_file(g[0]) else g)]
+    groups = [list(group) for _, group in groupby(words, key=lambda w: not w.startswith("-") and isfile(w))]  # noqa: PTH113 - says no
+    parts = [part for g in groups for part in ([g] if len(g) > FEW and isfile(g[0]) else g)]  # noqa: PTH113 - of what cannot be reached
     return pasted(*parts, *more)
 
 
@@ -53,18 +54,6 @@ def _reading(words: Sequence[str]) -> list[str]:
         return []
     read = {p for p in under_way.paths() if p.suffix not in (".yaml", ".yml")}
     return ["--mapping", str(under_way.values["mapping"])] if read & set(next_.paths()) else []
-
-
-def is_there(path: Path) -> bool:
-    """Whether there is a file or folder at a path; what cannot be reached is not."""
-    try:
-        return path.exists()
-    except PermissionError:
-        return False
-
-
-def _is_file(word: str) -> bool:
-    return is_there(Path(word)) and Path(word).is_file()
 
 
 def repeated(option: str, files: Sequence[str | Path]) -> list[str]:

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fieldsid.cli.headlines.typed import pasted
-from fieldsid.rounding import MANY, number
 
 Body = Mapping[str, Any]
 USE = {"yaw": ("turn-radius",), "pitch": ("schedule", "design")}
@@ -14,20 +13,10 @@ USE = {"yaw": ("turn-radius",), "pitch": ("schedule", "design")}
 MOST_NAMED = 3
 
 
-def counted(count: int, word: str, many: str = "") -> str:
-    """Return `1 run`, `2 runs`; `many` is a plural that is no `s` more."""
-    return f"{count} {word if count == 1 else many or f'{word}s'}"
-
-
 def named(names: Sequence[str]) -> str:
     """Return the first few names, and how many more there are."""
     more = len(names) - MOST_NAMED
     return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
-
-
-def times(over: float) -> str:
-    """Return an error over the noise floor; far above it decimals say nothing."""
-    return f"{over:.2f}" if over < MANY else number(over, 3)
 
 
 def used(axis: str, model: str) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from fieldsid.artifacts import write_text
 from fieldsid.cli.help.catalogue import entries
@@ -48,22 +49,18 @@ def script(shell: str) -> str:
 
 def options() -> dict[str, tuple[str, ...]]:
     """Return the options of every command, and the subcommands of those that have some."""
-    from importlib import import_module
-
     import typer
 
+    from fieldsid.cli.programs import program_of
+
     found = {}
-    for name, entry in entries().items():
-        module = import_module(entry.module)
-        if isinstance(module.command, typer.Typer):
-            group = typer.main.get_group(module.command)
-            under = {o for c in group.commands.values() for p in c.params for o in p.opts if o.startswith("-")}
-            found[name] = (*group.commands, *sorted(under), "--help")
-            continue
-        program = typer.Typer(add_completion=False)
-        program.command(name)(module.command)
-        known = {o for p in typer.main.get_command(program).params for o in (*p.opts, *p.secondary_opts) if o.startswith("-")}
-        found[name] = (*sorted(known), "--help")
+    for name in entries():
+        command: Any = typer.main.get_command(program_of([name])[0])
+        under = command.commands[name].commands if hasattr(command, "commands") else {}
+        known = {
+            o for c in under.values() or [command] for p in c.params for o in (*p.opts, *p.secondary_opts) if o.startswith("-")
+        }
+        found[name] = (*under, *sorted(known), "--help")
     return found
 
 

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from fieldsid.cli.console import FAR, words
 from fieldsid.cli.headlines.headline import Headline
-from fieldsid.cli.voice import shown_estimate, shown_in
+from fieldsid.cli.voice import angles
 from fieldsid.rounding import with_error
 
 STYLE = {
@@ -109,13 +109,13 @@ def _parameters(body: Mapping[str, Any], *, with_band: bool) -> Table:
     for name in ("", "value", "unit", *(("95 % band",) if with_band else ()), "error", "wanted", ""):
         made.add_column(name, justify="right" if name else "left", header_style="dim", no_wrap=True)
     for name, p in body["parameters"].items():
-        (factor, unit), wanted = shown_in(p["unit"]), p["goal_std_error"]
+        (factor, unit), wanted = angles().of(p["unit"]), p["goal_std_error"]
         value = None if p["value"] is None else factor * p["value"]
         wanted = _error(None if wanted is None else abs(factor) * wanted, value)
         if p["std_error"] is None:
             made.add_row(name, "-", unit, *(("-",) if with_band else ()), "-", wanted, "")
             continue
-        shown, _, band = shown_estimate(p["value"], p["std_error"], p["interval95"], p["unit"])
+        shown, _, band = angles().estimate(p["value"], p["std_error"], p["interval95"], p["unit"])
         state = words("settled", "green") if p["settled"] else words("moving", "yellow")
         bands = (band,) if with_band else ()
         made.add_row(name, shown, unit, *bands, _error(factor * p["std_error"], value), wanted, state)

@@ -30,11 +30,6 @@ def filled(parsed: Parsed, state: Callable[[], FolderState]) -> list[str]:
     return [] if fill is None else fill(parsed, state())
 
 
-def wants(parsed: Parsed) -> bool:
-    """Whether a command takes anything from a trial folder."""
-    return parsed.name in FILLS
-
-
 def _runs(parsed: Parsed, state: FolderState) -> list[str]:
     """Return the folder's runs without those that excite the other plane alone."""
     return [] if parsed.values.get("runs") else _of_plane(parsed, state)
@@ -142,12 +137,9 @@ def _extend(parsed: Parsed, state: FolderState) -> list[str]:
     return _of_model(runs)(parsed, state)
 
 
-def _model(parsed: Parsed, state: FolderState) -> list[str]:
-    return [] if parsed.values.get("model") else chosen_models(state)[:1]
-
-
-def _models(parsed: Parsed, state: FolderState) -> list[str]:
-    return [] if parsed.values.get("models") else chosen_models(state)
+def _unless(given: str, files: Callable[[FolderState], list[str]]) -> Fill:
+    """Return the filling of a command that takes some files of the folder, unless a parameter gives them."""
+    return lambda parsed, state: [] if parsed.values.get(given) else files(state)
 
 
 def _turn_radius(parsed: Parsed, state: FolderState) -> list[str]:
@@ -173,8 +165,8 @@ def _circles(state: FolderState) -> list[str]:
     return found
 
 
-def _schedule(parsed: Parsed, state: FolderState) -> list[str]:
-    return [] if parsed.values.get("schedule") else [i.path for i in state.of_kind("schedule")[-1:]]
+def _gains(state: FolderState) -> list[str]:
+    return [i.path for i in state.of_kind("schedule")[-1:]]
 
 
 def _live(parsed: Parsed, state: FolderState) -> list[str]:
@@ -206,13 +198,13 @@ FILLS: Mapping[str, Fill] = MappingProxyType(
         "compare": _compare,
         "diagnose": _diagnose,
         "extend": _extend,
-        "history": _model,
-        "simulate": _model,
-        "fit": _models,
+        "history": _unless("model", lambda state: chosen_models(state)[:1]),
+        "simulate": _unless("model", lambda state: chosen_models(state)[:1]),
+        "fit": _unless("models", chosen_models),
         "turn-radius": _turn_radius,
-        "schedule design": _models,
-        "schedule verify": _schedule,
-        "schedule export": _schedule,
+        "schedule design": _unless("models", chosen_models),
+        "schedule verify": _unless("schedule", _gains),
+        "schedule export": _unless("schedule", _gains),
         "live": _live,
         "batch": _batch,
     }

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import os
 import stat
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Self, TextIO
+from typing import Any
 
 import typer
 
-from fieldsid.cli.console import say
+from fieldsid.cli.console import said, say
 from fieldsid.cli.exit_codes import BAD_INPUT, DONE, OUR_BUG
-from fieldsid.cli.trial.filled import filled, in_words, left_out, wants
+from fieldsid.cli.trial.filled import filled, in_words, left_out
 from fieldsid.cli.trial.parsed import Parsed, parse
 from fieldsid.errors import FieldsidError
 from fieldsid.records.named_inputs import is_there
@@ -28,8 +27,6 @@ NOT_KEPT = ("guide", "status", "demo", "effects list", "effects show", "init")
 WRITTEN = ("output", "figure", "write_mapping")
 """Parameters that name what is written, not what is read."""
 LONGEST_VERDICT = 300
-MOST_HELD = 20_000
-"""Characters of the output that are kept while it is looked through for its first line."""
 
 
 def run_in_trial(arguments: Sequence[str], run: Callable[[Sequence[str]], Any]) -> Any:
@@ -38,7 +35,7 @@ def run_in_trial(arguments: Sequence[str], run: Callable[[Sequence[str]], Any]) 
     if parsed is None or parsed.name in NOT_KEPT:
         return run(arguments)
     folder, state = Path(), cache(_state)
-    added = filled(parsed, state) if wants(parsed) else []
+    added = filled(parsed, state)
     if added:
         others = len(left_out(parsed, state()))
         more = f"; {others} more excite the other plane alone" if others else ""
@@ -46,21 +43,21 @@ def run_in_trial(arguments: Sequence[str], run: Callable[[Sequence[str]], Any]) 
     words = [*arguments, *added]
     whole = parse(words) or parsed
     kept = _Kept(folder, words, whole)
-    with _FirstLine() as shown:
-        try:
-            result = run(words)
-        except (typer.TyperException, typer.Abort):  # nothing was begun
-            raise
-        except BrokenPipeError:  # who read the output went away, as `head` does: the work is done
-            kept.write(DONE, shown.line)
-            raise
-        except FieldsidError as error:
-            kept.write(BAD_INPUT, error.what)
-            raise
-        except Exception as error:
-            kept.write(OUR_BUG, f"{type(error).__name__}: {error}")
-            raise
-    kept.write(result if isinstance(result, int) else DONE, shown.line, result)
+    said()  # of whatever ran before
+    try:
+        result = run(words)
+    except (typer.TyperException, typer.Abort):  # nothing was begun
+        raise
+    except BrokenPipeError:  # who read the output went away, as `head` does: the work is done
+        kept.write(DONE, said())
+        raise
+    except FieldsidError as error:
+        kept.write(BAD_INPUT, error.what)
+        raise
+    except Exception as error:
+        kept.write(OUR_BUG, f"{type(error).__name__}: {error}")
+        raise
+    kept.write(result if isinstance(result, int) else DONE, said(), result)
     return result
 
 
@@ -86,10 +83,9 @@ class _Kept:
         outputs = self._stamps(Path(p) for p, seen in after.items() if self._before.get(p) != seen)
         body: Mapping[str, Any] = result if isinstance(result, Mapping) else {}
         named = body.get("effects") if self._words[0] == "diagnose" else None
-        said = str(body["headline"]["says"]) if "headline" in body else verdict if not verdict.startswith("{") else ""
         entry = Entry(
             self._time, ("sysid", *self._words), code, round(perf_counter() - self._began, 3),
-            said[:LONGEST_VERDICT], self._inputs, outputs, tuple(named or ()),
+            verdict[:LONGEST_VERDICT], self._inputs, outputs, tuple(named or ()),
         )  # fmt: skip
         try:
             append(self._folder, entry)
@@ -116,34 +112,3 @@ def _snapshot(folder: Path) -> dict[str, tuple[int, int]]:
                 if stat.S_ISREG(state.st_mode):
                     found[path.as_posix()] = (state.st_size, state.st_mtime_ns)
     return found
-
-
-class _FirstLine:
-    """Standard output as it is, whose first line that says something is kept: a command's result begins with its verdict."""
-
-    def __init__(self) -> None:
-        self._held = ""
-        self._stream: TextIO = sys.stdout
-
-    def __enter__(self) -> Self:
-        self._stream = sys.stdout
-        sys.stdout = self
-        return self
-
-    def __exit__(self, *_error: object) -> None:
-        sys.stdout = self._stream
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._stream, name)
-
-    def write(self, text: str) -> int:
-        """Write as the stream does."""
-        if len(self._held) < MOST_HELD:
-            self._held += text
-        return self._stream.write(text)
-
-    @property
-    def line(self) -> str:
-        """The first line that says something, warnings aside."""
-        lines = (" ".join(line.split()) for line in self._held.splitlines())
-        return next((line for line in lines if line and not line.startswith("warning: ")), "")

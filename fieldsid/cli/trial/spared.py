@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 
-from fieldsid.cli.trial.filled import filled, left_out, wants
+from fieldsid.cli.trial.filled import FILLS, filled, left_out
 from fieldsid.cli.trial.parsed import parse
 from fieldsid.trial_folder.journal import is_trial
 from fieldsid.trial_folder.make import MAPPING
@@ -28,7 +28,7 @@ def without_the_filled(words: Sequence[str]) -> list[str]:
     if not is_trial(Path()):
         return words
     parsed = parse(words)
-    if parsed is None or not wants(parsed):
+    if parsed is None or parsed.name not in FILLS:
         return words
     name, state = len(parsed.name.split()), cache(lambda: state_of(Path()))
     shorter = ([*words[:name], *_without_files(words[name:], options)] for options in ((*READ, "-o"), READ))

@@ -25,7 +25,9 @@ def draw(ax):
     ax.plot(x, x**3, label="model")
     ax.fill_between(x, x, x**2, hatch="//", clip_on=True)
     canvas.legend_above(ax)
-canvas.one(draw, Path(sys.argv[1]))
+sheet = canvas.sheet(8.0, 5.0)
+draw(sheet.add_subplot())
+canvas.save(sheet, Path(sys.argv[1]))
 """
 
 
@@ -46,7 +48,7 @@ def test_the_suffix_is_the_kind_of_file_and_the_same_figure_the_same_bytes(tmp_p
 
 
 def test_capital_letters_are_a_suffix_too(tmp_path):
-    path = canvas.one(lambda ax: ax.plot([0.0, 1.0]), tmp_path / "F.SVG")
+    path = canvas.save(canvas.sheet(), tmp_path / "F.SVG")
     assert path.read_bytes().startswith(b"<?xml")
 
 
