@@ -24,6 +24,7 @@ from fieldsid.schedule.wish import PROPORTIONAL, QUICKEST, Wish
 
 LEAST_HELD = 0.5
 """P and PI that hold fewer of the draws are refused: no proportional gain holds an unstable hull."""
+OPTIONS = {"kind": "--controller {}", "damping": "--damping {:g}", "phase_margin_deg": "--phase-margin {:g}"}
 DEPTH_PHASE_MARGIN_DEG = 60.0
 """Phase margin of the depth loop around the pitch loop: no overshoot to speak of beside what the pitch limit does."""
 
@@ -187,20 +188,25 @@ def _refusal(family: LinearPlant, wish: Wish, fin_limit: float) -> ModelError:
 
 
 def _remedy(family: LinearPlant, wish: Wish, fin_limit: float) -> str:
-    """Return the option with which a gain is found at this speed after all; nothing where none of the usual ones does."""
-    others = {
-        **{f"--controller {kind}": replace(wish, kind=kind) for kind in ("pd", "pid", "lqr") if kind != wish.kind},
-        **{f"--damping {d:g}": replace(wish, damping=d) for d in (0.5, 0.3) if d < wish.damped},
-        **{f"--phase-margin {p:g}": replace(wish, phase_margin_deg=p) for p in (30.0, 20.0) if p < wish.phase_margin_deg},
-        **{
-            f"--controller {k} --damping 0.5 --phase-margin 30": replace(wish, kind=k, damping=0.5, phase_margin_deg=30.0)
-            for k in ("pd",)
-            if wish.damped > 0.5 and wish.phase_margin_deg > 30.0
-        },
-    }
-    for option, other in others.items():
-        if other.kind in PROPORTIONAL and family.slow_damping[0] <= 0:
+    """Return the option with which a gain is found at this speed after all; nothing where none of the usual ones does.
+
+    All other gains are PD's, or lose phase to an integral: where PD has none at the loosest, none has.
+    """
+    damping, margin = wish.damped, wish.phase_margin_deg
+    loosest, *others = (
+        replace(wish, kind="pd", damping=min(0.3, damping), phase_margin_deg=min(20.0, margin)),
+        replace(wish, kind="pd"),
+        *(replace(wish, damping=d) for d in (0.5, 0.3) if d < damping),
+        *(replace(wish, phase_margin_deg=p) for p in (30.0, 20.0) if p < margin),
+        replace(wish, kind="pd", damping=min(0.5, damping), phase_margin_deg=min(30.0, margin)),
+    )
+    if _found(family.one(), loosest, fin_limit) is None:
+        return ""
+    for other in others:
+        if other == wish or (other.kind in PROPORTIONAL and family.slow_damping[0] <= 0):
             continue
-        if _found(family, other, fin_limit) is not None:
-            return f"at this speed there is one with `{option}`"
+        # with a rate they are refused for what the estimate lacks alone
+        if _found(family if other.kind in PROPORTIONAL else family.one(), other, fin_limit) is not None:
+            changed = (option.format(getattr(other, n)) for n, option in OPTIONS.items() if getattr(other, n) != getattr(wish, n))
+            return f"at this speed there is one with `{' '.join(changed)}`"
     return ""
