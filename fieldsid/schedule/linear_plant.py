@@ -140,6 +140,11 @@ class LinearPlant:
         _, _, c, _, c_f = self.straight
         return np.asarray(self.authority + c_f / c)
 
+    @property
+    def reference_gain(self) -> float:
+        """Return the fin (rad) per rad of reference that cancels the estimate's stiffness."""
+        return float(self.stiffness[0]) / float(self.slow_authority[0])
+
 
 def products(left: FloatArray, right: FloatArray) -> FloatArray:
     """Return the products of polynomials, row by row: (d, m) and (d, n) give (d, m + n - 1)."""

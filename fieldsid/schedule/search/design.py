@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldsid.errors import ModelError
-from fieldsid.models.axis import Axis
 from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.margins import FREQUENCY_GRID_RAD_S, HELD_SHARE, margins, worst_of
+from fieldsid.schedule.record import Row
 from fieldsid.schedule.search.binding import bound_by
 from fieldsid.schedule.search.formulas import bandwidth_of
 from fieldsid.schedule.search.objective import BETTER_SHARE, LACK_ROUNDING, Place, demand_of
@@ -57,23 +57,6 @@ class Sought:
     def step(self) -> float:
         """The step (rad) that was flown."""
         return self.search.place.demand.step
-
-
-@dataclass(frozen=True, slots=True)
-class Designed:
-    """Gains with the loop's crossover (rad/s), the reference's and the depth's gain; what the draws do with them.
-
-    `held` is the share of the draws that come to rest from the step, `settling` (s) how long 95 % of them take.
-    """
-
-    gains: Gains
-    crossover: float
-    slowed: float
-    reference_gain: float
-    depth_gain: float
-    held: float
-    settling: float
-    binds: str
 
 
 def design_gains(plant: LinearPlant, wish: Wish, fin_limit: float, answer: float = QUICKEST) -> Sought:
@@ -119,14 +102,20 @@ def with_bandwidth(quick: Sought, bandwidth: float) -> Sought | None:
     return replace(quick, search=search, found=found, binds=f"bandwidth {bandwidth:.3g} rad/s", slowed=1.0)
 
 
-def designed(sought: Sought) -> Designed:
-    """Return gains that were sought, with what the loop and the draws do with them."""
-    plant, gains = sought.plant, sought.found.gains
-    place = Place(plant.distinct(), sought.search.place.demand)
-    held, settling = place.held(gains)
-    crossover = float(np.nan_to_num(margins(plant.one(), gains).crossover[0]))
-    depth_gain = _depth_gain(place.plant, gains) if plant.axis is Axis.PITCH else 0.0
-    return Designed(gains, crossover, sought.slowed, _reference_gain(plant), depth_gain, held, settling, sought.binds)
+def row_of(sought: Sought, *, depth: bool, supported: bool) -> Row:
+    """Return the row of gains that were sought: its margins over the draws, and what these do with it.
+
+    `depth` adds the depth loop; `supported` says whether data were taken at this speed.
+    """
+    plant, gains, demand = sought.plant, sought.found.gains, sought.search.place.demand
+    family = plant.distinct()
+    held, settling = Place(family, demand).held(gains)
+    phase, gain, delay = margins(plant, gains).worst()
+    return Row(
+        plant.speed, gains, -float(plant.offset[0]), plant.reference_gain, demand.fin_limit,
+        _depth_gain(family, gains) if depth else 0.0, supported, sought.slowed,
+        phase, gain, delay, held, settling, sought.binds, demand.fin_of(gains),
+    )  # fmt: skip
 
 
 def _depth_gain(family: LinearPlant, gains: Gains) -> float:
@@ -135,17 +124,13 @@ def _depth_gain(family: LinearPlant, gains: Gains) -> float:
     T is the closed pitch loop from its reference, so the crossover is where T lags by 90 deg less the margin.
     """
     omega = FREQUENCY_GRID_RAD_S
-    asked = gains.kp + gains.ki / (1j * omega) + _reference_gain(family)
+    asked = gains.kp + gains.ki / (1j * omega) + family.reference_gain
     hull = family.response(omega)
     closed = hull * asked[None, :] / (1.0 + hull * gains.response(omega)[None, :])
     phase = np.degrees(np.unwrap(np.angle(closed), axis=1))
     first = np.argmax(phase <= DEPTH_PHASE_MARGIN_DEG - 90.0, axis=1)
     reached = np.take_along_axis(np.abs(closed), first[:, None], axis=1)[:, 0]
     return worst_of(omega[first] / (family.speed * reached), most=False)
-
-
-def _reference_gain(plant: LinearPlant) -> float:
-    return float(plant.stiffness[0]) / float(plant.slow_authority[0])
 
 
 def _search(family: LinearPlant, wish: Wish, fin_limit: float) -> Search:
