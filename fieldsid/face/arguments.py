@@ -116,12 +116,13 @@ def runs_behind(source: ParameterSource, say: Callable[[str], None]) -> list[Run
     from fieldsid.logs import load_run
     from fieldsid.logs.several.sifting import attempt
     from fieldsid.plant.parameter_source import logs_of
+    from fieldsid.runtime.parallel_map import parallel_map
 
     if not source.models or not source.paths or source.axis is not Axis.YAW:
         return []
     named = logs_of(source.paths)
     there = [p for _, p in named if p is not None]
-    runs = [run for run in (attempt(load_run, path) for path in there) if not isinstance(run, FieldsidError)]
+    runs = [run for run in parallel_map(lambda path: attempt(load_run, path), there) if not isinstance(run, FieldsidError)]
     if len(runs) < len(named):
         lost = f"{len(named) - len(runs)} of {len(named)} runs of the models"
         say(f"{lost} are gone, closed or outside of this folder: the speed lost in a turn is not measured in them")

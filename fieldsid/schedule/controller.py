@@ -51,16 +51,11 @@ KINDS: Mapping[str, str] = MappingProxyType(
 
 
 def closed_poles(plant: LinearPlant, gains: Gains) -> ComplexArray:
-    """Return the closed loop's poles (d, n) of every draw, the delay by a second-order Pade approximation."""
-    numerator, denominator = plant.polynomials()
-    one = np.ones_like(plant.damping)
-    if plant.delay.any():
-        t = plant.delay
-        numerator = products(numerator, np.column_stack([t * t / 12.0, -t / 2.0, one]))
-        denominator = products(denominator, np.column_stack([t * t / 12.0, t / 2.0, one]))
+    """Return the closed loop's poles (d, n) of every draw."""
+    numerator, denominator = plant.polynomials
     control = [gains.kd, gains.kp]
     if gains.ki != 0.0:
-        control, denominator = [*control, gains.ki], np.column_stack([denominator, 0.0 * one])
+        control, denominator = [*control, gains.ki], np.pad(denominator, ((0, 0), (0, 1)))
     forward = products(numerator, np.tile(np.array(control), (plant.count, 1)))
     whole = denominator.copy()
     whole[:, -forward.shape[1] :] += forward

@@ -93,8 +93,9 @@ class LinearPlant:
         hull = (b * (s + c) + c_f) / ((s * s + a * s + k) * (s + c) + c_r * s)
         return np.asarray(hull * np.exp(-s * self.delay[:, None]) / (self.lag[:, None] * s + 1.0))
 
+    @cached_property
     def polynomials(self) -> tuple[FloatArray, FloatArray]:
-        """Return numerator (d, m) and denominator (d, n) of angle over command without delay, highest power first."""
+        """Numerator (d, m) and denominator (d, n) of angle over command, highest power first; a delay by second-order Pade."""
         (a, k, c, c_r, c_f), b = self.straight, self.authority
         one = np.ones_like(a)
         numerator, denominator = b[:, None], np.column_stack([one, a, k])
@@ -103,6 +104,10 @@ class LinearPlant:
             denominator = np.column_stack([one, a + c, k + a * c + c_r, k * c])
         if self.lag.any():
             denominator = products(denominator, np.column_stack([self.lag, one]))
+        if self.delay.any():
+            square, half = self.delay**2 / 12.0, self.delay / 2.0
+            numerator = products(numerator, np.column_stack([square, -half, one]))
+            denominator = products(denominator, np.column_stack([square, half, one]))
         return numerator, denominator
 
     @property
@@ -134,6 +139,11 @@ class LinearPlant:
         """Return the authority (d,) 1/s^2 as the slow loop feels it: the fin's own and that through sway or heave."""
         _, _, c, _, c_f = self.straight
         return np.asarray(self.authority + c_f / c)
+
+    @property
+    def reference_gain(self) -> float:
+        """Return the fin (rad) per rad of reference that cancels the estimate's stiffness."""
+        return float(self.stiffness[0]) / float(self.slow_authority[0])
 
 
 def products(left: FloatArray, right: FloatArray) -> FloatArray:

@@ -74,24 +74,22 @@ def margins_of(known: PlantResponse, gains: Gains) -> Margins:
 
 def _read_off(size: FloatArray, phase: FloatArray, log_omega: FloatArray, damping: FloatArray) -> Margins:
     count = size.shape[0]
-    phase_margin, delay, crossover = np.full(count, np.inf), np.full(count, np.inf), np.full(count, np.nan)
-    gain_margin = np.full(count, np.inf)
-    for i, j in zip(*np.nonzero((size[:, :-1] > 0) != (size[:, 1:] > 0)), strict=True):
-        share = size[i, j] / (size[i, j] - size[i, j + 1])
-        omega = float(np.exp(log_omega[j] + share * (log_omega[j + 1] - log_omega[j])))
-        margin = float(np.mod(phase[i, j] + share * (phase[i, j + 1] - phase[i, j]) + np.pi, 2 * np.pi))
-        margin = margin if margin <= np.pi else margin - 2 * np.pi
-        if np.degrees(margin) < phase_margin[i]:
-            phase_margin[i], crossover[i] = np.degrees(margin), omega
-        delay[i] = min(delay[i], (margin if margin > 0 else 0.0) / omega)
+    phase_margin, delay, crossover, gain_margin = (np.full(count, fill) for fill in (np.inf, np.inf, np.nan, np.inf))
+    i, j = np.nonzero((size[:, :-1] > 0) != (size[:, 1:] > 0))
+    share = size[i, j] / (size[i, j] - size[i, j + 1])
+    omega = np.exp(log_omega[j] + share * (log_omega[j + 1] - log_omega[j]))
+    margin = np.pi - np.mod(-phase[i, j] - share * (phase[i, j + 1] - phase[i, j]), 2 * np.pi)
+    np.minimum.at(phase_margin, i, np.degrees(margin))
+    np.minimum.at(delay, i, np.maximum(margin, 0.0) / omega)
+    least = np.degrees(margin) == phase_margin[i]
+    crossover[i[least]] = omega[least]
     turns = np.floor((phase + np.pi) / (2 * np.pi))
-    for i, j in zip(*np.nonzero(turns[:, :-1] != turns[:, 1:]), strict=True):
-        line = 2 * np.pi * max(turns[i, j], turns[i, j + 1]) - np.pi
-        share = (line - phase[i, j]) / (phase[i, j + 1] - phase[i, j])
-        log_size = size[i, j] + share * (size[i, j + 1] - size[i, j])
-        # a crossing above one is a gain that may not fall below it; whether the loop is stable there, the phase margin says
-        if log_size < 0:
-            gain_margin[i] = min(gain_margin[i], -20 / np.log(10) * log_size)
+    i, j = np.nonzero(turns[:, :-1] != turns[:, 1:])
+    line = 2 * np.pi * np.maximum(turns[i, j], turns[i, j + 1]) - np.pi
+    share = (line - phase[i, j]) / (phase[i, j + 1] - phase[i, j])
+    log_size = size[i, j] + share * (size[i, j + 1] - size[i, j])
+    # a crossing above one is a gain that may not fall below it; whether the loop is stable there, the phase margin says
+    np.minimum.at(gain_margin, i, np.where(log_size < 0, -20 / np.log(10) * log_size, np.inf))
     unstable = damping < 0.0
     return Margins(
         np.where(unstable, -np.minimum(np.abs(phase_margin), 180.0), phase_margin),

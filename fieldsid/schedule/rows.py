@@ -9,11 +9,10 @@ from math import ceil, degrees
 from fieldsid.errors import UsageError
 from fieldsid.runtime.parallel_map import parallel_map
 from fieldsid.schedule.linear_plant import LinearPlant
-from fieldsid.schedule.margins import margins
 from fieldsid.schedule.plants import Plants
 from fieldsid.schedule.record import Row
 from fieldsid.schedule.search.best_constant import best_constant, improved, multiples_of
-from fieldsid.schedule.search.design import Sought, answering, designed, quickest, with_bandwidth
+from fieldsid.schedule.search.design import Sought, answering, quickest, row_of, with_bandwidth
 from fieldsid.schedule.search.objective import BETTER_SHARE, Place, demand_of
 from fieldsid.schedule.wish import QUICKEST, Wish
 
@@ -46,7 +45,8 @@ def design_rows(plants: Plants, knots: Sequence[float], asked: Asked) -> tuple[t
         as_slow = "" if wish.settling is not None else f" as at {_slowest(quick).plant.speed:.3g} m/s"
         found = parallel_map(lambda sought: answering(sought, answer, f"settling {answer:.3g} s{as_slow}"), quick)
     found = _no_worse_than_one(found, [place_of(s.plant, wish, limit, answer) for s in found])
-    return tuple(parallel_map(lambda sought: row_of(plants, sought, asked), found)), answer
+    supports = plants.source.supports
+    return tuple(parallel_map(lambda s: row_of(s, depth=asked.depth, supported=supports(s.plant.speed)), found)), answer
 
 
 def place_of(plant: LinearPlant, wish: Wish, fin_limit: float, answer: float) -> Place:
@@ -113,14 +113,3 @@ def _no_worse_than_one(rows: Sequence[Sought], places: Sequence[Place]) -> list[
         return replace(rows[i], found=replace(rows[i].found, gains=gains), binds=AS_THE_CONSTANT)
 
     return parallel_map(kept, range(len(rows)))
-
-
-def row_of(plants: Plants, sought: Sought, asked: Asked) -> Row:
-    """Return the row of gains that were sought, with its margins over the draws."""
-    plant, made = sought.plant, designed(sought)
-    phase, gain, delay = margins(plant, made.gains).worst()
-    return Row(
-        plant.speed, made.gains, -float(plant.offset[0]), made.reference_gain, asked.fin_limit,
-        made.depth_gain if asked.depth else 0.0, plants.source.supports(plant.speed), made.slowed,
-        phase, gain, delay, made.held, made.settling, made.binds, sought.search.place.demand.fin_of(made.gains),
-    )  # fmt: skip

@@ -8,7 +8,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -46,7 +46,7 @@ class Beside:
     ) -> None:
         self._axis, self._flown, self._wanted, self._waits = axis, flown, wanted, waits
         self._designing, self._diagnosing = SecondProcess(), SecondProcess()
-        self._times, self._fins, self._judged = array("d"), array("d"), nan
+        self._times, self._fins, self._judged = array("d"), array("d"), (nan, nan)
         self._designed: OnlineEstimate | None = None
         self.gains: LiveGains | None = None
         self.diagnosed: LiveDiagnosis | None = None
@@ -102,10 +102,13 @@ class Beside:
 
     def _diagnose(self, now: OnlineEstimate, flown: Flown, *, ended: bool) -> None:
         moved = last_moved(np.array(self._times), np.array(self._fins))
-        if not isfinite(moved) or moved == self._judged or not (ended or now.time - moved >= STILL_S):
+        judged, until = self._judged
+        # in the end all of it is told of, as the command does
+        is_due = now.time != until if ended else moved != judged and now.time - moved >= STILL_S
+        if not isfinite(moved) or not is_due:
             return
-        self._judged = moved
-        self._diagnosing.give(diagnosed, flown(now.time), self._axis)
+        self._judged = moved, now.time
+        self._diagnosing.give(diagnosed, flown(inf if ended else now.time), self._axis)
 
 
 def wanted_at(axis: Axis, schedule: Path | None, vehicle: Path | None, depth: bool) -> Callable[[OnlineEstimate], Wanted]:

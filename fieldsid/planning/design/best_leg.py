@@ -54,12 +54,15 @@ def best_leg(setting: Setting, speed: float, known: Sequence[Excitation] = ()) -
     UsageError when nothing stays inside the envelope.
     """
     judge = make_objective(setting.model, speed, setting.envelope, setting.window, setting.want, setting.run_up_s)
+    crowd = ensemble_at(judge, setting)
+    straight = fly_list(crowd.first(COARSE_DRAWS), np.zeros(0), judge.envelope, judge.autopilot, judge.run_up)
+    if np.mean(straight.outside(judge.envelope)) > setting.envelope.share:
+        raise _nothing_inside(judge)  # as the autopilot steers straight on
     scored = _known_again(judge, known) if known else catalogue(judge, setting.effort)
     scored = [s for s in scored if s.candidate.record.rule is None or not setting.open_loop]
     seeds = [s for s in (as_switched(judge, c.candidate) for c in scored) if s is not None]
     scored.append(switching(judge, seeds, setting.effort, setting.seed))
     scored.sort(key=lambda s: s.cost)
-    crowd = ensemble_at(judge, setting)
     leg = _best_of(judge, setting, crowd, scored)
     if not leg.flown_from_list_in(setting.envelope):
         leg = _best_of(judge, setting, crowd, [s for s in scored if s.candidate.record.rule is None])
@@ -73,14 +76,18 @@ def _best_of(judge: Objective, setting: Setting, crowd: Ensemble, scored: Sequen
     finalists = islice((c for c in kept if c is not None), FINALISTS)
     inside = [Scored(c, judge.cost(c, margin=10.0)) for c in finalists]
     if not inside:
-        raise UsageError(
-            f"no maneuver stays inside the envelope at {judge.scene.speed:g} m/s with a probability of "
-            f"{1 - setting.envelope.share:.0%}",
-            found=", ".join(f"{k} {v:.3g}" for k, v in setting.envelope.rooms().items()),
-            hint=f"{setting.envelope.widening()}, or narrow the prior with a first model: `--model MODEL`",
-        )
+        raise _nothing_inside(judge)
     best = enforce_chance_constraint(judge, setting, crowd, min(inside, key=lambda s: s.cost).candidate)
     return leg_of(judge, setting, best, crowd)
+
+
+def _nothing_inside(judge: Objective) -> UsageError:
+    limits = judge.envelope
+    return UsageError(
+        f"no maneuver stays inside the envelope at {judge.scene.speed:g} m/s with a probability of {1 - limits.share:.0%}",
+        found=", ".join(f"{k} {v:.3g}" for k, v in limits.rooms().items()),
+        hint=f"{limits.widening()}, or narrow the prior with a first model: `--model MODEL`",
+    )
 
 
 def ensemble_at(judge: Objective, setting: Setting) -> Ensemble:

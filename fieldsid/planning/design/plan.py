@@ -18,8 +18,9 @@ from fieldsid.planning.belief.prior_model import checked_prior
 from fieldsid.planning.design.abort_conditions import Abort, aborts_of
 from fieldsid.planning.design.best_leg import RUN_UP_S, Setting, best_leg
 from fieldsid.planning.design.circle_legs import circle_legs
-from fieldsid.planning.design.leg import Leg
+from fieldsid.planning.design.leg import Leg, turn_back_s
 from fieldsid.planning.flight.excitation import Excitation, Window
+from fieldsid.planning.flight.operating_point import operating_point
 from fieldsid.planning.safety.envelope import Envelope, check_room, check_speeds, limits_said
 from fieldsid.planning.specify.accuracy_goals import accuracy_goals_text
 from fieldsid.records.keys import INLINE, Key
@@ -107,14 +108,8 @@ def make_plan(model: Model, request: Request, step: Callable[[], None] = lambda:
     Raises UsageError for speeds, limits or accuracy goals that cannot be met, with what would be possible; ModelError for a prior
     that is unstable.
     """
-    check_speeds(request.speeds, request.slowest, request.fastest)
-    check_budget(request)
-    check_room(request.envelope, request.speeds, request.run_up_s, SHORTEST_WINDOW_S)
-    checked_prior(model, request.axis, request.speeds)
-    legs = _legs(model, request, step)
-    legs = [_repeated(leg, request.want, request.envelope) for leg in legs]
-    if request.radius:
-        legs += circle_legs(setting_at(model, request, max(request.speeds)), request.speeds)
+    circles = checked_circles([model], request, request.window.length)
+    legs = _legs(model, request, step) + circles
     check_minutes(legs, request)
     name = str(model.info.get("name", "")) or model.method or "model"
     return Plan(
@@ -130,6 +125,32 @@ def make_plan(model: Model, request: Request, step: Callable[[], None] = lambda:
     )
 
 
+def checked_circles(models: Sequence[Model], request: Request, shortest_s: float) -> list[Leg]:
+    """Return the circles of a request, none without, once all that shows before a search has been checked.
+
+    `shortest_s` is what a window takes at least. Raises UsageError and ModelError as `make_plan` does.
+    """
+    check_speeds(request.speeds, request.slowest, request.fastest)
+    _check_budget(request)
+    check_room(request.envelope, request.speeds, request.run_up_s, SHORTEST_WINDOW_S)
+    for model in models:
+        checked_prior(model, request.axis, request.speeds)
+    settings = [setting_at(models[0], request, speed) for speed in request.speeds]
+    circles = circle_legs(setting_at(models[0], request, max(request.speeds)), request.speeds) if request.radius else []
+    bases = [operating_point(models[0], speed).base for speed in request.speeds]
+    turns = [turn_back_s(base.damping, base.authority, request.envelope.fin) for base in bases]
+    legs = [request.run_up_s + min(shortest_s, s.window.length) + turn for s, turn in zip(settings, turns, strict=True)]
+    once = (sum(legs) + sum(leg.pass_s for leg in circles)) / 60.0
+    if request.minutes is not None and once > request.minutes:
+        fewer = f", or fly {max(1, int(len(legs) * request.minutes / once))} of the {len(legs)} speeds" if legs[1:] else ""
+        raise UsageError(
+            f"the plan takes {once:.1f} minutes at least, more than the {request.minutes:g} there are",
+            found=f"{len(legs) + len(circles)} legs, each flown once",
+            hint=f"give `--minutes {np.ceil(once):.0f}`{fewer}",
+        )
+    return circles
+
+
 def _legs(model: Model, request: Request, step: Callable[[], None]) -> list[Leg]:
     """Return one leg per speed: the middle speed is searched from nothing, the others from what was best there.
 
@@ -141,7 +162,8 @@ def _legs(model: Model, request: Request, step: Callable[[], None]) -> list[Leg]
     def leg_at(i: int, best: Sequence[Excitation]) -> Leg:
         factor = damping[middle] / damping[i]
         known = [*best, *(c.stretched(factor) for c in best if factor > 0)]
-        return best_leg(setting_at(model, request, request.speeds[i]), request.speeds[i], known)
+        leg = best_leg(setting_at(model, request, request.speeds[i]), request.speeds[i], known)
+        return _repeated(leg, request.want, request.envelope)
 
     first = leg_at(middle, [])
     step()
@@ -189,7 +211,7 @@ def with_passes(leg: Leg, passes: int) -> Leg:
     return replace(leg, passes=passes, expected={n: e.over(passes) for n, e in leg.expected.items()})
 
 
-def check_budget(request: Request) -> None:
+def _check_budget(request: Request) -> None:
     """Raise UsageError for a budget that cannot be meant, or circles in pitch."""
     if request.minutes is not None and not 0 < request.minutes <= 1440:
         raise UsageError(
@@ -213,8 +235,6 @@ def check_minutes(legs: list[Leg], request: Request) -> None:
     if once <= request.minutes and request.want:
         possible = _possible(legs, request)
         hint += f", or be content with `--want {accuracy_goals_text(possible)}`"
-    elif once > request.minutes:
-        hint += f", or fly {max(1, int(len(request.speeds) * request.minutes / once))} of the {len(request.speeds)} speeds"
     raise UsageError(
         f"the plan takes {total:.1f} minutes, more than the {request.minutes:g} there are"
         + (f", for the wish {accuracy_goals_text(request.want)}" if request.want else ""),

@@ -8,15 +8,20 @@ from dataclasses import replace
 from fieldsid.errors import UsageError
 from fieldsid.maneuvers import parse_spec
 from fieldsid.models.model import Model
-from fieldsid.planning.belief.prior_model import checked_prior
 from fieldsid.planning.design.best_leg import Setting, enforce_chance_constraint, enforce_envelope, ensemble_at, leg_of
-from fieldsid.planning.design.circle_legs import circle_legs
 from fieldsid.planning.design.leg import Leg
 from fieldsid.planning.design.objective import make_objective
-from fieldsid.planning.design.plan import SHORTEST_WINDOW_S, Plan, Request, check_budget, check_minutes, setting_at
-from fieldsid.planning.discriminate.discriminate import FAST_HZ, Separation, as_flown, candidate_maneuvers, separate, worth
+from fieldsid.planning.design.plan import Plan, Request, check_minutes, checked_circles, setting_at
+from fieldsid.planning.discriminate.discriminate import (
+    FAST_HZ,
+    Separation,
+    as_flown,
+    candidate_maneuvers,
+    separate,
+    shortest_of,
+    worth,
+)
 from fieldsid.planning.flight.excitation import Excitation
-from fieldsid.planning.safety.envelope import check_room, check_speeds
 from fieldsid.runtime.parallel_map import parallel_map
 
 COARSE_DRAWS = 60
@@ -33,17 +38,11 @@ def separating_plan(
     `step` is called as each leg is found; with `request.radius` circles follow. Raises UsageError when nothing stays inside
     the envelope or the legs take longer than there is time, ModelError for a rival that is unstable.
     """
-    check_speeds(request.speeds, request.slowest, request.fastest)
-    check_budget(request)
-    check_room(request.envelope, request.speeds, request.run_up_s, SHORTEST_WINDOW_S)
-    for rival in rivals:
-        checked_prior(rival, rivals[0].axis, request.speeds)
+    circles = checked_circles(rivals, request, shortest_of(request.window))
     made = parallel_map(lambda speed: _leg_at(rivals, request, speed), request.speeds)
     for _ in made:
         step()
-    legs, found = [leg for leg, _ in made], [separation for _, separation in made]
-    if request.radius:
-        legs += circle_legs(setting_at(rivals[0], request, max(request.speeds)), request.speeds)
+    legs, found = [*(leg for leg, _ in made), *circles], [separation for _, separation in made]
     check_minutes(legs, request)
     plan = Plan(
         rivals[0].axis, request.vehicle, rivals[0].method, request.envelope, tuple(legs), {}, request.seed, request.course,

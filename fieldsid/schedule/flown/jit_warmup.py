@@ -9,6 +9,7 @@ from fieldsid.models.hull import CONSTANTS
 from fieldsid.schedule.flown.closed_loop_kernel import GAIN_COLUMNS, OUT_COLUMNS, Plants, close_loop
 from fieldsid.schedule.flown.hull_kernel import SETTINGS, close_hull_loop
 from fieldsid.turning.maneuvering.equations import about_straight, settle, simulate
+from fieldsid.turning.steady.speed_loss import simulated
 
 COEFFICIENTS = 22
 STEP_S = 0.02
@@ -21,6 +22,7 @@ def compile_loops() -> None:
     time.setflags(write=False)  # as that of a run is
     simulate(p, 1.0, np.ones((1, 3)), np.zeros(1, dtype=np.int64), time, np.zeros((1, 2)), np.ones(2), STEP_S)
     settle(p, 1.0, 0.0)
+    simulated(push[1:], push, push, push, 1.0)
     about_straight(p[None], 1.0)
     row, rows = np.zeros(1), np.zeros((1, len(CONSTANTS)))
     plants = Plants(**{name: rows if name.startswith("core") else row for name in Plants._fields})

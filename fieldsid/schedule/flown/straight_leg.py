@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import accumulate
 
 import numpy as np
 
@@ -18,15 +19,13 @@ LEG_SEED = 5
 
 def disturbance_moment(noise: Noise | None, pace: Pace | None = None) -> FloatArray:
     """Return a moment (t,) in rad/s^2, one value for each time step of a pace: zero where no model has measured any."""
-    from scipy.signal import lfilter
-
     pace = pace or Pace()
     count = round(pace.leg / pace.step) + 1
     if noise is None or not noise.disturbance > 0.0:
         return np.zeros(count)
     keep = float(np.exp(-pace.step / max(noise.disturbance_time, pace.step)))
     white = np.random.default_rng(LEG_SEED).standard_normal(count) * np.sqrt(1.0 - keep**2)
-    return np.asarray(noise.disturbance * lfilter([1.0], [1.0, -keep], white))
+    return noise.disturbance * np.array(list(accumulate(white.tolist(), lambda moment, now: keep * moment + now)))
 
 
 def straight_leg(plant: LinearPlant, rows: Sequence[Row] | Row, noise: Noise | None, pace: Pace | None = None) -> Steps:

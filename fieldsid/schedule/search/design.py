@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldsid.errors import ModelError
-from fieldsid.models.axis import Axis
 from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.margins import FREQUENCY_GRID_RAD_S, HELD_SHARE, margins, worst_of
+from fieldsid.schedule.record import Row
 from fieldsid.schedule.search.binding import bound_by
 from fieldsid.schedule.search.formulas import bandwidth_of
 from fieldsid.schedule.search.objective import BETTER_SHARE, LACK_ROUNDING, Place, demand_of
@@ -24,6 +24,7 @@ from fieldsid.schedule.wish import PROPORTIONAL, QUICKEST, Wish
 
 LEAST_HELD = 0.5
 """P and PI that hold fewer of the draws are refused: no proportional gain holds an unstable hull."""
+OPTIONS = {"kind": "--controller {}", "damping": "--damping {:g}", "phase_margin_deg": "--phase-margin {:g}"}
 DEPTH_PHASE_MARGIN_DEG = 60.0
 """Phase margin of the depth loop around the pitch loop: no overshoot to speak of beside what the pitch limit does."""
 
@@ -56,23 +57,6 @@ class Sought:
     def step(self) -> float:
         """The step (rad) that was flown."""
         return self.search.place.demand.step
-
-
-@dataclass(frozen=True, slots=True)
-class Designed:
-    """Gains with the loop's crossover (rad/s), the reference's and the depth's gain; what the draws do with them.
-
-    `held` is the share of the draws that come to rest from the step, `settling` (s) how long 95 % of them take.
-    """
-
-    gains: Gains
-    crossover: float
-    slowed: float
-    reference_gain: float
-    depth_gain: float
-    held: float
-    settling: float
-    binds: str
 
 
 def design_gains(plant: LinearPlant, wish: Wish, fin_limit: float, answer: float = QUICKEST) -> Sought:
@@ -118,14 +102,20 @@ def with_bandwidth(quick: Sought, bandwidth: float) -> Sought | None:
     return replace(quick, search=search, found=found, binds=f"bandwidth {bandwidth:.3g} rad/s", slowed=1.0)
 
 
-def designed(sought: Sought) -> Designed:
-    """Return gains that were sought, with what the loop and the draws do with them."""
-    plant, gains = sought.plant, sought.found.gains
-    place = Place(plant.distinct(), sought.search.place.demand)
-    held, settling = place.held(gains)
-    crossover = float(np.nan_to_num(margins(plant.one(), gains).crossover[0]))
-    depth_gain = _depth_gain(place.plant, gains) if plant.axis is Axis.PITCH else 0.0
-    return Designed(gains, crossover, sought.slowed, _reference_gain(plant), depth_gain, held, settling, sought.binds)
+def row_of(sought: Sought, *, depth: bool, supported: bool) -> Row:
+    """Return the row of gains that were sought: its margins over the draws, and what these do with it.
+
+    `depth` adds the depth loop; `supported` says whether data were taken at this speed.
+    """
+    plant, gains, demand = sought.plant, sought.found.gains, sought.search.place.demand
+    family = plant.distinct()
+    held, settling = Place(family, demand).held(gains)
+    phase, gain, delay = margins(plant, gains).worst()
+    return Row(
+        plant.speed, gains, -float(plant.offset[0]), plant.reference_gain, demand.fin_limit,
+        _depth_gain(family, gains) if depth else 0.0, supported, sought.slowed,
+        phase, gain, delay, held, settling, sought.binds, demand.fin_of(gains),
+    )  # fmt: skip
 
 
 def _depth_gain(family: LinearPlant, gains: Gains) -> float:
@@ -134,17 +124,13 @@ def _depth_gain(family: LinearPlant, gains: Gains) -> float:
     T is the closed pitch loop from its reference, so the crossover is where T lags by 90 deg less the margin.
     """
     omega = FREQUENCY_GRID_RAD_S
-    asked = gains.kp + gains.ki / (1j * omega) + _reference_gain(family)
+    asked = gains.kp + gains.ki / (1j * omega) + family.reference_gain
     hull = family.response(omega)
     closed = hull * asked[None, :] / (1.0 + hull * gains.response(omega)[None, :])
     phase = np.degrees(np.unwrap(np.angle(closed), axis=1))
     first = np.argmax(phase <= DEPTH_PHASE_MARGIN_DEG - 90.0, axis=1)
     reached = np.take_along_axis(np.abs(closed), first[:, None], axis=1)[:, 0]
     return worst_of(omega[first] / (family.speed * reached), most=False)
-
-
-def _reference_gain(plant: LinearPlant) -> float:
-    return float(plant.stiffness[0]) / float(plant.slow_authority[0])
 
 
 def _search(family: LinearPlant, wish: Wish, fin_limit: float) -> Search:
@@ -187,20 +173,25 @@ def _refusal(family: LinearPlant, wish: Wish, fin_limit: float) -> ModelError:
 
 
 def _remedy(family: LinearPlant, wish: Wish, fin_limit: float) -> str:
-    """Return the option with which a gain is found at this speed after all; nothing where none of the usual ones does."""
-    others = {
-        **{f"--controller {kind}": replace(wish, kind=kind) for kind in ("pd", "pid", "lqr") if kind != wish.kind},
-        **{f"--damping {d:g}": replace(wish, damping=d) for d in (0.5, 0.3) if d < wish.damped},
-        **{f"--phase-margin {p:g}": replace(wish, phase_margin_deg=p) for p in (30.0, 20.0) if p < wish.phase_margin_deg},
-        **{
-            f"--controller {k} --damping 0.5 --phase-margin 30": replace(wish, kind=k, damping=0.5, phase_margin_deg=30.0)
-            for k in ("pd",)
-            if wish.damped > 0.5 and wish.phase_margin_deg > 30.0
-        },
-    }
-    for option, other in others.items():
-        if other.kind in PROPORTIONAL and family.slow_damping[0] <= 0:
+    """Return the option with which a gain is found at this speed after all; nothing where none of the usual ones does.
+
+    All other gains are PD's, or lose phase to an integral: where PD has none at the loosest, none has.
+    """
+    damping, margin = wish.damped, wish.phase_margin_deg
+    loosest, *others = (
+        replace(wish, kind="pd", damping=min(0.3, damping), phase_margin_deg=min(20.0, margin)),
+        replace(wish, kind="pd"),
+        *(replace(wish, damping=d) for d in (0.5, 0.3) if d < damping),
+        *(replace(wish, phase_margin_deg=p) for p in (30.0, 20.0) if p < margin),
+        replace(wish, kind="pd", damping=min(0.5, damping), phase_margin_deg=min(30.0, margin)),
+    )
+    if _found(family.one(), loosest, fin_limit) is None:
+        return ""
+    for other in others:
+        if other == wish or (other.kind in PROPORTIONAL and family.slow_damping[0] <= 0):
             continue
-        if _found(family, other, fin_limit) is not None:
-            return f"at this speed there is one with `{option}`"
+        # with a rate they are refused for what the estimate lacks alone
+        if _found(family if other.kind in PROPORTIONAL else family.one(), other, fin_limit) is not None:
+            changed = (option.format(getattr(other, n)) for n, option in OPTIONS.items() if getattr(other, n) != getattr(wish, n))
+            return f"at this speed there is one with `{' '.join(changed)}`"
     return ""

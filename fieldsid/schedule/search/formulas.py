@@ -2,7 +2,8 @@
 
 Yaw P is the paper's: kp = a22^2 / (4 zeta^2 b2) puts the poles at damping zeta; with a fin's lag, delay or a sway state it is
 found as the largest gain whose poles keep that damping, which is the same number where there are none. PD: poles at a bandwidth
-and damping. PI, PID: an integral beside them. LQR: Bryson's weights.
+and damping. PI, PID: an integral beside them. LQR: Bryson's weights, solved in closed form
+(Kwakernaak and Sivan 1972, Linear Optimal Control Systems).
 """
 
 from __future__ import annotations
@@ -11,7 +12,6 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 import numpy as np
-from scipy.linalg import solve_continuous_are
 
 from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.linear_plant import LinearPlant
@@ -72,14 +72,13 @@ def _with_integral(trial: Formula, plant: LinearPlant) -> Formula:
 
 
 def _quadratic(plant: LinearPlant, wish: Wish, fin: float) -> Formula:
+    """Return the gains of least integral of (share^2 angle/step)^2 + (fin's angle/fin)^2: poles by the symmetric root locus."""
     a, k, b = float(plant.slow_damping[0]), float(plant.stiffness[0]), float(plant.slow_authority[0])
-    system, drive = np.array([[0.0, 1.0], [-k, -a]]), np.array([[0.0], [b]])
+    most = b * fin / wish.step_of(plant.axis)
 
     def gains(share: float, _: float) -> Gains:
-        weight = np.diag([(share**2 / wish.step_of(plant.axis)) ** 2, 0.0])
-        cost = np.array([[1.0 / fin**2]])
-        gain = np.linalg.solve(cost, drive.T @ solve_continuous_are(system, drive, weight + 1e-12 * np.eye(2), cost))
-        return Gains(kp=float(gain[0, 0]), kd=float(gain[0, 1]))
+        stiff = float(np.hypot(k, most * share**2))
+        return Gains(kp=(stiff - k) / b, kd=(float(np.sqrt(a * a - 2.0 * k + 2.0 * stiff)) - a) / b)
 
     return gains
 

@@ -211,8 +211,7 @@ class Place:
     def step(self, gains: Gains) -> tuple[FloatArray, FloatArray]:
         """Return time (t,) and angle (t, d) of the step flown with gains, the trim of the estimate counted out."""
         plant, demand = self.plant, self.demand
-        reference_gain = float(plant.stiffness[0]) / float(plant.slow_authority[0])
-        row = Row(plant.speed, gains, -float(plant.offset[0]), reference_gain, demand.fin_limit)
+        row = Row(plant.speed, gains, -float(plant.offset[0]), plant.reference_gain, demand.fin_limit)
         steps = step_response(plant, row, reference=demand.step, seconds=demand.pace.flight, step_s=demand.pace.step)
         return steps.time, steps.angle
 

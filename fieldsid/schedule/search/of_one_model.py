@@ -23,8 +23,8 @@ from fieldsid.schedule.linear_plant import FinLimits
 from fieldsid.schedule.margins import margins
 from fieldsid.schedule.plants import Plants, models_plants
 from fieldsid.schedule.record import Row, Schedule
-from fieldsid.schedule.rows import DESIGN_DRAWS, SEED, Asked, place_of, row_of
-from fieldsid.schedule.search.design import Sought, design_gains
+from fieldsid.schedule.rows import DESIGN_DRAWS, SEED, place_of
+from fieldsid.schedule.search.design import Sought, design_gains, row_of
 from fieldsid.schedule.wish import QUICKEST, Wish, check_wish
 
 GAINS = ("kp", "ki", "kd")
@@ -101,7 +101,7 @@ def gains_of_one(model: Model, speed: float, wanted: Wanted) -> GainsOfOne:
     """Return the gains of a model at a speed in m/s; raises ModelError where none hold the loop, UsageError for a bad wish."""
     check_wish(wanted.wish)
     plants, sought = _designed(model, speed, wanted)
-    row = row_of(plants, sought, Asked(wanted.fin_limit, wanted.wish, wanted.depth))
+    row = row_of(sought, depth=wanted.depth, supported=plants.source.supports(speed))
     gains = np.array([[getattr(g, n) for n in GAINS] for g in _moved(model, speed, wanted)]).reshape(-1, 2, len(GAINS))
     spread = np.sqrt((0.25 * (gains[:, 0] - gains[:, 1]) ** 2).sum(axis=0))
     errors = dict(zip(GAINS, spread.tolist(), strict=True)) | {"feed_forward": _forward_error(model)}

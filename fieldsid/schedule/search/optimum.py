@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from math import exp, log
 
 import numpy as np
@@ -37,14 +38,17 @@ class Found:
     outcome: Outcome
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Search:
     """A wish's formula at a place."""
 
     place: Place
     wish: Wish
 
-    @property
+    def __reduce__(self) -> tuple[type[Search], tuple[Place, Wish]]:
+        return Search, (self.place, self.wish)  # a formula cannot be sent
+
+    @cached_property
     def formula(self) -> Formula:
         """The formula, of which a share of one asks for all of the fin that the step may ask for."""
         return formula_of(self.place.plant, self.wish, self.place.demand.fin_limit * self.wish.most_fin)

@@ -8,7 +8,7 @@ hypot(u, l_r r). Source: Fossen 2011, section 7.1.3 (surge with loss term X_rr r
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -19,6 +19,7 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.record import knows_speed, record_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.block_means import block_means, block_width
+from fieldsid.numerics.jit import jit
 from fieldsid.records.keys import Key, Number
 
 BLOCK_S, BLOCK_SHARE = 0.2, 0.2
@@ -145,7 +146,8 @@ class _Case:
 def _case(run: Run) -> _Case | None:
     if not (run.has("yaw_rate_rad_s") or run.has("yaw_rad")) or not (run.has("rudder_rad") or run.has("rudder_measured_rad")):
         return None
-    record = record_of(run, Axis.YAW)
+    # the surge is taken as it was measured: what a record makes of it takes longer than all else here
+    record = record_of(replace(run, signals={n: v for n, v in run.signals.items() if n != "surge_m_s"}), Axis.YAW)
     angle_only = not record.rate_ok.any()
     rate = (
         np.gradient(record.angle, record.time)
@@ -184,20 +186,23 @@ def _filled(run: Run, name: str, none: FloatArray) -> FloatArray:
     return np.interp(run.time, run.time[ok], values[ok])
 
 
-def _simulated(case: _Case, drag: float, turn: float, fin: float, straight: float, first: float) -> FloatArray:
-    """Return surge (n,) by Heun's steps."""
-    u = np.empty(case.time.size)
+@jit
+def simulated(steps: FloatArray, push: FloatArray, drag: FloatArray, loss: FloatArray, first: float) -> FloatArray:
+    """Return surge (n,) of u' = push - drag u^2 - loss by Heun's steps (n - 1,) s; what is given is (n,)."""
+    u = np.empty(push.size)
     u[0] = first
-    loss_r, loss_d = turn * case.rate**2, fin * case.fin**2
-    push = drag * straight**2 * case.thrust
-    steps = np.diff(case.time)
-    for i, h in enumerate(steps):
-        now = u[i]
-        slope = push[i] - (drag + loss_d[i]) * now * now - loss_r[i]
+    for i in range(steps.size):
+        now, h = u[i], steps[i]
+        slope = push[i] - drag[i] * now * now - loss[i]
         ahead = now + h * slope
-        after = push[i + 1] - (drag + loss_d[i + 1]) * ahead * ahead - loss_r[i + 1]
+        after = push[i + 1] - drag[i + 1] * ahead * ahead - loss[i + 1]
         u[i + 1] = min(max(now + 0.5 * h * (slope + after), 0.01), 50.0)
     return u
+
+
+def _surge(case: _Case, drag: float, turn: float, fin: float, straight: float, first: float) -> FloatArray:
+    push = drag * straight**2 * case.thrust
+    return simulated(np.diff(case.time), push, drag + fin * case.fin**2, turn * case.rate**2, first)
 
 
 def _fit_loss(cases: Sequence[_Case]) -> tuple[tuple[float, float, float], FloatArray, float]:
@@ -206,9 +211,7 @@ def _fit_loss(cases: Sequence[_Case]) -> tuple[tuple[float, float, float], Float
     firsts = [float(np.median(c.surge[:10])) for c in cases]
 
     def residual(p: FloatArray) -> FloatArray:
-        return np.concatenate(
-            [c.surge - _simulated(c, p[0], p[1], p[2], p[3 + 2 * i], p[4 + 2 * i]) for i, c in enumerate(cases)]
-        )
+        return np.concatenate([c.surge - _surge(c, *p[:3], *p[3 + 2 * i : 5 + 2 * i]) for i, c in enumerate(cases)])
 
     start = np.array([0.1, 0.2, 0.05, *[s for first in firsts for s in (first, first)]])
     low = np.array([1e-3, 0.0, 0.0] + [1e-3] * (2 * len(cases)))

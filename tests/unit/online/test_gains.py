@@ -67,8 +67,7 @@ def test_those_that_are_loaded_are_kept_where_they_serve_and_changed_where_the_f
     ("wanted", "says"),
     [
         pytest.param(replace(QUICK, wish=Wish("p")), "unstable", id="by p"),
-        # what delay would do is searched for, of every one that is shorter
-        pytest.param(replace(QUICK, limits=FinLimits(delay=8.0)), "no pd gain", id="delay", marks=pytest.mark.slow),
+        pytest.param(replace(QUICK, limits=FinLimits(delay=8.0)), "no pd gain", id="delay"),
     ],
 )
 def test_none_are_given_for_what_cannot_be_stabilised(wanted, says):

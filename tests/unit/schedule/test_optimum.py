@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import solve_continuous_are
 
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise
@@ -61,6 +62,17 @@ def test_a_share_of_one_asks_for_the_fin_allowed_and_no_more(stiffness):
     gains = formula_of(one, Wish("pd", step=0.2), 0.26)(1.0, 1.0)
     assert abs(gains.kp) * 0.2 == pytest.approx(0.26)
     assert bandwidth_of(one, gains) == pytest.approx(fin_bandwidth(one, 0.26, 0.2))
+
+
+@pytest.mark.parametrize("stiffness", [-0.3, 0.0, 0.4, 5.0])
+def test_lqr_has_the_gains_of_the_riccati_equation(stiffness):
+    one = replace(plants_at(source_at(HULLS["unstable"]), REFERENCE, FinLimits(), 1, 0)[0][0], stiffness=np.array([stiffness]))
+    gains = formula_of(one, Wish("lqr", step=0.2), 0.26)(0.7, 1.0)
+    a, b = float(one.slow_damping[0]), float(one.slow_authority[0])
+    system, drive = np.array([[0.0, 1.0], [-stiffness, -a]]), np.array([[0.0], [b]])
+    cost = np.array([[0.26**-2]])
+    solved = solve_continuous_are(system, drive, np.diag([(0.7**2 / 0.2) ** 2, 0.0]), cost)
+    assert np.allclose([gains.kp, gains.kd], (drive.T @ solved)[0] / cost[0, 0], rtol=1e-6)
 
 
 def test_of_steps_that_are_not_there_in_the_end_the_one_further_off_is_later():

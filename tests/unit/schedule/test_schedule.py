@@ -35,7 +35,7 @@ from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, not_counted, 
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.margins import margins
 from fieldsid.schedule.record import load_schedule, save_schedule
-from fieldsid.schedule.search.design import design_gains, designed
+from fieldsid.schedule.search.design import design_gains, row_of
 from fieldsid.schedule.verdict import against_constant, lost
 from fieldsid.schedule.verify import checked_speeds, verify_schedule
 from fieldsid.schedule.wish import Wish
@@ -163,14 +163,14 @@ def test_yaw_gain_and_feed_forward_are_the_papers(yaw, zeta):
 
 
 def test_poles_of_the_papers_gain_have_the_chosen_damping():
-    found = designed(design_gains(plant(), Wish(damping=0.7), 0.26))
+    found = row_of(design_gains(plant(), Wish(damping=0.7), 0.26), depth=False, supported=True)
     assert least_damping(plant(), found.gains) == pytest.approx(0.7, abs=1e-6)
 
 
 def test_lag_and_delay_slow_the_gain_until_damping_and_margin_hold():
     wish = Wish(damping=0.7, phase_margin_deg=50.0)
     late = plant(lag=0.3, delay=0.4)
-    found = designed(design_gains(late, wish, 0.26))
+    found = row_of(design_gains(late, wish, 0.26), depth=False, supported=True)
     assert found.slowed < 0.95
     assert least_damping(late, found.gains) >= 0.7 - 1e-3
     assert margins(late, found.gains).phase_deg[0] >= 50.0 - 0.1
@@ -286,7 +286,7 @@ def test_depth_through_pitch_settles_without_overshoot_to_speak_of(pitch):
 
 def test_the_depth_loop_keeps_its_phase_margin_by_python_control():
     own = replace(plant(stiffness=0.4, lag=0.3, delay=0.0), axis=Axis.PITCH)
-    found = designed(design_gains(own, Wish(kind="pd", step=0.175), 0.26))
+    found = row_of(design_gains(own, Wish(kind="pd", step=0.175), 0.26), depth=True, supported=True)
     kp, kd, ref = found.gains.kp, found.gains.kd, found.reference_gain
     pitch_loop = control.tf([-1.6 * (kp + ref)], [0.3, 1.0 + 0.3 * 1.2, 1.2 + 0.3 * 0.4 - 1.6 * kd, 0.4 - 1.6 * kp])
     _, phase, *_ = control.margin(pitch_loop * control.tf([found.depth_gain * own.speed], [1.0, 0.0]))
@@ -357,9 +357,9 @@ def test_an_unstable_plant_is_refused_for_p_and_held_by_pd():
         design_gains(plant(damping=-0.2), Wish(), 0.26)
     assert caught.value.found == "damping -0.2 1/s, a deviation doubles every 3.5 s"
     assert "`--controller pd`" in caught.value.hint
-    held = designed(design_gains(plant(damping=-0.2), Wish(kind="pd"), 0.26))
+    held = row_of(design_gains(plant(damping=-0.2), Wish(kind="pd"), 0.26), depth=False, supported=True)
     assert least_damping(plant(damping=-0.2), held.gains)[0] > 0.5
-    assert held.held == 1.0
+    assert held.draws_held == 1.0
 
 
 def test_p_is_refused_where_half_of_the_draws_are_unstable_and_the_estimate_is_not():
@@ -369,18 +369,18 @@ def test_p_is_refused_where_half_of_the_draws_are_unstable_and_the_estimate_is_n
     with pytest.raises(ModelError, match="half of the draws") as caught:
         design_gains(doubtful, Wish(), 0.26)
     assert "unstable by 13 of 20 draws" in caught.value.found
-    held = designed(design_gains(doubtful, Wish(kind="pd"), 0.26))
-    assert held.held == 1.0
+    held = row_of(design_gains(doubtful, Wish(kind="pd"), 0.26), depth=False, supported=True)
+    assert held.draws_held == 1.0
     assert margins(doubtful, held.gains).phase_deg.min() >= 22.5
 
 
 def test_gains_serve_the_worst_of_the_draws_not_their_mean():
     strong = plant(count=20, authority=-1.6 * np.linspace(1.0, 6.0, 20), lag=0.3, delay=0.4)
-    of_mean = designed(design_gains(strong.one(), Wish(kind="pd"), 0.26))
-    of_all = designed(design_gains(strong, Wish(kind="pd"), 0.26))
+    of_mean = row_of(design_gains(strong.one(), Wish(kind="pd"), 0.26), depth=False, supported=True)
+    of_all = row_of(design_gains(strong, Wish(kind="pd"), 0.26), depth=False, supported=True)
     assert margins(strong, of_mean.gains).worst()[0] < 22.5
     assert margins(strong, of_all.gains).worst()[0] >= 22.5
-    assert of_all.held >= 0.95
+    assert of_all.draws_held >= 0.95
 
 
 def test_an_unstable_loop_has_no_margin_whatever_its_crossings_are():
