@@ -11,7 +11,8 @@ import numpy as np
 
 from fieldsid.errors import LogError
 from fieldsid.logs.reader import MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, ReadOptions, span_of
-from fieldsid.logs.readers.bags.messages.definitions import AnyDecoder, DefinitionSearch, decoder_of
+from fieldsid.logs.readers.bags.messages.definitions import DefinitionSearch, decoder_of
+from fieldsid.logs.readers.bags.messages.message_layout import Decoder
 from fieldsid.logs.readers.bags.packets import CDR, ROS1, Collector, Connection, TopicPackets, keep_first
 from fieldsid.logs.readers.bags.signals import check_not_empty, undecodable
 from fieldsid.logs.run import Note
@@ -27,7 +28,7 @@ Span = tuple[float, float]
 class _Topic:
     """The numbers of one topic: first values by path, and the ranges seen so far; or the error that says why there are none."""
 
-    decoder: AnyDecoder | None = None
+    decoder: Decoder | None = None
     first: dict[str, Any] = field(default_factory=dict)
     spans: dict[str, Span] = field(default_factory=dict)
     note: Note | None = None

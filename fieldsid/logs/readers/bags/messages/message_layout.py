@@ -1,7 +1,7 @@
 """Where the fields of a serialized message lie, and many messages decoded at once.
 
 Over rosbags: chosen numbers 10 times as fast (tests/benchmarks/bag_reading.py), and a damaged message among others is left out.
-Types and encodings that are not known here are left to rosbags, see `by_rosbags.ObjectDecoder`.
+rosbags decodes no type and no encoding that is not known here.
 
 A message is walked once; whatever in it decides the layout (lengths of strings and sequences) is kept as a guard.
 All messages with the same size and the same guards share the layout, so their fields are columns of one block.
@@ -277,7 +277,16 @@ class Decoder:
 
     def first_values(self, raw: bytes) -> dict[str, Any]:
         """Return every number of one message by path; rows of numbers up to eight elements."""
-        return first_values(self.layout(raw), raw)
+        layout = self.layout(raw)
+        found: dict[str, Any] = {}
+        for path, leaf in layout.leaves.items():
+            if leaf.count is None:
+                found[path] = np.frombuffer(raw, leaf.dtype, 1, leaf.offset)[0].item()
+                continue
+            names = _names_beside(layout, path)
+            for i, value in enumerate(np.frombuffer(raw, leaf.dtype, leaf.count, leaf.offset)[:8]):
+                found[f"{path}[{names[i] if i < len(names) else i}]"] = value.item()
+        return found
 
     def decode(self, payloads: Sequence[bytes], paths: Sequence[str]) -> Columns:
         """Return for each path the numbers of all messages, and which messages the definition fits."""
@@ -330,19 +339,6 @@ def _take(
         for j, (offset, dtype) in enumerate(place):
             column = np.ascontiguousarray(block[:, offset : offset + dtype.itemsize]).view(dtype)[:, 0]
             out[k][rows, j] = column
-
-
-def first_values(layout: Layout, raw: bytes) -> dict[str, Any]:
-    """Return every number of one message by path; rows of numbers up to eight elements."""
-    found: dict[str, Any] = {}
-    for path, leaf in layout.leaves.items():
-        if leaf.count is None:
-            found[path] = np.frombuffer(raw, leaf.dtype, 1, leaf.offset)[0].item()
-            continue
-        names = _names_beside(layout, path)
-        for i, value in enumerate(np.frombuffer(raw, leaf.dtype, leaf.count, leaf.offset)[:8]):
-            found[f"{path}[{names[i] if i < len(names) else i}]"] = value.item()
-    return found
 
 
 def _names_beside(layout: Layout, path: str) -> tuple[str, ...]:
