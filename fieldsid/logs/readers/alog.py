@@ -12,8 +12,8 @@ from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.reader import MOST_CHANNELS, Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.readers._topics import DATA, Means, Topic, inventory_of, raw_log_of, topic_of
 from fieldsid.logs.run import Note
+from fieldsid.logs.unknown_file import head_of
 
-HEAD = 4096
 _ENU = {"frame": "ENU/FRD"}
 MEANS: Means = {
     f"NAV_HEADING.{DATA}": ("yaw_rad", {"unit": "deg"}),
@@ -32,10 +32,7 @@ MEANS: Means = {
 
 def sniff(path: Path) -> bool:
     """Whether a file has the logger's head."""
-    if path.is_dir():
-        return False
-    with path.open("rb") as stream:
-        head = stream.read(HEAD)
+    head = head_of(path)
     return head.startswith(b"%%") and b"%% LOGSTART" in head
 
 

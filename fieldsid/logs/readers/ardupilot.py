@@ -10,19 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.convert.servo_counts import COUNTS, SERVOS
 from fieldsid.logs.convert.times.time_column import YEARS_S
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.readers._topics import Means, Topic, inventory_of, library, raw_log_of, topic_of, unheard
 from fieldsid.logs.run import Note
-from fieldsid.logs.unknown_file import COPY_AGAIN, DATAFLASH
+from fieldsid.logs.unknown_file import DATAFLASH, head_of, unreadable
 
 MAVLINK = (0xFE, 0xFD)
 """How a packet of either version of the protocol starts, behind eight bytes of time."""
 FORMAT, FORMAT_LENGTH = 128, 89
-HEAD = 4096
 PARAMETERS = {"PARM": ("Name", "Value"), "PARAM_VALUE": ("param_id", "param_value")}
 """Messages of the vehicle's parameters, with the fields of their name and value."""
 TEXT = re.compile(rb"^FMT, ?128,", re.MULTILINE)
@@ -64,10 +62,7 @@ def _outputs(parameters: Mapping[str, float]) -> dict[str, tuple[str, Mapping[st
 
 def sniff(path: Path) -> bool:
     """Whether a file starts as a DataFlash log, binary or text, or as a packet with its time."""
-    if path.is_dir():
-        return False
-    with path.open("rb") as stream:
-        head = stream.read(HEAD)
+    head = head_of(path)
     if head.startswith(DATAFLASH) or TEXT.search(head):
         return True
     return len(head) >= 9 and head[8] in MAVLINK and YEARS_S[0] < 1e-6 * int.from_bytes(head[:8], "big") < YEARS_S[1]
@@ -75,8 +70,7 @@ def sniff(path: Path) -> bool:
 
 def _topics(path: Path) -> tuple[dict[str, Topic], Means]:
     """Return the topics of a log, and what they mean: by the definitions, the outputs by the vehicle's own parameters."""
-    with path.open("rb") as stream:
-        head = stream.read(HEAD)
+    head = head_of(path)
     is_flash = head.startswith(DATAFLASH) or TEXT.search(head) is not None
     what = "a DataFlash log (ArduPilot)" if is_flash else "a telemetry log (MAVLink)"
     mavutil = library("pymavlink.mavutil", path, what, "ardupilot")
@@ -84,8 +78,7 @@ def _topics(path: Path) -> tuple[dict[str, Topic], Means]:
         with unheard(), closing(mavutil.mavlink_connection(str(path)) if not is_flash else _flash(path)) as log:
             rows, parameters = _rows(log, is_flash=is_flash)
     except Exception as error:  # pymavlink raises this very class for a format it does not know
-        found = f"{type(error).__name__}: {error}"[:160]
-        raise LogError(f"`{path}` is {what} that cannot be read", found=found, hint=COPY_AGAIN) from error
+        raise unreadable(path, f"{what} that cannot be read", error) from error
     found_topics = {name: _joined(messages) for name, messages in rows.items()}
     topics = {name: topic for name, topic in found_topics.items() if topic is not None}
     return topics, {**MEANS, **_outputs(parameters)}
@@ -109,9 +102,7 @@ def _rows(log: Any, *, is_flash: bool) -> tuple[Rows, dict[str, float]]:
 
 def _flash(path: Path) -> Any:
     forms = library("pymavlink.DFReader", path, "a DataFlash log (ArduPilot)", "ardupilot")
-    with path.open("rb") as stream:
-        is_binary = stream.read(len(DATAFLASH)) == DATAFLASH
-    its_own = forms.DFReader_binary if is_binary else forms.DFReader_text
+    its_own = forms.DFReader_binary if head_of(path).startswith(DATAFLASH) else forms.DFReader_text
     # its compiled index writes a line for each damaged byte to the process's own stderr, where nothing keeps it from the user
     kind: Any = type("Quiet", (its_own,), {"init_arrays_fast": its_own.init_arrays})  # the text form has none
     log = kind.__new__(kind)

@@ -24,7 +24,7 @@ from fieldsid.logs.readers._plain_text import GZIP, HEAD, PlainText, plain_text
 from fieldsid.logs.readers._text import LOOKED_AT, Form, form_of
 from fieldsid.logs.readers._unpacked_rows import LONGEST_ROW, refuse_endless
 from fieldsid.logs.run import Note
-from fieldsid.logs.unknown_file import COPY_AGAIN, is_text, known_text
+from fieldsid.logs.unknown_file import COPY_AGAIN, head_of, is_text, known_text
 
 _LINE = re.compile(r"line (\d+)")
 BLOCK_ROWS = 100_000
@@ -33,12 +33,7 @@ BLOCK_ROWS = 100_000
 
 def sniff(path: Path) -> bool:
     """Whether a file may be text: anything that has no binary format's signature."""
-    if path.is_dir():
-        return False
-    with path.open("rb") as stream:
-        if stream.read(len(GZIP)) == GZIP:
-            return True
-    return is_text(path)
+    return not path.is_dir() and (head_of(path).startswith(GZIP) or is_text(path))
 
 
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:

@@ -25,7 +25,7 @@ from fieldsid.logs.readers._imc_definition import Message, definition_of
 from fieldsid.logs.readers._topics import Means, Topic, inventory_of, raw_log_of, topic_of
 from fieldsid.logs.readers._unpacked_size import UnpackedSize
 from fieldsid.logs.run import Note
-from fieldsid.logs.unknown_file import COPY_AGAIN, imc_order
+from fieldsid.logs.unknown_file import COPY_AGAIN, head_of, imc_order
 from fieldsid.numerics.arrays import FloatArray
 
 GZIP = b"\x1f\x8b"
@@ -49,11 +49,8 @@ MEANS: Means = {f"EstimatedState.{name}": (signal, {"unit": unit}) for name, (si
 
 def sniff(path: Path) -> bool:
     """Whether a file, packed or not, starts with a synchronisation number."""
-    if path.is_dir():
-        return False
-    with path.open("rb") as stream:
-        head = stream.read(2)
-    if head == GZIP:
+    head = head_of(path)
+    if head.startswith(GZIP):
         try:
             with gzip.open(path) as packed:
                 head = packed.read(2)

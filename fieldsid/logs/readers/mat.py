@@ -19,7 +19,7 @@ from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, seri
 from fieldsid.logs.readers._mat_elements import refuse_damaged
 from fieldsid.logs.readers._topics import library
 from fieldsid.logs.readers._unpacked_size import UnpackedSize
-from fieldsid.logs.unknown_file import COPY_AGAIN
+from fieldsid.logs.unknown_file import head_of, unreadable
 from fieldsid.numerics.arrays import FloatArray
 
 MAGIC = b"MATLAB "
@@ -32,16 +32,11 @@ _FAILURES = (ValueError, TypeError, KeyError, IndexError, OSError, EOFError, Not
 
 def sniff(path: Path) -> bool:
     """Whether a file has MATLAB's head."""
-    if path.is_dir():
-        return False
-    with path.open("rb") as stream:
-        return stream.read(len(MAGIC)) == MAGIC
+    return head_of(path).startswith(MAGIC)
 
 
 def _columns(path: Path) -> Columns:
-    with path.open("rb") as stream:
-        is_hdf5 = stream.read(len(HDF5)) == HDF5
-    found = dict(_of_hdf5(path) if is_hdf5 else _of_mat(path))
+    found = dict(_of_hdf5(path) if head_of(path).startswith(HDF5) else _of_mat(path))
     lengths = Counter(v.size for v in found.values())
     if not lengths:
         raise LogError(
@@ -70,11 +65,11 @@ def _of_mat(path: Path) -> Iterator[tuple[str, FloatArray]]:
             warnings.simplefilter("ignore", scipy_io.matlab.MatReadWarning)
             variables = scipy_io.loadmat(str(path), squeeze_me=True, struct_as_record=False)
     except _FAILURES as error:
-        raise _damaged(path, error) from error
+        raise unreadable(path, "a MATLAB file that cannot be read", error) from error
     except Exception as error:  # scipy raises its own kind, and zlib another
         if type(error).__module__.partition(".")[0] not in ("scipy", "zlib"):
             raise
-        raise _damaged(path, error) from error
+        raise unreadable(path, "a MATLAB file that cannot be read", error) from error
     for name, value in variables.items():
         if not name.startswith("__"):
             yield from _walked(name, value, 0)
@@ -112,13 +107,8 @@ def _of_hdf5(path: Path) -> Iterator[tuple[str, FloatArray]]:
         with h5py.File(str(path), "r") as file:
             file.visititems(visit)
     except _FAILURES as error:
-        raise _damaged(path, error) from error
+        raise unreadable(path, "a MATLAB file that cannot be read", error) from error
     yield from found
-
-
-def _damaged(path: Path, error: Exception) -> LogError:
-    found = f"{type(error).__name__}: {error}"[:160]
-    return LogError(f"`{path}` is a MATLAB file that cannot be read", found=found, hint=COPY_AGAIN)
 
 
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:

@@ -19,7 +19,7 @@ from fieldsid.logs.readers._unpacked_rows import refuse_repeated
 from fieldsid.logs.readers._unpacked_size import UnpackedSize
 from fieldsid.logs.run import COLUMNS, Note
 from fieldsid.logs.several.run_names import stem_of
-from fieldsid.logs.unknown_file import COPY_AGAIN
+from fieldsid.logs.unknown_file import COPY_AGAIN, head_of
 from fieldsid.records.check import check
 from fieldsid.records.kinds import RUN_HEAD
 from fieldsid.records.reading import read_json
@@ -34,10 +34,7 @@ AGAIN = "import the log again, with `--force`"
 
 def sniff(path: Path) -> bool:
     """Whether a file starts like Parquet."""
-    if path.is_dir():
-        return False
-    with path.open("rb") as stream:
-        return stream.read(4) == MAGIC
+    return head_of(path).startswith(MAGIC)
 
 
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:

@@ -15,10 +15,9 @@ from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.readers._topics import DATA, Means, Topic, inventory_of, library, raw_log_of, topic_of
 from fieldsid.logs.run import Note
-from fieldsid.logs.unknown_file import COPY_AGAIN, is_glider_log
+from fieldsid.logs.unknown_file import COPY_AGAIN, head_of, is_glider_log, unreadable
 
 END = b"X"
-HEAD = 2048
 SIZES = {1, 2, 4, 8}
 """Bytes of a sensor's number."""
 MEANS: Means = {
@@ -40,10 +39,7 @@ _FAILURES = (ValueError, KeyError, IndexError, TypeError, OSError, UnicodeDecode
 
 def sniff(path: Path) -> bool:
     """Whether a file has the head of a glider's binary log."""
-    if path.is_dir():
-        return False
-    with path.open("rb") as stream:
-        return is_glider_log(stream.read(HEAD))
+    return is_glider_log(head_of(path))
 
 
 def _topics(path: Path, wanted: set[str] | None = None) -> dict[str, Topic]:
@@ -61,15 +57,13 @@ def _topics(path: Path, wanted: set[str] | None = None) -> dict[str, Topic]:
             _refuse_other_lengths(path, log)
             found = _sensors(log, [n for n in log.parameterNames if wanted is None or n in wanted])
     except (*_FAILURES, dbdreader.DbdError) as error:
-        what = f"`{path}` is a Slocum glider's log that cannot be read"
-        raise LogError(what, found=f"{type(error).__name__}: {error}"[:160], hint=COPY_AGAIN) from error
+        raise unreadable(path, "a Slocum glider's log that cannot be read", error) from error
     return {n: topic for n, topic in found.items() if topic is not None}
 
 
 def _refuse_cut_head(path: Path) -> None:
     """Raise LogError where the head ends before the lines that it counts: dbdreader would look for them for ever."""
-    with path.open("rb") as stream:
-        head = stream.read(HEAD)
+    head = head_of(path)
     tags = _TAGS.search(head)
     lines = head.count(b"\n")
     if tags is None or lines < int(tags[1]) or head.count(b"\n", 0, tags.start()) >= int(tags[1]):
@@ -108,8 +102,7 @@ def _cut(path: Path) -> tuple[Note, ...]:
 
 def _cache_of(path: Path) -> Path | None:
     """Return the list of sensors that a log refers to, None where it brings the list; raises LogError."""
-    with path.open("rb") as stream:
-        head = stream.read(HEAD)
+    head = head_of(path)
     found = _CACHE.search(head)
     if found is None or not _FACTORED.search(head):
         return None

@@ -11,7 +11,7 @@ from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.readers._topics import Means, Topic, inventory_of, library, raw_log_of, topic_of, unheard
 from fieldsid.logs.run import Note
-from fieldsid.logs.unknown_file import COPY_AGAIN, ULOG, ULOG_HEADER
+from fieldsid.logs.unknown_file import ULOG, ULOG_HEADER, head_of, unreadable
 
 MESSAGE_HEADER = 3
 """Bytes before a message's body: its length and its type."""
@@ -34,10 +34,7 @@ MEANS: Means = {
 
 def sniff(path: Path) -> bool:
     """Whether a file has the signature."""
-    if path.is_dir():
-        return False
-    with path.open("rb") as stream:
-        return stream.read(len(ULOG)) == ULOG
+    return head_of(path).startswith(ULOG)
 
 
 def _topics(path: Path) -> tuple[dict[str, Topic], tuple[Note, ...]]:
@@ -51,8 +48,7 @@ def _topics(path: Path) -> tuple[dict[str, Topic], tuple[Note, ...]]:
         with path.open("rb") as stream, unheard():
             log = pyulog.ULog(stream)
     except Exception as error:  # pyulog has no error of its own for what it cannot parse
-        found = f"{type(error).__name__}: {error}"[:160]
-        raise LogError(f"`{path}` is a damaged ULog file", found=found, hint=COPY_AGAIN) from error
+        raise unreadable(path, "a damaged ULog file", error) from error
     topics = {}
     for part in log.data_list:
         if "timestamp" not in part.data:  # the format asks for it: a definition that was damaged

@@ -13,6 +13,7 @@ from fieldsid.logs.readers.bags.containers import db3, mcap, ros1
 from fieldsid.logs.readers.bags.containers.metadata import check_against_metadata
 from fieldsid.logs.readers.bags.packets import Collector, Connection, Settle, TopicPackets, UnknownFormError, keep_all
 from fieldsid.logs.run import Note
+from fieldsid.logs.unknown_file import head_of
 
 Scan = Callable[[Path, Collector], None]
 SCANS: Mapping[bytes, Scan] = {ros1.MAGIC: ros1.scan, mcap.MAGIC: mcap.scan, db3.MAGIC: db3.scan}
@@ -71,14 +72,12 @@ def _collect(part: Path, collector: Collector) -> None:
 
 
 def _unknown(path: Path, collector: Collector) -> None:
-    with path.open("rb") as stream:
-        start = stream.read(16)
+    start = head_of(path)[:16]
     raise UnknownFormError(f"`{path}` is not a bag", found=f"it starts with {start!r}", hint="copy it from the vehicle again")
 
 
 def _scan_of(path: Path) -> Scan | None:
-    with path.open("rb") as stream:
-        head = stream.read(16)
+    head = head_of(path)
     return next((scan for magic, scan in SCANS.items() if head.startswith(magic)), None)
 
 
