@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.convert.servo_counts import COUNTS, SERVOS
 from fieldsid.logs.convert.times.time_column import YEARS_S
-from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.readers._topics import Means, Topic, inventory_of, library, raw_log_of, topic_of, unheard
+from fieldsid.logs.reader import ReadOptions
+from fieldsid.logs.readers._topics import Means, Topic, Topics, library, topic_of, topic_reader, unheard
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import DATAFLASH, head_of, unreadable
 
@@ -68,8 +67,11 @@ def sniff(path: Path) -> bool:
     return len(head) >= 9 and head[8] in MAVLINK and YEARS_S[0] < 1e-6 * int.from_bytes(head[:8], "big") < YEARS_S[1]
 
 
-def _topics(path: Path) -> tuple[dict[str, Topic], Means]:
-    """Return the topics of a log, and what they mean: by the definitions, the outputs by the vehicle's own parameters."""
+def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
+    """Return all topics, and what they mean: by the definitions, the outputs by the vehicle's own parameters.
+
+    Raises LogError for a damaged file, or without pymavlink.
+    """
     head = head_of(path)
     is_flash = head.startswith(DATAFLASH) or TEXT.search(head) is not None
     what = "a DataFlash log (ArduPilot)" if is_flash else "a telemetry log (MAVLink)"
@@ -79,9 +81,8 @@ def _topics(path: Path) -> tuple[dict[str, Topic], Means]:
             rows, parameters = _rows(log, is_flash=is_flash)
     except Exception as error:  # pymavlink raises this very class for a format it does not know
         raise unreadable(path, f"{what} that cannot be read", error) from error
-    found_topics = {name: _joined(messages) for name, messages in rows.items()}
-    topics = {name: topic for name, topic in found_topics.items() if topic is not None}
-    return topics, {**MEANS, **_outputs(parameters)}
+    topics = {name: _joined(messages) for name, messages in rows.items()}
+    return Topics(topics, {**MEANS, **_outputs(parameters)}, _cut(path))
 
 
 def _rows(log: Any, *, is_flash: bool) -> tuple[Rows, dict[str, float]]:
@@ -149,22 +150,11 @@ def _joined(messages: list[tuple[float, dict[str, float]]]) -> Topic | None:
     return topic_of(np.array([t for t, _ in messages]), fields)
 
 
-def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
-    """Return the messages with count, rate and first values; raises LogError for a damaged file, or without pymavlink."""
-    topics, means = _topics(path)
-    return inventory_of(path, "ArduPilot log", topics, means, _cut(path))
-
-
-def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
-    """Return the mapped fields; raises MappingError for one that is not there, LogError as `inventory` does."""
-    return raw_log_of(path, _topics(path)[0], mapping, _cut(path))
-
-
-READER = Reader(
-    name="ardupilot",
-    says="ArduPilot log: .bin, its text form .log, .tlog, with the extra `ardupilot`",
-    suffixes=(".bin", ".BIN", ".log", ".tlog"),
-    sniff=sniff,
-    inventory=inventory,
-    read=read,
+READER = topic_reader(
+    "ardupilot",
+    "ArduPilot log: .bin, its text form .log, .tlog, with the extra `ardupilot`",
+    (".bin", ".BIN", ".log", ".tlog"),
+    "ArduPilot log",
+    sniff,
+    _topics,
 )

@@ -19,10 +19,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import LogError
-from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
+from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.readers._imc_definition import Message, definition_of
-from fieldsid.logs.readers._topics import Means, Topic, inventory_of, raw_log_of, topic_of
+from fieldsid.logs.readers._topics import Means, Topic, Topics, topic_of, topic_reader
 from fieldsid.logs.readers._unpacked_size import UnpackedSize
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN, head_of, imc_order
@@ -124,7 +123,8 @@ def _whole(messages: npt.NDArray[np.uint8], order: str) -> npt.NDArray[np.bool_]
     return np.asarray(made == said)
 
 
-def _topics(path: Path, options: ReadOptions) -> tuple[dict[str, Topic], tuple[Note, ...]]:
+def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
+    """Return the messages of all kinds that have numbers; raises LogError for a log without its definition."""
     kinds = definition_of(path, options.msg_path)
     data, is_cut = _unpacked(path)
     order = imc_order(data[:2])
@@ -144,8 +144,7 @@ def _topics(path: Path, options: ReadOptions) -> tuple[dict[str, Topic], tuple[N
         time = np.ascontiguousarray(good[:, 6:14]).view(f"{order}f8")[:, 0].astype(np.float64)
         numbers = np.ascontiguousarray(good[:, HEADER : HEADER + layout.itemsize]).view(layout)[:, 0]
         parts[kind, source, entity].append((time, {n: numbers[n].astype(np.float64) for n in layout.names or ()}))
-    notes = _notes(places, wrong, is_cut=is_cut)
-    return dict(_named(kinds, parts, _most(own))), notes
+    return Topics(dict(_named(kinds, parts, _most(own))), MEANS, _notes(places, wrong, is_cut=is_cut))
 
 
 def _notes(places: _Places, wrong: int, *, is_cut: bool) -> tuple[Note, ...]:
@@ -168,7 +167,7 @@ def _most(counts: Counter[tuple[int, int, int, int]]) -> int:
 
 def _named(
     kinds: dict[int, Message], parts: dict[tuple[int, int, int], list[tuple[FloatArray, dict[str, FloatArray]]]], own: int
-) -> Iterator[tuple[str, Topic]]:
+) -> Iterator[tuple[str, Topic | None]]:
     """Yield topics: the own system's busiest entity has the message's name, others their source, entity or device beside it."""
     sizes = {key: sum(len(time) for time, _ in blocks) for key, blocks in parts.items()}
     for (kind, source, entity), blocks in parts.items():
@@ -180,34 +179,13 @@ def _named(
         fields = {n: np.concatenate([f[n] for _, f in blocks]) for n in blocks[0][1]}
         devices = np.unique(fields["id"]) if "id" in fields else np.zeros(0)
         if not 1 < devices.size <= MOST_IDS:
-            topic = topic_of(time, fields)
-            if topic is not None:
-                yield name, topic
+            yield name, topic_of(time, fields)
             continue
         for device in devices:
             rows = fields["id"] == device
-            topic = topic_of(time[rows], {n: v[rows] for n, v in fields.items()})
-            if topic is not None:
-                yield f"{name}[{device:.0f}]", topic
+            yield f"{name}[{device:.0f}]", topic_of(time[rows], {n: v[rows] for n, v in fields.items()})
 
 
-def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
-    """Return the messages with count, rate and first numbers; raises LogError for a log without its definition."""
-    topics, notes = _topics(path, options)
-    return inventory_of(path, "IMC log", topics, MEANS, notes)
-
-
-def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
-    """Return the mapped fields; raises MappingError for one that is not there, LogError as `inventory` does."""
-    topics, notes = _topics(path, options)
-    return raw_log_of(path, topics, mapping, notes)
-
-
-READER = Reader(
-    name="lsf",
-    says="DUNE log (LSTS): .lsf, .lsf.gz, with its IMC.xml beside it",
-    suffixes=(".lsf", ".lsf.gz"),
-    sniff=sniff,
-    inventory=inventory,
-    read=read,
+READER = topic_reader(
+    "lsf", "DUNE log (LSTS): .lsf, .lsf.gz, with its IMC.xml beside it", (".lsf", ".lsf.gz"), "IMC log", sniff, _topics
 )

@@ -24,7 +24,7 @@ from fieldsid.logs.readers._clock import Clock, clock_of
 from fieldsid.logs.readers._columns import Columns, numbers_mostly
 from fieldsid.logs.readers._devices import devices_of
 from fieldsid.logs.readers._tables_of_run import names_in_run, run_of, runs_in
-from fieldsid.logs.readers._topics import Means, Topic, inventory_of, raw_log_of, topic_of
+from fieldsid.logs.readers._topics import Means, Topic, Topics, inventory_of, raw_log_of, topic_of, wanted_by
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import name_of_run
 from fieldsid.numerics.arrays import FloatArray
@@ -62,19 +62,19 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     topics = {name: part.topic for name, part in parts.items()}
     apart = _apart(parts)
     notes = (*notes, *([Note("clocks_apart", f"{apart.what} ({apart.found})", {})] if apart else _joined(parts)))
-    return inventory_of(path, "tables of one run", topics, _attitudes(topics), notes, kind=TABLE)
+    return inventory_of(path, "tables of one run", Topics(topics, _attitudes(topics), notes), kind=TABLE)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     """Return the mapped columns; raises MappingError for one that is not there, LogError where their clocks are not one."""
-    wanted = {source.topic for source in mapping.sources.values() if source.topic is not None}
+    wanted = wanted_by(mapping)
     parts, notes = _parts(path, options, mapping.table, mapping, wanted)
     used = {name: part for name, part in parts.items() if name in wanted}
     apart = _apart(used)
     if apart is not None:
         raise apart
     topics = {name: part.topic for name, part in parts.items()}
-    raw = raw_log_of(path, topics, mapping, (*notes, *_joined(used)))
+    raw = raw_log_of(path, Topics(topics, notes=(*notes, *_joined(used))), mapping)
     return replace(raw, name=name_of_run(run_of(path, options.joined)) if options.joined else raw.name)
 
 
