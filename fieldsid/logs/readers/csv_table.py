@@ -15,10 +15,10 @@ import numpy.typing as npt
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, span_of
+from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.readers._cells import ERRORS, MISSING, SENTENCE, cells, has_number, is_word
-from fieldsid.logs.readers._clock import Clock, clock_of, why_no_clock
-from fieldsid.logs.readers._columns import Columns, numbers_mostly, own_map_of, samples_of, series_of, used_by
+from fieldsid.logs.readers._clock import inventory_of_table
+from fieldsid.logs.readers._columns import Columns, own_map_of, series_of, used_by
 from fieldsid.logs.readers._growing import NUMBERS, GrowingColumn
 from fieldsid.logs.readers._plain_text import GZIP, HEAD, PlainText, plain_text
 from fieldsid.logs.readers._text import LOOKED_AT, Form, form_of
@@ -40,17 +40,11 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     """Return the columns with their count of numbers, the table's rate and the first values."""
     with opened(path, form, options) as table:
         columns = table.columns(range(table.form.width))
-        clock = clock_of(columns, options.clock)
-        channels = tuple(_channel(columns, i, clock) for i in range(table.form.width))
         written = table.form
         found = TableForm(
             written.separator, bool(written.names), written.start, form.encoding, "," if written.decimal == "," else "."
         )
-        duration = clock.duration_s if clock else float("nan")
-        samples = samples_of(columns, clock.time, clock.source) if clock else None
-        notes = (*table.notes, *(clock.notes if clock else ()))
-        problem = why_no_clock(columns) if clock is None and options.clock is None else None
-        return Inventory(path, "text table", duration, channels, found, notes, samples, no_clock=problem)
+        return inventory_of_table(path, "text table", columns, options, table=found, notes=table.notes)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
@@ -267,20 +261,6 @@ def _exact(version: str) -> dict[str, Any]:
     """Ask pandas for the last digit; from 3.1 on it gives it unasked, and warns when asked."""
     major, minor = (int(n) for n in version.split(".")[:2])
     return {} if (major, minor) >= (3, 1) else {"float_precision": "round_trip"}
-
-
-def _channel(columns: Columns, index: int, clock: Clock | None) -> ChannelInfo:
-    import pandas as pd
-
-    values = numbers_mostly(columns.take(index))
-    numeric = values.dtype.kind in NUMBERS
-    seen = np.isfinite(values.astype(float)) if numeric else ~np.asarray(pd.isna(values))
-    first: Sequence[Any] = values[seen][:3].tolist()
-    kind = "number" if numeric else "text"
-    span = span_of(values) if numeric else None
-    rate = clock.rate_hz(values) if clock else float("nan")
-    unit = columns.units[index] if columns.units else None
-    return ChannelInfo(columns.name(index), kind, int(seen.sum()), rate, (FieldInfo("", kind, tuple(first), span),), unit)
 
 
 READER = Reader(

@@ -13,9 +13,9 @@ import numpy as np
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, span_of
-from fieldsid.logs.readers._clock import clock_of, why_no_clock
-from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
+from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
+from fieldsid.logs.readers._clock import inventory_of_table
+from fieldsid.logs.readers._columns import Columns, own_map_of, series_of
 from fieldsid.logs.readers._mat_elements import refuse_damaged
 from fieldsid.logs.readers._topics import library
 from fieldsid.logs.readers._unpacked_size import UnpackedSize
@@ -113,22 +113,7 @@ def _of_hdf5(path: Path) -> Iterator[tuple[str, FloatArray]]:
 
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     """Return the columns with their count of numbers, rate and first values; raises LogError where there are none."""
-    columns = _columns(path)
-    clock = clock_of(columns, options.clock)
-    channels = tuple(
-        ChannelInfo(
-            name,
-            "number",
-            int(np.isfinite(values).sum()),
-            clock.rate_hz(values) if clock else float("nan"),
-            (FieldInfo("", "number", tuple(values[:3].tolist()), span_of(values)),),
-        )
-        for name, values in ((n, columns.take(i)) for i, n in enumerate(columns.names))
-    )
-    samples = samples_of(columns, clock.time, clock.source) if clock else None
-    problem = why_no_clock(columns) if clock is None and options.clock is None else None
-    duration, notes = (clock.duration_s, clock.notes) if clock else (float("nan"), ())
-    return Inventory(path, "MATLAB file", duration, channels, notes=notes, samples=samples, no_clock=problem)
+    return inventory_of_table(path, "MATLAB file", _columns(path), options)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:

@@ -12,9 +12,9 @@ import numpy as np
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.mapping.vocabulary import TIME
-from fieldsid.logs.reader import MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, Series, span_of
-from fieldsid.logs.readers._clock import clock_of, why_no_clock
-from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
+from fieldsid.logs.reader import MOST_CHANNELS, Inventory, RawLog, Reader, ReadOptions, Series
+from fieldsid.logs.readers._clock import inventory_of_table
+from fieldsid.logs.readers._columns import Columns, own_map_of, series_of
 from fieldsid.logs.readers._unpacked_rows import refuse_repeated
 from fieldsid.logs.readers._unpacked_size import UnpackedSize
 from fieldsid.logs.run import COLUMNS, Note
@@ -40,21 +40,8 @@ def sniff(path: Path) -> bool:
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     """Return the columns with their count of numbers and first values."""
     table = _table(path)
-    columns = _columns(path, table)
-    clock = clock_of(columns, options.clock)
-    channels = []
-    for i, name in enumerate(table.column_names):
-        column, cells = table.column(i), columns.take(i)
-        count = len(column) - column.null_count
-        kind = "text" if cells.dtype.kind == "O" else "number"
-        rate = clock.rate_hz(cells) if clock else float("nan")
-        first = cells[:3].astype(str) if cells.dtype.kind == "M" else cells[:3]
-        channels.append(ChannelInfo(name, kind, count, rate, (FieldInfo("", kind, tuple(first.tolist()), span_of(cells)),)))
-    samples = samples_of(columns, clock.time, clock.source) if clock else None
-    problem = why_no_clock(columns) if clock is None and options.clock is None else None
-    duration, notes = (clock.duration_s, clock.notes) if clock else (float("nan"), ())
-    more = len(import_module("pyarrow.parquet").read_schema(path).names) - len(channels)
-    return Inventory(path, "Parquet table", duration, tuple(channels), notes=notes, samples=samples, no_clock=problem, more=more)
+    more = len(import_module("pyarrow.parquet").read_schema(path).names) - len(table.column_names)
+    return inventory_of_table(path, "Parquet table", _columns(path, table), options, more=more)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
