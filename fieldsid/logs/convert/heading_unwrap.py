@@ -126,7 +126,7 @@ class _Path:
 def _path(time: FloatArray, values: FloatArray, rate: Track | None) -> _Path | None:
     """Return what a crossing is judged by; None where no step is too fast, or too many are, or noise hides them."""
     steps, dt = np.diff(values), np.diff(time)
-    turned = steps - TURN * np.round(steps / TURN)
+    turned = within_half_turn(steps)
     noise = noise_of_steps(np.where(np.abs(turned) > np.maximum(FASTEST_RAD_S * dt, STAIR_RAD), np.nan, turned))
     least = max(MIN_JUMP_RAD, NOISES * math.sqrt(2.0) * noise)
     limit = np.maximum(FASTEST_RAD_S * dt, least)
@@ -136,6 +136,11 @@ def _path(time: FloatArray, values: FloatArray, rate: Track | None) -> _Path | N
         return None
     calm = np.flatnonzero(np.abs(turned) <= limit)
     return _Path(time, values, least, _swept(time, turned, calm, rate), turned / dt, calm, jumps, abs(spread) <= 2.0 * least)
+
+
+def within_half_turn(angle: FloatArray) -> FloatArray:
+    """Return angles (n,) in rad within half a turn."""
+    return np.asarray(angle - TURN * np.round(angle / TURN))
 
 
 def noise_of_steps(turned: FloatArray) -> float:

@@ -15,6 +15,7 @@ from fieldsid.errors import DataError
 from fieldsid.logs.convert.faults.spikes import DIGITS, last_digit
 from fieldsid.logs.convert.units import UNITS, unit_of_ratio
 from fieldsid.logs.doctor.stated import Stated
+from fieldsid.logs.doctor.together import over, together
 from fieldsid.logs.run import SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.shifted_correlation import lag_of, shifted_correlations, slope_of
@@ -164,10 +165,10 @@ def _turned_in_degrees(run: Run, angle: str, rate: str, stated: Stated) -> list[
 
     The circular variances 1 - |mean exp(i (step - k turn))| of k = 1 and k = 57.3 are compared (Mardia and Jupp 2000, 2.3.1).
     """
-    both = np.isfinite(run[angle]) & np.isfinite(run[rate])
-    if both.sum() < 50:
+    both = together(run, angle, rate)
+    if both is None:
         return []
-    made, turned = np.diff(run[angle][both]), np.diff(trapezoid_integral(run.time[both], run[rate][both]))
+    made, turned = np.diff(both[1]), np.diff(trapezoid_integral(both[0], both[2]))
     as_rad, as_deg = (max(1.0 - abs(complex(np.mean(np.exp(1j * (made - k * turned))))), ROUNDING) for k in (1.0, DEGREES))
     if not as_deg < as_rad / FITS_BETTER:
         return []
@@ -186,11 +187,12 @@ def _jumps(run: Run, angle: str, rate: str) -> list[Note]:
 
     A rate that is wrong for a few samples moves the angle's noise out of no single step, so that changes over a few are taken.
     """
-    both = np.isfinite(run[angle]) & np.isfinite(run[rate])
-    if both.sum() < 50:
+    both = together(run, angle, rate)
+    if both is None:
         return []
-    time, turned, swept = run.time[both], run[angle][both], trapezoid_integral(run.time[both], run[rate][both])
-    fastest = FASTER * float(np.percentile(np.abs(run[rate][both]), 90))
+    time, turned, turning = both
+    swept = trapezoid_integral(time, turning)
+    fastest = FASTER * float(np.percentile(np.abs(turning), 90))
     found = [f for width in JUMP_WIDTHS if (f := _off_over(width, time, turned, swept, fastest)) is not None]
     if not found:
         return []
@@ -209,7 +211,7 @@ def _off_over(
 
     `fastest` is the rate by which they may be a step apart.
     """
-    off = (turned[width:] - turned[:-width]) - (swept[width:] - swept[:-width])
+    off = over(turned - swept, width)
     off = np.abs(off - np.median(off))
     usual = float(np.median(off)) / MEDIAN_OF_NORMAL
     limit = max(JUMP_SPREADS * usual, DIGITS * last_digit(turned))
@@ -226,18 +228,18 @@ def changes_of(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray,
 
     None when the log is too short, or neither moves clearly more than its noise.
     """
-    both = np.isfinite(run[angle]) & np.isfinite(run[rate])
-    if both.sum() < 50:
+    both = together(run, angle, rate)
+    if both is None:
         return None
-    time, turned, swept = run.time[both], run[angle][both], trapezoid_integral(run.time[both], run[rate][both])
-    step = float(np.median(np.diff(time)))
+    time, turned, turning = both
+    swept, step = trapezoid_integral(time, turning), float(np.median(np.diff(time)))
     floor = MIN_NOISE_RATIO * math.sqrt(2.0) * _noise(turned)
-    noise = _noise(run[rate][both])
+    noise = _noise(turning)
     for window_s in (PAIR_WINDOW_S, LONG_WINDOW_S):
         width = max(1, round(window_s / step))
         if time.size <= 3 * width:
             return None
-        a, b = turned[width:] - turned[:-width], swept[width:] - swept[:-width]
+        a, b = over(turned, width), over(swept, width)
         if float(np.std(a)) > floor and float(np.std(b)) > MIN_NOISE_RATIO * noise * math.sqrt(window_s * step):
             return a, b, step
     return None

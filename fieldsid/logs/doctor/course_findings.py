@@ -15,6 +15,7 @@ from fieldsid.logs.convert.units import UNIT_LIMIT, factor_to
 from fieldsid.logs.doctor.angle_and_rate import TRUSTED
 from fieldsid.logs.doctor.pair_findings import SPEEDS, goes_with_way
 from fieldsid.logs.doctor.stated import Stated
+from fieldsid.logs.doctor.together import over, together, width_of
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.trapezoid import trapezoid_integral
@@ -43,18 +44,7 @@ SPREADS = 4.0
 
 def course_findings(run: Run, stated: Stated | None = None) -> list[Note]:
     """Return the findings on the course and the slope of the way of a run."""
-    found = _course(run) if all(run.has(s) for s in ("x_m", "y_m", "yaw_rad")) else []
-    return [*found, *(_dive(run, stated or Stated()) if all(run.has(s) for s in ("depth_m", "pitch_rad", "surge_m_s")) else [])]
-
-
-def _windows(run: Run, *signals: str, window_s: float = WINDOW_S) -> tuple[FloatArray, int, list[FloatArray]] | None:
-    """Return the times (n,) at which all signals are there, the samples of a window, and the signals; None where too few."""
-    good = np.all([np.isfinite(run[s]) for s in signals], axis=0)
-    if good.sum() < 50:
-        return None
-    time = run.time[good]
-    width = max(1, round(window_s / float(np.median(np.diff(time)))))
-    return (time, width, [run[s][good] for s in signals]) if time.size > 4 * width else None
+    return [*_course(run), *_dive(run, stated or Stated())]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,15 +70,15 @@ class Course:
 
 def course_of(run: Run, window_s: float = WINDOW_S) -> Course | None:
     """Return the course that a run makes over windows in s; None where it makes none."""
-    found = _windows(run, "x_m", "y_m", "yaw_rad", window_s=window_s)
-    if found is None:
+    seen = together(run, "x_m", "y_m", "yaw_rad")
+    if seen is None or seen[0].size <= 4 * (width := width_of(seen[0], window_s)):
         return None
-    time, width, (x, y, yaw) = found
-    dx, dy = x[width:] - x[:-width], y[width:] - y[:-width]
+    time, x, y, yaw = seen
+    dx, dy = over(x, width), over(y, width)
     way = np.hypot(dx, dy)
     moved = way > SLOWEST_M_S * window_s
     heading = trapezoid_integral(time, yaw)
-    mean, rate = ((v[width:] - v[:-width]) / (time[width:] - time[:-width]) for v in (heading, yaw))
+    mean, rate = (over(v, width) / over(time, width) for v in (heading, yaw))
     share = float(moved.mean())
     return None if moved.sum() < FEWEST else Course(np.arctan2(dy, dx)[moved], mean[moved], rate[moved], way[moved], share, width)
 
@@ -157,12 +147,11 @@ def goes_with_depth(run: Run) -> bool:
 
 def _dived(run: Run) -> tuple[float, float] | None:
     """Return the correlation of the depth's change with what speed and pitch make of it, and their slope; None for too little."""
-    found = _windows(run, "depth_m", "pitch_rad", "surge_m_s")
-    if found is None:
+    seen = together(run, "depth_m", "pitch_rad", "surge_m_s")
+    if seen is None or seen[0].size <= 4 * (width := width_of(seen[0], WINDOW_S)):
         return None
-    time, width, (depth, pitch, surge) = found
-    said = trapezoid_integral(time, -surge * np.sin(pitch))
-    made, wanted = depth[width:] - depth[:-width], said[width:] - said[:-width]
+    time, depth, pitch, surge = seen
+    made, wanted = over(depth, width), over(trapezoid_integral(time, -surge * np.sin(pitch)), width)
     enough = math.atanh(TRUSTED) * math.sqrt(max(made.size / width - 3.0, 0.0)) >= SPREADS
     if not enough or float(np.ptp(made)) == 0.0 or float(np.ptp(wanted)) == 0.0:
         return None

@@ -7,7 +7,9 @@ import math
 import numpy as np
 
 from fieldsid.errors import DataError
+from fieldsid.logs.convert.mask_blocks import blocks_of
 from fieldsid.logs.convert.servo_counts import servo_of
+from fieldsid.logs.doctor.together import together
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
@@ -34,7 +36,7 @@ def fin_findings(run: Run) -> list[Note]:
     found = []
     for fin, rate in _AXES:
         if run.has(fin):
-            found += [*_range(run, fin), *(_early(run, fin, rate) if run.has(rate) else [])]
+            found += [*_range(run, fin), *_early(run, fin, rate)]
     return [*found, *(_roll(run) if run.has("roll_rad") else [])]
 
 
@@ -65,10 +67,10 @@ def refuse_no_angle(run: Run, fin: str) -> None:
 
 def _early(run: Run, fin: str, rate: str) -> list[Note]:
     """The mean answer of the rate about steps of the fin: what comes before the step cannot be its answer."""
-    seen = np.isfinite(run[fin]) & np.isfinite(run[rate])
-    if seen.sum() < 50:
+    both = together(run, fin, rate)
+    if both is None:
         return []
-    time, moves, answer = run.time[seen], run[fin][seen], run[rate][seen]
+    time, moves, answer = both
     at, size = _steps(time, moves)
     inside = (at > time[0] + BEFORE_S) & (at < time[-1] - AFTER_S)
     at, side = at[inside], np.sign(size[inside])
@@ -117,9 +119,8 @@ def _roll(run: Run) -> list[Note]:
 
 def _upright(time: FloatArray, roll: FloatArray) -> str:
     """Return the advice to take the longest stretch between rolls of this size; nothing where there is none."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], roll <= ROLLED, [False]]).astype(np.int8)))
-    starts, ends = edges[::2], edges[1::2] - 1
+    starts, behind = blocks_of(roll <= ROLLED)
     if not starts.size:
         return ""
-    k = int(np.argmax(time[ends] - time[starts]))
-    return f"; take the longest stretch without: `--from {time[starts[k]]:.2f} --to {time[ends[k]]:.2f}`"
+    begin, end = max(zip(time[starts], time[behind - 1], strict=True), key=lambda part: part[1] - part[0])
+    return f"; take the longest stretch without: `--from {begin:.2f} --to {end:.2f}`"

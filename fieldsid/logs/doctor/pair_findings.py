@@ -7,6 +7,7 @@ import numpy as np
 from fieldsid.logs.convert.units import factor_to, unit_of_ratio
 from fieldsid.logs.doctor.angle_and_rate import LAG_S, TRUSTED
 from fieldsid.logs.doctor.stated import Stated
+from fieldsid.logs.doctor.together import FEWEST, over, together, width_of
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.shifted_correlation import lag_of, slope_of
 from fieldsid.numerics.trapezoid import trapezoid_integral
@@ -24,13 +25,8 @@ _FINS = (("rudder_rad", "rudder_measured_rad"), ("elevator_rad", "elevator_measu
 
 def pair_findings(run: Run, stated: Stated) -> list[Note]:
     """Return the findings on pairs of signals of a run."""
-    found = _speed_and_way(run, stated)
-    if all(run.has(s) for s in ("surge_m_s", "propeller_rpm")):
-        found += _speed_and_turns(run)
-    for command, fin in _FINS:
-        if run.has(command) and run.has(fin):
-            found += _command_and_fin(run, command, fin, stated)
-    return found
+    of_fins = [note for command, fin in _FINS for note in _command_and_fin(run, command, fin, stated)]
+    return [*_speed_and_way(run, stated), *_speed_and_turns(run), *of_fins]
 
 
 def _speed_and_way(run: Run, stated: Stated) -> list[Note]:
@@ -57,18 +53,12 @@ def goes_with_way(run: Run) -> bool:
 
 def _way_by_speed(run: Run) -> float | None:
     """Return how many times the speed the way made in a second is; None where there is too little of either."""
-    if not all(run.has(s) for s in ("surge_m_s", "x_m", "y_m")):
+    seen = together(run, "x_m", "y_m", "surge_m_s")
+    if seen is None or seen[0].size <= 2 * (width := width_of(seen[0], 5.0)):
         return None
-    good = np.isfinite(run["x_m"]) & np.isfinite(run["y_m"]) & np.isfinite(run["surge_m_s"])
-    if good.sum() < 50:
-        return None
-    time, x, y, surge = run.time[good], run["x_m"][good], run["y_m"][good], run["surge_m_s"][good]
-    width = max(1, round(5.0 / float(np.median(np.diff(time)))))
-    if time.size <= 2 * width:
-        return None
-    made = np.hypot(x[width:] - x[:-width], y[width:] - y[:-width]) / (time[width:] - time[:-width])
-    said = trapezoid_integral(time, surge)
-    said = np.abs(said[width:] - said[:-width]) / (time[width:] - time[:-width])
+    time, x, y, surge = seen
+    made = np.hypot(over(x, width), over(y, width)) / over(time, width)
+    said = np.abs(over(trapezoid_integral(time, surge), width)) / over(time, width)
     # In a turn the straight way is shorter than the path, so the fastest windows decide.
     fast = float(np.percentile(said, 90))
     return float(np.percentile(made, 90)) / fast if fast > SLOWEST else None
@@ -76,11 +66,14 @@ def _way_by_speed(run: Run) -> float | None:
 
 def _speed_and_turns(run: Run) -> list[Note]:
     """The way made in a turn of the propeller: a few tenths of a metre, whatever its slip."""
-    good = np.isfinite(run["propeller_rpm"]) & np.isfinite(run["surge_m_s"])
-    turning = good & (np.abs(run["propeller_rpm"]) > SLOW_RPM) & (np.abs(run["surge_m_s"]) > SLOWEST)
-    if turning.sum() < 50:
+    seen = together(run, "propeller_rpm", "surge_m_s")
+    if seen is None:
         return []
-    advance = float(np.median(np.abs(60.0 * run["surge_m_s"][turning] / run["propeller_rpm"][turning])))
+    _, rpm, surge = np.abs(seen)
+    turning = (rpm > SLOW_RPM) & (surge > SLOWEST)
+    if turning.sum() < FEWEST:
+        return []
+    advance = float(np.median(60.0 * surge[turning] / rpm[turning]))
     if advance < MOST_ADVANCE_M:
         return []
     message = f"surge_m_s makes {advance:.3g} m in a turn of propeller_rpm (limit {MOST_ADVANCE_M:g} m): check the units of both"
@@ -88,10 +81,10 @@ def _speed_and_turns(run: Run) -> list[Note]:
 
 
 def _command_and_fin(run: Run, command: str, fin: str, stated: Stated) -> list[Note]:
-    both = np.isfinite(run[command]) & np.isfinite(run[fin])
-    if both.sum() < 50 or np.ptp(run[command][both]) == 0.0 or np.ptp(run[fin][both]) == 0.0:
+    both = together(run, fin, command)
+    if both is None or np.ptp(both[1]) == 0.0 or np.ptp(both[2]) == 0.0:
         return []
-    time, a, b = run.time[both], run[fin][both], run[command][both]
+    time, a, b = both
     step = float(np.median(np.diff(time)))
     slope, trust = slope_of(a, b)
     found = []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.logs.convert.faults.spikes import spikes_of
+from fieldsid.logs.convert.mask_blocks import blocks_of
 from fieldsid.logs.convert.servo_counts import FINS, servo_of
 from fieldsid.logs.doctor.pair_findings import goes_with_way
 from fieldsid.logs.doctor.stated import Stated
@@ -89,8 +90,7 @@ def _frozen(name: str, time: FloatArray, values: FloatArray) -> list[Note]:
     same = np.diff(values) == 0.0
     if same.mean() > COARSE_LIMIT:
         return []
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(np.int8)))
-    starts, ends = edges[::2], edges[1::2]
+    starts, ends = blocks_of(same)
     if not starts.size:
         return []
     lengths = time[ends] - time[starts]

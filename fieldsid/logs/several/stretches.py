@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.logs.convert.conditioning import MAIN
+from fieldsid.logs.convert.mask_blocks import blocks_of
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
@@ -120,8 +121,7 @@ def _tails(run: Run) -> BoolArray:
 def _long(time: FloatArray, mask: BoolArray) -> BoolArray:
     """Return only those runs of a mask (n,) that last."""
     kept = mask.copy()
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+    for begin, end in zip(*blocks_of(mask), strict=True):
         if time[end - 1] - time[begin] < OFF_S:
             kept[begin:end] = False
     return kept

@@ -21,11 +21,11 @@ from fieldsid.logs.channels import AXES
 from fieldsid.logs.convert.clock import Track, held
 from fieldsid.logs.convert.servo_counts import COUNTS, FINS, SERVOS, Servo
 from fieldsid.logs.convert.units import pick_unit
+from fieldsid.logs.doctor.together import width_of
 from fieldsid.logs.mapping.fins.families import Family, are_outputs, families, is_measured, is_on_starboard, is_thruster
 from fieldsid.logs.mapping.fins.shares import EXPLAINS, WINDOWS_S, FinShares, explains, fin_shares, moved_by
 from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.mapping.numbers.units_told import Reading, as_counts, fin_reading
-from fieldsid.logs.mapping.numbers.windows import width_of
 from fieldsid.logs.mapping.trial import Log
 from fieldsid.logs.reader import Inventory, Series
 from fieldsid.logs.run import Note, Run

@@ -21,8 +21,6 @@ def rate_by_turning(run: Run, *, has_unit: bool) -> tuple[float, str, Note] | No
 
     `has_unit` says that the yaw rate's unit is known; else it is that in which a vehicle would log so fast.
     """
-    if not (run.has("yaw_rad") and run.has("yaw_rate_rad_s")):
-        return None
     changes = changes_of(run, "yaw_rad", "yaw_rate_rad_s")
     slope, trust = slope_of(*changes[:2]) if changes is not None else (0.0, 0.0)
     if trust < TRUSTED or slope <= 0.0:

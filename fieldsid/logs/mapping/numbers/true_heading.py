@@ -66,13 +66,13 @@ def _taken(names: Sequence[str], best: int, why: str) -> Note:
 
 def _off_rate(run: Run) -> float:
     """Return by how many rad a heading's change over a window is off the integral of the yaw rate; infinite without one."""
-    changes = changes_of(run, *PAIRS[0]) if run.has("yaw_rad") and run.has("yaw_rate_rad_s") else None
+    changes = changes_of(run, *PAIRS[0])
     return float("inf") if changes is None else float(np.std(changes[0] - changes[1]))
 
 
 def lead_of(run: Run) -> Lead | None:
     """Return by how much the heading of a run leads its course; None where the log does not show it."""
-    made = course_of(run, WINDOW_S) if all(run.has(s) for s in ("yaw_rad", "x_m", "y_m")) else None
+    made = course_of(run, WINDOW_S)
     return None if made is None else _regressed(made.heading - made.course, made.heading, made.rate, made.width)
 
 

@@ -15,10 +15,11 @@ import numpy.typing as npt
 
 from fieldsid.logs.convert.geodetic import north_and_east
 from fieldsid.logs.doctor.course_findings import AGREES, TURNED, WINDOW_S
+from fieldsid.logs.doctor.together import FEWEST, width_of
 from fieldsid.logs.mapping.canonical_names import unit_in_name
 from fieldsid.logs.mapping.name_words import words_of
 from fieldsid.logs.mapping.numbers.units_told import in_radians
-from fieldsid.logs.mapping.numbers.windows import FEWEST, change, width_of
+from fieldsid.logs.mapping.numbers.windows import change
 from fieldsid.logs.mapping.vocabulary import COMMANDED, COMPASS, LATITUDE, LONGITUDE, OF_ANOTHER, OVER_GROUND
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import Samples
