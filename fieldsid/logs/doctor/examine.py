@@ -10,10 +10,8 @@ from fieldsid.logs.convert.clock import GAP_FACTOR
 from fieldsid.logs.convert.conditioning import MAIN, likely_unit
 from fieldsid.logs.convert.times.time_column import FASTEST_S, SLOW_S
 from fieldsid.logs.doctor.angle_and_rate import angle_findings
-from fieldsid.logs.doctor.course_findings import course_findings
-from fieldsid.logs.doctor.fin_findings import fin_findings
-from fieldsid.logs.doctor.limit_findings import limit_findings
-from fieldsid.logs.doctor.pair_findings import pair_findings
+from fieldsid.logs.doctor.fin_findings import fin_findings, limit_findings
+from fieldsid.logs.doctor.pair_findings import course_findings, pair_findings
 from fieldsid.logs.doctor.signal_findings import signal_findings
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import LINES, Note, Run

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.logs.convert.conditioning import blocks_of
 from fieldsid.logs.convert.faults.spikes import spikes_of
-from fieldsid.logs.convert.mask_blocks import blocks_of
 from fieldsid.logs.convert.servo_counts import FINS, servo_of
 from fieldsid.logs.doctor.pair_findings import goes_with_way
 from fieldsid.logs.doctor.stated import Stated

@@ -32,3 +32,11 @@ def width_of(time: FloatArray, window_s: float) -> int:
 def over(values: npt.NDArray[Number], width: int) -> npt.NDArray[Number]:
     """Return the changes (n - width,) of numbers over windows of so many samples."""
     return values[width:] - values[:-width]
+
+
+def change(values: npt.NDArray[Number], width: int) -> npt.NDArray[Number]:
+    """Return the change of a column (n,) over a window about each sample, NaN at the ends."""
+    found = np.full_like(values, np.nan)
+    if values.size > width:
+        found[width // 2 :][: values.size - width] = over(values, width)
+    return found

@@ -6,8 +6,7 @@ import re
 
 from fieldsid.logs.channels import ANGLES
 from fieldsid.logs.doctor.angle_and_rate import PAIRS
-from fieldsid.logs.mapping.canonical_names import canonical
-from fieldsid.logs.mapping.name_words import unit_said, words_of
+from fieldsid.logs.mapping.canonical_names import canonical, unit_said, words_of
 from fieldsid.logs.mapping.vocabulary import (
     COMMANDED,
     EULER,

@@ -15,8 +15,7 @@ from fieldsid.logs.channels import Source, TableForm
 from fieldsid.logs.convert.conditioning import in_order
 from fieldsid.logs.convert.times.clock_text import DAY_S, clock_of_text
 from fieldsid.logs.convert.times.time_column import YEARS_S, likely_time_unit
-from fieldsid.logs.mapping.canonical_names import unit_in_name
-from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.canonical_names import unit_in_name, words_of
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, ReadOptions, span_of

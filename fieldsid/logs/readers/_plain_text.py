@@ -18,10 +18,9 @@ from tempfile import TemporaryFile
 from typing import IO
 
 from fieldsid.errors import LogError
-from fieldsid.logs.readers._unpacked_rows import LONGEST_ROW, UnpackedRows
+from fieldsid.logs.readers._unpacked import GZIP, LONGEST_ROW, UnpackedRows
 from fieldsid.logs.unknown_file import COPY_AGAIN
 
-GZIP = b"\x1f\x8b"
 HEAD = LONGEST_ROW
 """Bytes at the start of a table that tell how it is written."""
 PIECE_BYTES = 1 << 20

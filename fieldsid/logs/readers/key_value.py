@@ -15,7 +15,7 @@ from fieldsid.errors import LogError
 from fieldsid.logs.channels import TableForm
 from fieldsid.logs.convert.number_cells import as_numbers
 from fieldsid.logs.convert.times.time_column import seconds_of
-from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import ReadOptions

@@ -18,7 +18,7 @@ from fieldsid.logs.readers._clock import inventory_of_table
 from fieldsid.logs.readers._columns import Columns, own_map_of, series_of
 from fieldsid.logs.readers._mat_elements import refuse_damaged
 from fieldsid.logs.readers._topics import library
-from fieldsid.logs.readers._unpacked_size import UnpackedSize
+from fieldsid.logs.readers._unpacked import UnpackedSize
 from fieldsid.logs.unknown_file import head_of, unreadable
 from fieldsid.numerics.arrays import FloatArray
 

@@ -15,8 +15,7 @@ from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.reader import MOST_CHANNELS, Inventory, RawLog, Reader, ReadOptions, Series
 from fieldsid.logs.readers._clock import inventory_of_table
 from fieldsid.logs.readers._columns import Columns, own_map_of, series_of
-from fieldsid.logs.readers._unpacked_rows import refuse_repeated
-from fieldsid.logs.readers._unpacked_size import UnpackedSize
+from fieldsid.logs.readers._unpacked import UnpackedSize, refuse_repeated
 from fieldsid.logs.run import COLUMNS, Note
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.logs.unknown_file import COPY_AGAIN, head_of

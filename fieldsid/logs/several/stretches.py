@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.logs.convert.conditioning import MAIN
-from fieldsid.logs.convert.mask_blocks import blocks_of
+from fieldsid.logs.convert.conditioning import MAIN, blocks_of
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 

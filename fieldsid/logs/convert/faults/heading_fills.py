@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.clock import Track
+from fieldsid.logs.convert.conditioning import blocks_of
 from fieldsid.logs.convert.heading_unwrap import FASTEST_RAD_S, MIN_JUMP_RAD, NOISES, noise_of_steps, within_half_turn
-from fieldsid.logs.convert.mask_blocks import blocks_of
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 

@@ -13,6 +13,7 @@ from fieldsid.logs.convert.number_cells import as_numbers
 from fieldsid.logs.convert.times.clock_parts import PLUS, clock_of_parts, parts_of, put_together
 from fieldsid.logs.convert.times.clock_text import (
     DAY_S,
+    FEW_STEPS,
     FORMS,
     HOUR_S,
     STAMP,
@@ -23,12 +24,13 @@ from fieldsid.logs.convert.times.clock_text import (
     clock_of_stamps,
     clock_of_text,
     going_on,
+    gone_on,
     lost_hours,
+    round_of,
     stamps_of_text,
 )
 from fieldsid.logs.convert.times.coarse_stamps import rebuilt
 from fieldsid.logs.convert.times.dates import days_of_columns
-from fieldsid.logs.convert.times.starting_again import FEW_STEPS, gone_on, round_of
 from fieldsid.logs.convert.units import UNITS, pick_unit
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.run import Note

@@ -18,8 +18,7 @@ from fieldsid.logs.channels import POSITION
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, FULL_RAD, Servo, servo_of
 from fieldsid.logs.convert.units import DEGREE, UNITS, pick_unit
 from fieldsid.logs.doctor.angle_and_rate import PAIRS, agrees_with_rate
-from fieldsid.logs.doctor.course_findings import goes_along_course, goes_with_depth
-from fieldsid.logs.doctor.pair_findings import goes_with_way
+from fieldsid.logs.doctor.pair_findings import goes_along_course, goes_with_depth, goes_with_way
 from fieldsid.logs.doctor.signal_findings import LARGEST
 from fieldsid.logs.run import GOALS, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from fieldsid.errors import LogError
-from fieldsid.logs.readers._unpacked_size import UnpackedSize
+from fieldsid.logs.readers._unpacked import UnpackedSize
 from fieldsid.logs.run import Note
 
 ROS1, CDR = "ros1", "cdr"

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from fieldsid.errors import LogError
-from fieldsid.logs.readers._unpacked_size import UnpackedSize
+from fieldsid.logs.readers._unpacked import UnpackedSize
 from fieldsid.logs.readers.bags.containers import db3, mcap, ros1
 from fieldsid.logs.readers.bags.containers.metadata import check_against_metadata
 from fieldsid.logs.readers.bags.packets import Collector, Connection, Settle, TopicPackets, UnknownFormError, keep_all

@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from fieldsid.logs.readers._unpacked_size import MOST_TIMES, UnpackedSize
+from fieldsid.logs.readers._unpacked import MOST_TIMES, UnpackedSize
 from fieldsid.logs.readers.bags.packets import UnknownFormError
 
 PIECE_BYTES = 1 << 20
