@@ -120,12 +120,7 @@ class Form:
     width: int
     names: tuple[str, ...]
     units: tuple[str, ...] = ()
-
     is_sentences: bool = False
-
-    def label(self, index: int) -> str:
-        """The name of a column, or its index where there is no header."""
-        return self.names[index] if self.names else str(index)
 
 
 def form_of(text: str, asked: TableForm, path: Path) -> Form:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -171,7 +171,7 @@ class _Table:
         with TemporaryFile() as blanked, TemporaryFile() as own, TemporaryFile() as plain:
             if self.text.holds(ERRORS, b"#", self.begin, self.end):
                 self._without_errors(blanked)
-            if self.text.holds(SENTENCE, b"$", self.begin, self.end):
+            if not self.form.is_sentences and self.text.holds(SENTENCE, b"$", self.begin, self.end):
                 self._without_sentences(own)
             try:
                 return self._parsed(wanted)
@@ -180,48 +180,51 @@ class _Table:
                     raise
                 return self._parsed(wanted)
 
-    def _without_errors(self, plain: IO[bytes]) -> None:
-        """Copy the rows, with an empty cell for each in which a program says that there is no number."""
-        count, first = 0, b""
+    def _copied(self, plain: IO[bytes], line_of: Callable[[bytes], bytes]) -> None:
+        """Read on from a copy of the rows, each as a function gives it."""
         with self.text.between(self.begin, self.end) as rows:
-            for raw in rows:
-                found = ERRORS.findall(raw) if b"#" in raw else []
-                count, first = count + len(found), first or (found[0] if found else b"")
-                plain.write(ERRORS.sub(b"", raw) if found else raw)
-        self._turn_to(plain)
-        message = f"cells that say there is no number, as {first.decode()!r}, taken as missing: {count}"
-        self.notes.append(Note("error_cells", message, {"count": count}))
+            plain.writelines(map(line_of, rows))
+        self.text = replace(self.text, stream=plain, size=plain.tell(), encoding=self.text.encoding.removesuffix("-sig"))
+        self.begin, self.end = 0, plain.tell()
+
+    def _without_errors(self, plain: IO[bytes]) -> None:
+        """Leave an empty cell for each in which a program says that there is no number."""
+        found: list[bytes] = []
+
+        def without(raw: bytes) -> bytes:
+            said = ERRORS.findall(raw) if b"#" in raw else []
+            found.extend(said)
+            return ERRORS.sub(b"", raw) if said else raw
+
+        self._copied(plain, without)
+        message = f"cells that say there is no number, as {found[0].decode()!r}, taken as missing: {len(found)}"
+        self.notes.append(Note("error_cells", message, {"count": len(found)}))
 
     def _without_sentences(self, plain: IO[bytes]) -> None:
-        """Copy the rows, with an empty line for each sentence of NMEA among them; a log of nothing else stays as it is."""
+        """Leave an empty line for each sentence of NMEA among the rows."""
         found: list[bytes] = []
-        with self.text.between(self.begin, self.end) as rows:
-            for raw in rows:
-                is_sentence = SENTENCE.match(raw) is not None
-                found += [raw] if is_sentence else []
-                plain.write(b"\n" if is_sentence else raw)
-        if self.form.is_sentences:
-            return
-        self._turn_to(plain)
+
+        def without(raw: bytes) -> bytes:
+            is_sentence = SENTENCE.match(raw) is not None
+            found.extend([raw] if is_sentence else [])
+            return b"\n" if is_sentence else raw
+
+        self._copied(plain, without)
         first = found[0].decode("latin-1").strip()[:60]
         message = f"lines of another talker (NMEA 0183) between the rows, left out: {len(found)}, the first {first!r}"
         self.notes.append(Note("nmea_lines", message, {"count": len(found)}))
 
-    def _turn_to(self, plain: IO[bytes]) -> None:
-        """Read the rows from a copy of them."""
-        self.text = replace(self.text, stream=plain, size=plain.tell(), encoding=self.text.encoding.removesuffix("-sig"))
-        self.begin, self.end = 0, plain.tell()
-
     def _without_words(self, plain: IO[bytes]) -> bool:
-        """Copy the rows, with an empty line for each line without a number that is no row; return whether there was one."""
+        """Leave an empty line for each line without a number that is no row; return whether there was one."""
         found: list[str] = []
-        with self.text.between(self.begin, self.end) as rows:
-            for raw in rows:
-                line = raw.decode(self.text.encoding, errors="replace").strip()
-                is_row = not line or line.startswith("#") or has_number(line, self.form.separator, self.form.decimal)
-                plain.write(raw if is_row else b"\n")
-                found += [] if is_row else [line]
-        self._turn_to(plain)
+
+        def without(raw: bytes) -> bytes:
+            line = raw.decode(self.text.encoding, errors="replace").strip()
+            is_row = not line or line.startswith("#") or has_number(line, self.form.separator, self.form.decimal)
+            found.extend([] if is_row else [line])
+            return raw if is_row else b"\n"
+
+        self._copied(plain, without)
         message = f"lines of words between the rows, left out: {len(found)}, the first {found[0][:60]!r}" if found else ""
         self.notes += [Note("text_rows", message, {"count": len(found)})] if found else []
         return bool(found)
