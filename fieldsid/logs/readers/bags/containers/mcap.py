@@ -1,7 +1,7 @@
 """MCAP files (mcap.dev, specification 0), read from front to back.
 
 Over rosbags: packets 3 times as fast (tests/benchmarks/bag_reading.py), and a file that is cut off, has no footer or
-damaged records gives what is left; files of other recorders than ROS 2's. Another compression is left to rosbags.
+damaged records gives what is left; files of other recorders than ROS 2's.
 
 A record is an opcode (u8), a length (u64) and that many bytes; a chunk holds more records. The summary behind the data
 repeats schemas and channels and counts the messages; it is used where it is there.

@@ -1,7 +1,7 @@
 """ROS 1 bags (format 2.0), read from front to back.
 
 Over rosbags: packets 3 to 4 times as fast (tests/benchmarks/bag_reading.py), and a bag that is cut off, has no index or
-damaged records gives what is left. Another version or compression, and encryption, are left to rosbags.
+damaged records gives what is left.
 
 A record is a header (u32 length, then u32 length + `name=value` fields) and data (u32 length, then bytes); a chunk holds
 more records. The index behind the data repeats the connections and counts the messages; it is used where it is there.
@@ -16,9 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
+from fieldsid.errors import LogError
 from fieldsid.logs.readers.bags.containers.damage import Bytes, Place, Records, forget, mapped
 from fieldsid.logs.readers.bags.containers.decompress import unpacked
-from fieldsid.logs.readers.bags.packets import ROS1, Collector, Connection, UnknownFormError
+from fieldsid.logs.readers.bags.packets import ROS1, Collector, Connection
 
 MAGIC = b"#ROSBAG V"
 FIRST_LINE = b"#ROSBAG V2.0\n"
@@ -46,11 +47,11 @@ Fields = Mapping[bytes, bytes]
 
 
 def scan(path: Path, collector: Collector) -> None:
-    """Read every record of a bag into `collector`; raises UnknownFormError for a version or an encryption it does not know."""
+    """Read every record of a bag into `collector`; raises LogError for a version or an encryption it does not know."""
     with mapped(path) as data:
         first = data.find(b"\n", 0, 32) + 1
         if data[:first] != FIRST_LINE:
-            raise UnknownFormError(
+            raise LogError(
                 f"`{path}` is a bag of another version",
                 found=repr(data[: max(first, 16)]),
                 hint="convert it with `rosbag migrate`",
@@ -135,9 +136,7 @@ class _Records(Records):
         if op == CONNECTION:
             self._connection(fields, data, pos, stop)
         elif op == BAG and fields.get(b"encryptor"):
-            raise UnknownFormError(
-                "the bag is encrypted", found=repr(fields[b"encryptor"]), hint="decrypt it with `rosbag decrypt`"
-            )
+            raise LogError("the bag is encrypted", found=repr(fields[b"encryptor"]), hint="decrypt it with `rosbag decrypt`")
         return stop
 
     def is_cut(self, data: Bytes, pos: int, end: int) -> bool:

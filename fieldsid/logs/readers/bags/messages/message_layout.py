@@ -19,7 +19,6 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import LogError, MappingError
-from fieldsid.logs.readers.bags.packets import UnknownFormError
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
 
@@ -78,7 +77,7 @@ class Walker:
         self.layout = Layout()
         self.pos = self.start
         if cdr and raw[:2] not in {b"\x00\x00", b"\x00\x01"}:
-            raise UnknownFormError(
+            raise LogError(
                 "a message is in an encoding that is not plain CDR",
                 found=f"encapsulation {raw[:2].hex()}",
                 hint="re-record with the default RMW",
@@ -171,7 +170,7 @@ class Walker:
 
     def _dtype(self, base: str) -> np.dtype[Any]:
         if base not in DTYPES:
-            raise UnknownFormError(f"fields of type `{base}` are not read", found=base, hint="map another topic")
+            raise LogError(f"fields of type `{base}` are not read", found=base, hint="map another topic")
         return np.dtype(self.order + DTYPES[base])
 
 
@@ -352,8 +351,8 @@ def as_floats(values: npt.NDArray[Any]) -> FloatArray:
     return floats[:, 0] if floats.shape[1] == 1 else floats
 
 
-def _misfit(type_name: str, needed: int, found: int) -> UnknownFormError:
-    return UnknownFormError(
+def _misfit(type_name: str, needed: int, found: int) -> LogError:
+    return LogError(
         f"the definition of `{type_name}` does not fit its messages",
         found=f"a message of {found} bytes where the definition ends at {needed}",
         hint="give the definitions the vehicle was built with: `--msg-path DIR`",
