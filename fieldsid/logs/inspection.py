@@ -15,13 +15,12 @@ from fieldsid.display import Brief
 from fieldsid.errors import FieldsidError, MappingError
 from fieldsid.logs.channels import TableForm
 from fieldsid.logs.convert.conditioning import MAIN, MAX_GAP_S, gaps_in
-from fieldsid.logs.convert.servo_counts import FINS
 from fieldsid.logs.importing import Importer
 from fieldsid.logs.mapping.propose import propose
 from fieldsid.logs.mapping.trial import Proposal
 from fieldsid.logs.reader import WORTH_SALVAGING, ChannelInfo, FieldInfo, Inventory, ReadOptions, reader_of
 from fieldsid.logs.readers._tables_of_run import tables_beside
-from fieldsid.logs.run import Note, Run
+from fieldsid.logs.run import FINS, Note, Run
 from fieldsid.records.keys import Key
 from fieldsid.text.one_line import one_line
 

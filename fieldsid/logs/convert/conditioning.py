@@ -11,7 +11,7 @@ import numpy.typing as npt
 from fieldsid.errors import LogError
 from fieldsid.logs.convert.times.time_column import unit_of_step
 from fieldsid.logs.reader import ReadOptions
-from fieldsid.logs.run import Note
+from fieldsid.logs.run import FINS, Note
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 MAX_GAP_S = 2.0
@@ -24,10 +24,7 @@ WORTH_TAKING = 10
 ROUNDING = 1.01
 """What a gap of just the limit may be over it, by the rounding and the jitter of the times."""
 
-MAIN = (
-    "yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s",
-    "rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad",
-)  # fmt: skip
+MAIN = ("yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s", *FINS)
 """Signals that identification stands on."""
 
 

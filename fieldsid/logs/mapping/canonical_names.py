@@ -12,10 +12,10 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from fieldsid.logs.channels import POSITION
-from fieldsid.logs.convert.servo_counts import BY_UNIT, FINS
+from fieldsid.logs.convert.servo_counts import BY_UNIT
 from fieldsid.logs.convert.units import SPELLINGS, Unit, dimension_of, find_unit
 from fieldsid.logs.mapping.vocabulary import GLIDER, KNOWN, LATITUDE, LONGITUDE, TIME
-from fieldsid.logs.run import LINES, SIGNALS
+from fieldsid.logs.run import FINS, LINES, SIGNALS
 
 _BRACKET = re.compile(r"[\[({]([^\])}]*)[\])}]")
 _WORD = re.compile(r"[A-Z]+[a-z]*|[a-z]+|\d+")

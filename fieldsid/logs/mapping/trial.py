@@ -23,7 +23,7 @@ from fieldsid.logs.mapping.draft import place_of
 from fieldsid.logs.mapping.numbers.true_heading import GEOGRAPHIC
 from fieldsid.logs.mapping.numbers.units_told import assumed_units, heading_in_doubt, set_by_size, unit_of_wraps
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.run import SIGNALS, Note, Run
+from fieldsid.logs.run import FINS, SIGNALS, Note, Run
 
 MENDS = 6
 """Readings of the log with what the last one's findings have set: a unit, a frame and the signs of two rates come in turn."""
@@ -96,7 +96,7 @@ def tried(log: Log, body: dict[str, Any], defined: frozenset[str]) -> Proposal:
     return Proposal(body, replace(run, notes=(*run.notes, *notes)), notes=tuple(why))
 
 
-ANGLES_BESIDE = ("rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad", "pitch_rad", "roll_rad")
+ANGLES_BESIDE = (*FINS, "pitch_rad", "roll_rad")
 
 
 def mended(body: dict[str, Any], run: Run, findings: Iterable[Note], by_size: Container[str] = ()) -> list[Note]:

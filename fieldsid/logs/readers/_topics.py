@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -36,6 +36,8 @@ from fieldsid.registry import near
 
 DATA = "data"
 """Field of a topic that is one number."""
+SHOWN = 12
+"""Topics that a message names."""
 Means = Mapping[str, tuple[str, Mapping[str, Any]]]
 """What a format's own definition says: by `topic.field`, the signal and how a mapping reads it."""
 
@@ -154,10 +156,11 @@ def raw_log_of(path: Path, log: Topics, mapping: ChannelMap) -> RawLog:
     return RawLog(stem_of(path), series, (*log.notes, started), one_clock=False)
 
 
-def _picked(path: Path, topics: Mapping[str, Topic], signal: str, source: Source) -> Series:
+def topic_name(path: Path, what: str, topics: Collection[str], signal: str, source: Source) -> str:
+    """Return the topic that a source names, of those of a log; raises MappingError where it names none, or another."""
     if source.topic is None:
         raise MappingError(
-            f"`{signal}` is mapped to a {source.label}, but `{path}` is a log of topics",
+            f"`{signal}` is mapped to a {source.label}, but `{path}` is {what}",
             found=source.label,
             hint="name a `topic` and a `field`",
             signal=signal,
@@ -165,24 +168,28 @@ def _picked(path: Path, topics: Mapping[str, Topic], signal: str, source: Source
     if source.topic not in topics:
         raise MappingError(
             f"`{path}` has no topic `{source.topic}` for `{signal}`",
-            found=", ".join(sorted(topics)[:12]),
+            found=", ".join(sorted(topics)[:SHOWN]) or "no topics",
             hint=near(source.topic, list(topics)),
             signal=signal,
         )
-    topic = topics[source.topic]
+    return source.topic
+
+
+def _picked(path: Path, topics: Mapping[str, Topic], signal: str, source: Source) -> Series:
+    called = topic_name(path, "a log of topics", topics, signal, source)
+    topic = topics[called]
     fields = [part.strip() for part in (source.path or DATA).split(",")]
     for name in fields:
         if name not in topic.fields:
             raise MappingError(
-                f"topic `{source.topic}` has no field `{name}` for `{signal}`",
+                f"topic `{called}` has no field `{name}` for `{signal}`",
                 found=", ".join(topic.fields),
                 hint=near(name, list(topic.fields)),
                 signal=signal,
             )
     values = [topic.fields[name] for name in fields]
-    label = f"{source.topic}.{source.path}" if source.path else source.topic
-    unit = None if signal in COMBINED else unit_of_field(source.topic, fields[0], signal, topic.unit)
-    return Series(topic.time, values[0] if len(values) == 1 else np.stack(values, axis=1), label, unit)
+    unit = None if signal in COMBINED else unit_of_field(called, fields[0], signal, topic.unit)
+    return Series(topic.time, values[0] if len(values) == 1 else np.stack(values, axis=1), source.label, unit)
 
 
 def topic_of(time: FloatArray, fields: Mapping[str, FloatArray], unit: str | None = None) -> Topic | None:

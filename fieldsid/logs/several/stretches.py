@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.logs.convert.conditioning import MAIN, blocks_of
-from fieldsid.logs.run import Note, Run
+from fieldsid.logs.run import MOTORS, Note, Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 OFF_S = 10.0
@@ -27,7 +27,6 @@ DIVES_M, DIVES = 1.0, 0.2
 """Depth in m, and share of the log below it, from which on a log is one of dives."""
 SURFACE_M = 0.3
 GAP_STEPS = 5.0
-_MOTORS = ("thrust", "thrust_ratio", "propeller_rpm")
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +77,7 @@ def _seconds(time: FloatArray, mask: BoolArray) -> float:
 def _idle(run: Run) -> BoolArray:
     """Where no way is made and the motor, if it is in the log, is off."""
     speed = _speed(run)
-    motor = next((run[m] for m in _MOTORS if run.has(m)), None)
+    motor = next((run[m] for m in MOTORS if run.has(m)), None)
     off = np.zeros(run.time.size, dtype=np.bool_)
     if motor is not None:
         full = float(np.nanpercentile(np.abs(motor), 95))

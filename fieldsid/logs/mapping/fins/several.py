@@ -19,7 +19,7 @@ import numpy as np
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.channels import AXES
 from fieldsid.logs.convert.clock import Track, held
-from fieldsid.logs.convert.servo_counts import COUNTS, FINS, SERVOS, Servo
+from fieldsid.logs.convert.servo_counts import COUNTS, SERVOS, Servo
 from fieldsid.logs.convert.units import pick_unit
 from fieldsid.logs.doctor.together import width_of
 from fieldsid.logs.mapping.canonical_names import words_of
@@ -29,7 +29,7 @@ from fieldsid.logs.mapping.numbers.units_told import Reading, as_counts, fin_rea
 from fieldsid.logs.mapping.trial import Log
 from fieldsid.logs.mapping.vocabulary import COMMANDED, MEASURED, OF_ANOTHER, word_set
 from fieldsid.logs.reader import Inventory, Series
-from fieldsid.logs.run import Note, Run
+from fieldsid.logs.run import FINS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
 OUTPUTS = word_set("servo servomotor actuator actuators rcou output outputs control controls")

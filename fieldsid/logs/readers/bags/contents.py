@@ -12,13 +12,13 @@ import numpy as np
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ChannelMap, Source, Stamp
 from fieldsid.logs.reader import MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, RawLog, ReadOptions, span_of
+from fieldsid.logs.readers._topics import topic_name
 from fieldsid.logs.readers.bags.messages.definitions import DefinitionSearch, decoder_of
 from fieldsid.logs.readers.bags.messages.message_layout import Decoder
 from fieldsid.logs.readers.bags.messages.topic import TopicDecoding, TopicSeries
 from fieldsid.logs.readers.bags.packets import CDR, ROS1, Collector, Connection, TopicPackets, keep_first
 from fieldsid.logs.readers.bags.stores import collected
 from fieldsid.logs.run import Note
-from fieldsid.registry import near
 
 MOST_NUMBERS = 200
 """Numbers in a message beyond which it is a picture or a cloud of points: of those only the first values are told."""
@@ -166,27 +166,12 @@ def check_not_empty(path: Path, collector: Collector) -> None:
 
 
 def _topic(path: Path, collector: Collector, signal: str, source: Source) -> None:
-    if source.topic is None:
-        raise MappingError(
-            f"`{signal}` is mapped to a {source.label}, but `{path}` is a bag",
-            found=source.label,
-            hint="name a `topic` and a `field`",
-            signal=signal,
-        )
-    if source.topic not in collector.connections:
-        raise MappingError(
-            f"`{path}` has no topic `{source.topic}` for `{signal}`",
-            found=", ".join(sorted(collector.connections)) or "no topics",
-            hint=near(source.topic, list(collector.connections)),
-            signal=signal,
-        )
-    if not collector.packets[source.topic].stamps:
-        hint = f"map `{signal}` to another topic"
-        raise LogError(f"topic `{source.topic}` has no messages", found="0 messages", hint=hint, signal=signal)
-    connection = collector.connections[source.topic]
-    if source.topic in collector.mixed:
-        hint = f"map `{signal}` to another topic"
-        raise LogError(f"topic `{source.topic}` cannot be decoded", found="messages of two types", hint=hint, signal=signal)
+    topic, hint = topic_name(path, "a bag", collector.connections, signal, source), f"map `{signal}` to another topic"
+    if not collector.packets[topic].stamps:
+        raise LogError(f"topic `{topic}` has no messages", found="0 messages", hint=hint, signal=signal)
+    if topic in collector.mixed:
+        raise LogError(f"topic `{topic}` cannot be decoded", found="messages of two types", hint=hint, signal=signal)
+    connection = collector.connections[topic]
     if not connection.is_decodable:
         raise undecodable(connection, signal)
 
