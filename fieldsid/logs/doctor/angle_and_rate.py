@@ -12,8 +12,8 @@ from collections.abc import Container
 import numpy as np
 
 from fieldsid.errors import DataError
-from fieldsid.logs.convert.faults.spikes import DIGITS, last_digit
-from fieldsid.logs.convert.units import UNITS, unit_of_ratio
+from fieldsid.logs.convert.faults.spikes import DIGITS, SPREADS, last_digit
+from fieldsid.logs.convert.units import UNIT_LIMIT, UNITS, unit_of_ratio
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.doctor.together import over, together
 from fieldsid.logs.run import SIGNALS, Note, Run
@@ -30,9 +30,8 @@ STRONG, WEAK = 0.9, 0.5
 """Correlation of two signals of which one is the other's rate, and the one below which, at every shift, neither is."""
 MIN_NOISE_RATIO = 4.0
 """How many times its noise a change must be to be judged."""
-SLOPE_LIMIT = 0.15
-JUMP_SPREADS, FASTER, FEWEST_JUMPS = 8.0, 1.5, 2
-"""Standard deviations, and times a step at the rate of a fast tenth of the log, by which an angle and its rate may differ."""
+FASTER, FEWEST_JUMPS = 1.5, 2
+"""Times a step at the rate of a fast tenth of the log by which an angle and its rate may differ, and places that are jumps."""
 JUMP_WIDTHS = (1, 2, 4)
 """Steps over which they are compared."""
 FITS_BETTER = 2.5
@@ -129,7 +128,7 @@ def contradiction(run: Run, angle: str, rate: str) -> str:
 def _is_rate_of(changes: tuple[FloatArray, FloatArray, float], least: float) -> bool:
     """Whether changes of a signal go with the integral of another, one to one and with a correlation above a least one."""
     slope, trust = slope_of(*changes[:2])
-    return trust > least and abs(slope - 1.0) <= SLOPE_LIMIT
+    return trust > least and abs(slope - 1.0) <= UNIT_LIMIT
 
 
 def _unrelated(run: Run, angle: str, rate: str) -> list[Note]:
@@ -199,7 +198,7 @@ def _jumps(run: Run, angle: str, rate: str) -> list[Note]:
     count, size, limit, at = max(found, key=lambda f: f[1] / f[2])
     message = (
         f"{angle} and {rate} disagree at {count} places of {time.size} samples, by up to {size:.3g} rad at {at:.2f} s (limit "
-        f"{limit:.3g} rad, {JUMP_SPREADS:g} standard deviations): one of them jumps where the other does not"
+        f"{limit:.3g} rad, {SPREADS:g} standard deviations): one of them jumps where the other does not"
     )
     return [Note("disagree", message, {"signal": angle, "value": size, "limit": limit, "count": count})]
 
@@ -214,7 +213,7 @@ def _off_over(
     off = over(turned - swept, width)
     off = np.abs(off - np.median(off))
     usual = float(np.median(off)) / MEDIAN_OF_NORMAL
-    limit = max(JUMP_SPREADS * usual, DIGITS * last_digit(turned))
+    limit = max(SPREADS * usual, DIGITS * last_digit(turned))
     odd = np.flatnonzero(off > np.maximum(limit, fastest * np.diff(time)[width - 1 :]))
     places = 1 + int(np.count_nonzero(np.diff(odd) > width)) if odd.size else 0
     if places < FEWEST_JUMPS or usual == 0.0:
@@ -266,9 +265,9 @@ def _of_slope(angle: str, rate: str, slope: float, stated: Stated) -> list[Note]
         advice, unit = _in_degrees(rate, goes_as, angle, stated)
         message = f"{rate} is {1 / size:.3g} times the change of {angle}, as numbers in {goes_as} are: {advice}"
         found.append(Note("unit", message, {**data, "goes_as": goes_as, **unit}))
-    elif abs(size - 1.0) > SLOPE_LIMIT:
-        message = f"{angle} changes {size:.3g} times as fast as {rate} says (limit 1 +/- {SLOPE_LIMIT:g}): check both scales"
-        found.append(Note("rate_scale", message, {**data, "limit": SLOPE_LIMIT}))
+    elif abs(size - 1.0) > UNIT_LIMIT:
+        message = f"{angle} changes {size:.3g} times as fast as {rate} says (limit 1 +/- {UNIT_LIMIT:g}): check both scales"
+        found.append(Note("rate_scale", message, {**data, "limit": UNIT_LIMIT}))
     return found
 
 

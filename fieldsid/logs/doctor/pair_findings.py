@@ -25,6 +25,7 @@ SPEEDS = {unit: factor_to("surge_m_s", unit) for unit in ("kn", "mph", "km/h", "
 LEAST_WAY, MOST_WAY = 0.6, 1.5
 """How many times the speed the way made in a second may be: a current and a slip lie between."""
 SLOWEST = 0.1
+"""Speed in m/s below which the way made is the sensors' noise."""
 SLOW_RPM = 30.0
 MOST_ADVANCE_M = 4.0
 """Way made in a turn of a propeller that is larger than any this program's vehicles have."""
@@ -126,8 +127,6 @@ DEPTHS = {unit: factor_to("depth_m", unit) for unit in ("ft", "fathom", "cm", "m
 """Units in which a depth is logged, in m."""
 HEADINGS = {"deg": math.degrees(1.0), "rad": math.radians(1.0)}
 """Units in which a heading is that was taken for the other one, by how many times as far it turns."""
-SLOWEST_M_S = 0.1
-"""Speed below which the way made is the sensors' noise."""
 SPREADS = 4.0
 """Standard deviations by which a correlation must be off zero, by Fisher's z = atanh(r) over windows that share no sample."""
 
@@ -166,7 +165,7 @@ def course_of(run: Run, window_s: float = WINDOW_S) -> Course | None:
     time, x, y, yaw = seen
     dx, dy = over(x, width), over(y, width)
     way = np.hypot(dx, dy)
-    moved = way > SLOWEST_M_S * window_s
+    moved = way > SLOWEST * window_s
     heading = trapezoid_integral(time, yaw)
     mean, rate = (over(v, width) / over(time, width) for v in (heading, yaw))
     if moved.sum() < FEWEST_MOVED:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs.channels import Source, TableForm
 from fieldsid.logs.convert.conditioning import in_order
+from fieldsid.logs.convert.times.clock_parts import MOSTLY
 from fieldsid.logs.convert.times.clock_text import DAY_S, clock_of_text
 from fieldsid.logs.convert.times.time_column import YEARS_S, likely_time_unit
 from fieldsid.logs.mapping.canonical_names import unit_in_name, words_of
@@ -24,8 +25,6 @@ from fieldsid.logs.readers._columns import Columns, is_counter, numbers_mostly, 
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
-MOSTLY = 0.9
-"""Share of the steps of a column that go on, from which it is taken for time: a damaged log may go back here and there."""
 REGULAR = 0.5
 """Standard deviation of the steps over their mean, up to which a column that nobody named goes on like time."""
 OF_WEEK = (

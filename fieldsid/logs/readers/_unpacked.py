@@ -12,7 +12,7 @@ from pathlib import Path
 from fieldsid.errors import LogError
 
 GZIP = b"\x1f\x8b"
-BLOCK = 1 << 20
+PIECE_BYTES = 1 << 20
 SMALL = 128 << 20
 """Unpacked bytes that are read however they were packed."""
 MOST_TIMES = 300
@@ -53,8 +53,8 @@ def inflated(path: Path) -> tuple[bytes, bool]:
         return raw, False
     unpack, out, size = zlib.decompressobj(wbits=31), bytearray(), UnpackedSize(path)
     try:
-        for start in range(0, len(raw), BLOCK):
-            piece = unpack.decompress(raw[start : start + BLOCK], size.left + 1)
+        for start in range(0, len(raw), PIECE_BYTES):
+            piece = unpack.decompress(raw[start : start + PIECE_BYTES], size.left + 1)
             size.add(len(piece))
             out += piece
     except zlib.error:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.logs.convert.conditioning import MAIN, blocks_of
+from fieldsid.logs.convert.conditioning import MAIN, OWN_STEPS, blocks_of
 from fieldsid.logs.run import MOTORS, Note, Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
@@ -26,7 +26,6 @@ LEAST_SPEED = 0.1
 DIVES_M, DIVES = 1.0, 0.2
 """Depth in m, and share of the log below it, from which on a log is one of dives."""
 SURFACE_M = 0.3
-GAP_STEPS = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +51,7 @@ def stretches_of(run: Run) -> tuple[tuple[Stretch, ...], tuple[Note, ...]]:
     }
     off = {why: _long(run.time, mask) for why, mask in reasons.items()}
     away = np.any(np.stack(list(off.values())), axis=0)
-    breaks = np.flatnonzero((np.diff(run.time) > max(OFF_S, GAP_STEPS * float(np.median(np.diff(run.time))))) | np.diff(away)) + 1
+    breaks = np.flatnonzero((np.diff(run.time) > max(OFF_S, OWN_STEPS * float(np.median(np.diff(run.time))))) | np.diff(away)) + 1
     parts = [p for p in np.split(np.arange(run.time.size), breaks) if not away[p[0]]]
     kept = tuple(s for p in parts if (s := Stretch(float(run.time[p[0]]), float(run.time[p[-1]]))).end_s - s.start_s >= LEAST_S)
     if not kept or kept == whole:

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.number_cells import as_numbers
-from fieldsid.logs.convert.times.dates import DATE, days_of, texts
+from fieldsid.logs.convert.times.dates import DATE, MOSTLY, days_of, stamps_in, texts
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
@@ -35,8 +35,6 @@ IN_WORDS = (
     "%a, %d %b %Y %H:%M:%S",
 )  # fmt: skip
 """Dates in words as the C library, spreadsheets and mail write them."""
-MOSTLY = 0.5
-"""Share of the cells that must be of a form for a column to be taken for it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,13 +126,8 @@ def _of_a_day(cells: npt.NDArray[Any]) -> Clock | None:
 
 def _in_words(cells: npt.NDArray[Any]) -> FloatArray | None:
     """Return the seconds (n,) since 1970 of dates that name the month before the day; None where less than half are."""
-    import pandas as pd
-
-    for form in IN_WORDS:
-        stamps = pd.to_datetime(texts(cells), format=form, errors="coerce").to_numpy(dtype="datetime64[us]")
-        if np.isnat(stamps).mean() < 1.0 - MOSTLY:
-            return np.where(np.isnat(stamps), np.nan, stamps.astype(np.int64) / 1e6)
-    return None
+    stamps = stamps_in(texts(cells), IN_WORDS)
+    return None if stamps is None else np.where(np.isnat(stamps), np.nan, stamps.astype(np.int64) / 1e6)
 
 
 def lost_hours(name: str, times: int, period_s: float) -> Note:

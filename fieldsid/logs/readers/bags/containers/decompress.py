@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from fieldsid.errors import LogError
-from fieldsid.logs.readers._unpacked import MOST_TIMES, UnpackedSize
+from fieldsid.logs.readers._unpacked import MOST_TIMES, PIECE_BYTES, UnpackedSize
 
-PIECE_BYTES = 1 << 20
 LARGEST = 1 << 26
 """Bytes of a chunk or message that is one: recorders write some 1e6, and a few packed bytes may claim any number. Larger ones are
 unpacked where so many are packed that they can be meant."""
