@@ -113,16 +113,12 @@ def not_a_log(path: Path, suffixes: Sequence[str]) -> LogError:
         return LogError(f"`{path}` starts as a log of another kind does, and is none", found=size, hint=COPY_AGAIN)
     for signature, (what, way) in FOREIGN.items():
         if head.startswith(signature):
-            return _of_foreign(path, what, way.format(path=quote(str(path))))
+            hint = way.format(path=quote(str(path)))
+            return LogError(f"`{path}` is {what}, for which no reader is installed", found=size, hint=hint)
     for signature, what in NO_LOG.items():
         if head.startswith(signature):
             return LogError(f"`{path}` is {what}, not a log", found=size, hint=give)
     return LogError(f"`{path}` is no log this program reads", found=f"{size} with no known signature", hint=give)
-
-
-def _of_foreign(path: Path, what: str, way: str) -> LogError:
-    size = path.stat().st_size
-    return LogError(f"`{path}` is {what}, for which no reader is installed", found=f"{size} bytes", hint=way)
 
 
 def own_kind(path: Path) -> str | None:

@@ -197,7 +197,8 @@ def _quaternion(signal: str, series: Series, source: Source, mapping: ChannelMap
     angles = dict(zip(ANGLES, angles_of_quaternion(xyzw, source.frame or mapping.frame), strict=True))
     wanted = ANGLES if signal == ATTITUDE else (signal,)
     if signal != ATTITUDE and signal not in ANGLES:
-        raise MappingError(f"`{signal}` cannot come from a quaternion", found=series.label, hint="map one number", signal=signal)
+        hint = f"name one number: `{source.path}.x`" if source.topic else "map one number"
+        raise MappingError(f"`{signal}` cannot come from a quaternion", found=series.label, hint=hint, signal=signal)
     return {n: angles[n] + source.offset if source.offset and n == "yaw_rad" else angles[n] for n in wanted}
 
 

@@ -95,7 +95,8 @@ def _rows(log: Any, *, is_flash: bool) -> tuple[Rows, dict[str, float]]:
         if message.get_type() in PARAMETERS:
             name, value = (getattr(message, field) for field in PARAMETERS[message.get_type()])
             parameters[str(name)] = float(value)
-        name, time, fields = _of_flash(message) if is_flash else _of_packet(message)
+        fields = {k: v for k, v in message.to_dict().items() if isinstance(v, (int, float)) and not isinstance(v, bool)}
+        name, time = _of_flash(message, fields) if is_flash else _of_packet(message)
         if time is not None and fields:
             rows.setdefault(name, []).append((time, fields))
     return rows, parameters
@@ -117,18 +118,17 @@ def _flash(path: Path) -> Any:
     return log
 
 
-def _of_flash(message: Any) -> tuple[str, float | None, dict[str, float]]:
-    body = {k: v for k, v in message.to_dict().items() if isinstance(v, (int, float)) and not isinstance(v, bool)}
+def _of_flash(message: Any, body: dict[str, float]) -> tuple[str, float | None]:
+    """Return the name and the time in s of a message of the vehicle, which are taken out of its numbers."""
     stamp, unit_s = (body.pop("TimeUS"), 1e-6) if "TimeUS" in body else (body.pop("TimeMS", None), 1e-3)
     # without the units of its fields a format does not say which is the number of the sensor: then it stands behind the time
     which = getattr(message.fmt, "instance_field", None) or ("I" if list(message.fmt.columns[1:2]) == ["I"] else None)
     name = f"{message.get_type()}[{int(body.pop(which))}]" if which in body else message.get_type()
-    return name, None if stamp is None else float(stamp) * unit_s, body
+    return name, None if stamp is None else float(stamp) * unit_s
 
 
-def _of_packet(message: Any) -> tuple[str, float | None, dict[str, float]]:
-    body = {k: v for k, v in message.to_dict().items() if isinstance(v, (int, float)) and not isinstance(v, bool)}
-    return message.get_type(), float(message._timestamp), body  # noqa: SLF001 - pymavlink's only name for the log's time
+def _of_packet(message: Any) -> tuple[str, float]:
+    return message.get_type(), float(message._timestamp)  # noqa: SLF001 - pymavlink's only name for the log's time
 
 
 def _cut(path: Path) -> tuple[Note, ...]:

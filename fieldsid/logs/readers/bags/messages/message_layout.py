@@ -315,12 +315,10 @@ class Decoder:
                 block, rows = block[1:], rows[1:]
                 continue
             places = [numbers_at(layout, p) for p in paths]
-            same = np.zeros(rows.size, dtype=bool)
-            same[0] = True
-            if tried < ROWS_APART:
-                same = np.ones(rows.size, dtype=bool)
-                for begin, end in layout.guards:
-                    same &= (block[:, begin:end] == block[0, begin:end]).all(axis=1)
+            same = np.ones(rows.size, dtype=bool)
+            same[1:] = tried < ROWS_APART
+            for begin, end in layout.guards if tried < ROWS_APART else ():
+                same &= (block[:, begin:end] == block[0, begin:end]).all(axis=1)
             _take(block[same], rows[same], places, out)
             block, rows = (block[~same], rows[~same]) if tried < ROWS_APART else (block[1:], rows[1:])
             tried += 1

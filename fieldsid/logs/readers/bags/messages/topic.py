@@ -56,16 +56,10 @@ class TopicSeries:
     def series(self, signal: str, stamps: Stamps, origin: int) -> Series:
         """Return one signal's series, in seconds from `origin`."""
         path = self.paths[signal]
-        last = path.rpartition(".")[2]
-        stated = (
-            "Pa"
-            if self.connection.type_name == PRESSURE
-            else unit_of_field(self.connection.topic, path, signal)
-            if signal != ATTITUDE
-            else None
-        )
+        stated = None if signal == ATTITUDE else unit_of_field(self.connection.topic, path, signal)
+        unit = "Pa" if self.connection.type_name == PRESSURE else stated
         label = f"{self.connection.topic}.{path}" if path else self.connection.topic
-        return Series((stamps - origin) / 1e9, self.values[signal], label, stated, last == "z")
+        return Series((stamps - origin) / 1e9, self.values[signal], label, unit, path.rpartition(".")[2] == "z")
 
 
 class TopicDecoding:
@@ -175,13 +169,6 @@ def field_of(connection: Connection, layout: Layout, signal: str, path: str) -> 
             f"`{ATTITUDE}` needs a quaternion, not `{path}` of `{connection.topic}`",
             found=f"quaternions: {', '.join(quaternions_in(layout)) or 'none'}",
             hint="give the field that holds x, y, z, w",
-            signal=signal,
-        )
-    if len(places) == 4 and signal not in (ATTITUDE, "yaw_rad", "pitch_rad", "roll_rad"):
-        raise MappingError(
-            f"`{signal}` cannot come from a quaternion",
-            found=f"{connection.topic}.{path}",
-            hint=f"name one number: `{path}.x`",
             signal=signal,
         )
     return path
