@@ -197,8 +197,9 @@ class _Table:
             return ERRORS.sub(b"", raw) if said else raw
 
         self._copied(plain, without)
-        message = f"cells that say there is no number, as {found[0].decode()!r}, taken as missing: {len(found)}"
-        self.notes.append(Note("error_cells", message, {"count": len(found)}))
+        if found:
+            message = f"cells that say there is no number, as {found[0].decode()!r}, taken as missing: {len(found)}"
+            self.notes.append(Note("error_cells", message, {"count": len(found)}))
 
     def _without_sentences(self, plain: IO[bytes]) -> None:
         """Leave an empty line for each sentence of NMEA among the rows."""
@@ -210,9 +211,10 @@ class _Table:
             return b"\n" if is_sentence else raw
 
         self._copied(plain, without)
-        first = found[0].decode("latin-1").strip()[:60]
-        message = f"lines of another talker (NMEA 0183) between the rows, left out: {len(found)}, the first {first!r}"
-        self.notes.append(Note("nmea_lines", message, {"count": len(found)}))
+        if found:
+            first = found[0].decode("latin-1").strip()[:60]
+            message = f"lines of another talker (NMEA 0183) between the rows, left out: {len(found)}, the first {first!r}"
+            self.notes.append(Note("nmea_lines", message, {"count": len(found)}))
 
     def _without_words(self, plain: IO[bytes]) -> bool:
         """Leave an empty line for each line without a number that is no row; return whether there was one."""
@@ -225,8 +227,9 @@ class _Table:
             return raw if is_row else b"\n"
 
         self._copied(plain, without)
-        message = f"lines of words between the rows, left out: {len(found)}, the first {found[0][:60]!r}" if found else ""
-        self.notes += [Note("text_rows", message, {"count": len(found)})] if found else []
+        if found:
+            message = f"lines of words between the rows, left out: {len(found)}, the first {found[0][:60]!r}"
+            self.notes.append(Note("text_rows", message, {"count": len(found)}))
         return bool(found)
 
     def _parsed(self, wanted: Sequence[int]) -> dict[int, npt.NDArray[Any]]:

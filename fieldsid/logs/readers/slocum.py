@@ -55,8 +55,9 @@ def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
             log = dbdreader.DBD(str(path), cacheDir=own)
             log.close()  # it opens the file again to read it
             _refuse_other_lengths(path, log)
-            names = log.parameterNames
-            found = _sensors(log, sorted(wanted) if wanted and wanted <= {*names} else names)
+            found = _sensors(log, sorted(wanted.intersection(log.parameterNames)))
+            if not wanted or any(found.get(name) is None for name in wanted):
+                found = _sensors(log, log.parameterNames)
     except (*_FAILURES, dbdreader.DbdError) as error:
         raise unreadable(path, "a Slocum glider's log that cannot be read", error) from error
     return Topics(found, MEANS, _cut(path))

@@ -37,9 +37,9 @@ def days_of(cells: npt.NDArray[Any]) -> FloatArray | None:
     if digits is not None:
         return _of_digits(digits)
     words = texts(cells)
-    by_week = stamps_in(words.where(words.str.fullmatch(OF_WEEK_OR_YEAR)), ("%G-W%V-%u", "%Y-%j"))
-    if by_week is not None:
-        return _as_days(by_week)
+    if words.str.fullmatch(OF_WEEK_OR_YEAR).fillna(value=False).mean() > MOSTLY:
+        by_week = stamps_in(words, ("%G-W%V-%u", "%Y-%j"))
+        return None if by_week is None else _as_days(by_week)
     parts = words.str.extract(f"^{DATE.pattern}$")
     if parts[0].notna().mean() <= MOSTLY:
         return None
