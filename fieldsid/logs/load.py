@@ -79,7 +79,7 @@ def _judged_anew(run: Run, fin_max_rad: Mapping[str, float]) -> Run:
     kept = tuple(n for n in run.notes if n.code not in OF_LIMITS)
     if not fin_max_rad:
         return replace(run, notes=kept)
-    from fieldsid.logs.doctor.limit_findings import limit_findings
+    from fieldsid.logs.doctor.fin_findings import limit_findings
 
     return replace(run, notes=(*kept, *limit_findings(run, fin_max_rad)))
 

@@ -50,10 +50,14 @@ SIGNALS: Mapping[str, str] = MappingProxyType(
     }
 )
 """Canonical signal names and their units; `thrust` may be in any unit."""
+FINS = ("rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad")
+"""What fins were told, and what they did."""
+MOTORS = ("thrust", "thrust_ratio", "propeller_rpm")
+"""What the propulsion was told, or did: its scale bears on no estimate."""
 PART = "["
 """What stands behind a signal in the name of an entry of its sum: `rudder_rad[0]`."""
 STEP_LINES: Mapping[str, tuple[str, str]] = MappingProxyType(
-    {fin: (f"{fin[:-4]}_from_rad", f"{fin[:-4]}_to_rad") for fin in SIGNALS if fin.startswith(("rudder", "elevator"))}
+    {fin: (f"{fin[:-4]}_from_rad", f"{fin[:-4]}_to_rad") for fin in FINS}
 )
 """Beside a fin that moves between the run's samples: start and end of its line over the step that each sample begins.
 

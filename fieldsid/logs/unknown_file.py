@@ -46,9 +46,22 @@ _OWN = re.compile(rb"^\s*\{?\s*[\"']?schema[\"']?\s*:\s*[\"']?(fieldsid/([a-z-]+
 _HEAD = 4096
 
 
+def head_of(path: Path) -> bytes:
+    """Return how a file starts; nothing of a folder."""
+    if path.is_dir():
+        return b""
+    with path.open("rb") as stream:
+        return stream.read(_HEAD)
+
+
+def unreadable(path: Path, what: str, error: Exception) -> LogError:
+    """Return the error of a log that what reads it does not take: `what` it is, and the library's own words."""
+    return LogError(f"`{path}` is {what}", found=f"{type(error).__name__}: {error}"[:160], hint=COPY_AGAIN)
+
+
 def is_text(path: Path) -> bool:
     """Whether a file may hold a table of text: no known format, and no zero bytes, or as many as UTF-16 has."""
-    head = _head_of(path)
+    head = head_of(path)
     if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return True
     if head.startswith((*FOREIGN, *NO_LOG)) or _is_read_elsewhere(head) or _OWN.search(head):
@@ -92,7 +105,7 @@ def not_a_log(path: Path, suffixes: Sequence[str]) -> LogError:
     give = f"give a log: {', '.join(suffixes)}"
     if path.is_dir():
         return _of_folder(path, suffixes, give)
-    head, size = _head_of(path), f"{path.stat().st_size} bytes"
+    head, size = head_of(path), f"{path.stat().st_size} bytes"
     own = _OWN.search(head)
     if own is not None:
         return _of_own(path, own[1].decode(), own[2].decode(), give)
@@ -100,22 +113,18 @@ def not_a_log(path: Path, suffixes: Sequence[str]) -> LogError:
         return LogError(f"`{path}` starts as a log of another kind does, and is none", found=size, hint=COPY_AGAIN)
     for signature, (what, way) in FOREIGN.items():
         if head.startswith(signature):
-            return _of_foreign(path, what, way.format(path=quote(str(path))))
+            hint = way.format(path=quote(str(path)))
+            return LogError(f"`{path}` is {what}, for which no reader is installed", found=size, hint=hint)
     for signature, what in NO_LOG.items():
         if head.startswith(signature):
             return LogError(f"`{path}` is {what}, not a log", found=size, hint=give)
     return LogError(f"`{path}` is no log this program reads", found=f"{size} with no known signature", hint=give)
 
 
-def _of_foreign(path: Path, what: str, way: str) -> LogError:
-    size = path.stat().st_size
-    return LogError(f"`{path}` is {what}, for which no reader is installed", found=f"{size} bytes", hint=way)
-
-
 def own_kind(path: Path) -> str | None:
     """Return which file of this program a file is, by its schema: "model", "fit" and so on; None for any other."""
     try:
-        found = _OWN.search(_head_of(path)) if path.is_file() else None
+        found = _OWN.search(head_of(path)) if path.is_file() else None
     except OSError:  # who reads it says why it cannot be read
         return None
     return None if found is None else found[2].decode()
@@ -139,8 +148,3 @@ def _of_folder(path: Path, suffixes: Sequence[str], give: str) -> LogError:
     shown = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
     hint = f"give the logs in it: `{quote(str(path))}/*{known[0][0]}`" if known else give
     return LogError(f"`{path}` is a folder, and no bag", found=f"it holds {shown or 'nothing'}", hint=hint)
-
-
-def _head_of(path: Path) -> bytes:
-    with path.open("rb") as stream:
-        return stream.read(_HEAD)

@@ -23,7 +23,7 @@ from fieldsid.errors import ArtifactError, LogError, UsageError
 from fieldsid.exports._patch import patch_yaml
 from fieldsid.logs.inspection import inspect_log
 from fieldsid.logs.readers._mat_elements import refuse_damaged
-from fieldsid.logs.readers._unpacked_size import SMALL, UnpackedSize
+from fieldsid.logs.readers._unpacked import SMALL, UnpackedSize
 from fieldsid.logs.readers.bags.messages.definitions import _parsed
 from fieldsid.logs.readers.bags.messages.message_layout import refuse_endless
 from fieldsid.models.axis import Axis

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fieldsid.fitting.fin_offset import offset_of
-from fieldsid.logs.doctor.limit_findings import BEYOND_SHARE, share_beyond
+from fieldsid.logs.doctor.fin_findings import BEYOND_SHARE, share_beyond
 from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model

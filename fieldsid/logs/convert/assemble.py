@@ -11,22 +11,22 @@ import numpy as np
 
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, ChannelMap, Source
-from fieldsid.logs.convert.clock import Track, one_clock, summed
+from fieldsid.logs.convert.clock import ANGLES_AND_RATES, Track, one_clock, summed
 from fieldsid.logs.convert.conditioning import MAX_GAP_S, in_order, possible, refuse_impossible_steps, refuse_long_gaps
 from fieldsid.logs.convert.faults.dropouts import SENSED, without_dropouts
 from fieldsid.logs.convert.faults.heading_fills import without_fills
 from fieldsid.logs.convert.faults.repeats import without_repeats
-from fieldsid.logs.convert.frames import SWAPPED_BY_WORLD, about_level, angles_of_quaternion, to_ned_frd
-from fieldsid.logs.convert.geodetic import north_and_east
+from fieldsid.logs.convert.frames import SWAPPED_BY_WORLD, about_level, angles_of_quaternion, north_and_east, to_ned_frd
 from fieldsid.logs.convert.heading_unwrap import unwrapped_over
-from fieldsid.logs.convert.readings import by_reading
 from fieldsid.logs.convert.servo_counts import counts_unit, turned_from_counts
 from fieldsid.logs.convert.units import DEGREE, depth_of_pressure, factor_to, pick_unit, scaled
 from fieldsid.logs.reader import RawLog, ReadOptions, Series
 from fieldsid.logs.run import COLUMNS, PART, Note, Run, signal_of
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 WHOLE = (-np.inf, np.inf)
+BESIDE = 0.5
+"""Share of a signal's numbers beside which the fastest angle or rate has one, below which it has rows of its own."""
 
 
 def assemble(
@@ -48,7 +48,7 @@ def assemble(
         time = next(iter(raw.series.values())).time if raw.series else np.zeros(0)
         run = Run(raw.name, time, {s: v.values for s, v in raw.series.items()}, path, raw.notes)
         return run if part == WHOLE else run.between(*part)
-    raw = by_reading(raw)
+    raw = _by_reading(raw)
     notes = list(raw.notes)
     tracks: dict[str, Track] = {}
     for signal, series in raw.series.items():
@@ -96,6 +96,30 @@ def _counted(time: FloatArray, notes: Sequence[Note]) -> str:
 
 def _inspect(path: Path | None) -> str:
     return f"`sysid inspect {'LOG' if path is None else quote(str(path))}`"
+
+
+def _by_reading(raw: RawLog) -> RawLog:
+    """Return a table of one row a reading as signals on clocks of their own; any other log as it is.
+
+    Most cells of such a table are blank. A table of one row for all has blanks too where a sensor is slower or fails: there what
+    the slower one has stands beside the faster one's number. Here it does not: no clock is that of the rows.
+    """
+    seen = {signal: _rows_of(series) for signal, series in raw.series.items()}
+    filled = {signal: rows for signal, rows in seen.items() if rows.any()}
+    if not raw.one_clock or not filled or all(rows.all() for rows in filled.values()):
+        return raw
+    base = max([s for s in (ATTITUDE, *ANGLES_AND_RATES) if s in filled] or filled, key=lambda s: int(filled[s].sum()))
+    if all((rows & filled[base]).sum() >= BESIDE * rows.sum() for rows in filled.values()):
+        return raw
+    series = {
+        s: replace(raw.series[s], time=raw.series[s].time[rows], values=raw.series[s].values[rows]) for s, rows in filled.items()
+    }
+    return replace(raw, series=series, one_clock=False)
+
+
+def _rows_of(series: Series) -> BoolArray:
+    """Return the rows (n,) with a number of a signal."""
+    return np.asarray(np.isfinite(series.values.reshape(series.time.size, -1)).all(axis=1))
 
 
 def _on_one_clock(
@@ -173,7 +197,8 @@ def _quaternion(signal: str, series: Series, source: Source, mapping: ChannelMap
     angles = dict(zip(ANGLES, angles_of_quaternion(xyzw, source.frame or mapping.frame), strict=True))
     wanted = ANGLES if signal == ATTITUDE else (signal,)
     if signal != ATTITUDE and signal not in ANGLES:
-        raise MappingError(f"`{signal}` cannot come from a quaternion", found=series.label, hint="map one number", signal=signal)
+        hint = f"name one number: `{source.path}.x`" if source.topic else "map one number"
+        raise MappingError(f"`{signal}` cannot come from a quaternion", found=series.label, hint=hint, signal=signal)
     return {n: angles[n] + source.offset if source.offset and n == "yaw_rad" else angles[n] for n in wanted}
 
 

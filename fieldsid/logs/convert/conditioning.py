@@ -11,8 +11,8 @@ import numpy.typing as npt
 from fieldsid.errors import LogError
 from fieldsid.logs.convert.times.time_column import unit_of_step
 from fieldsid.logs.reader import ReadOptions
-from fieldsid.logs.run import Note
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.logs.run import FINS, Note
+from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 MAX_GAP_S = 2.0
 """A main signal missing for longer than this inside a run is refused unless the user raises the limit."""
@@ -24,10 +24,7 @@ WORTH_TAKING = 10
 ROUNDING = 1.01
 """What a gap of just the limit may be over it, by the rounding and the jitter of the times."""
 
-MAIN = (
-    "yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s",
-    "rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad",
-)  # fmt: skip
+MAIN = ("yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s", *FINS)
 """Signals that identification stands on."""
 
 
@@ -155,3 +152,9 @@ def _longest_without(time: FloatArray, gaps: Sequence[Gap]) -> tuple[float, floa
         parts.append((begin, gap.start_s))
         begin = max(begin, gap.end_s)
     return max([*parts, (begin, float(time[-1]))], key=lambda part: part[1] - part[0])
+
+
+def blocks_of(mask: BoolArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Return where the blocks of a mask (n,) begin, and where the samples behind them are."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return edges[::2], edges[1::2]

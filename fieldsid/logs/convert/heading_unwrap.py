@@ -35,20 +35,14 @@ SLACK_RAD_S = 0.5
 MIN_JUMP_RAD = 0.03
 NOISES = 6.0
 """What stands out is more than this many standard deviations of the noise, and more than `MIN_JUMP_RAD`."""
-LOUDEST_RAD = 1.0
-"""Where only more than this stands out of the noise, nothing can be concluded from it."""
 NEIGHBOURS = 8
 """Steps on each side that say what the motion is."""
-LOOK_AHEAD = 3
-"""Steps among which one must stand out for the line to go on: noise may hide one."""
 HELD_S = 1.0
 """A heading held at the wrap comes back to it within this time."""
 AGREES = (0.7, 1.4)
 """Slopes of the heading's steps on the integrated rate between which the rate is trusted."""
-STAIR_RAD = 0.5
-"""A step up to this size counts as noise where such steps are many: a heading that is held between its own samples."""
-RARE, HELD = 0.02, 0.8
-"""Shares of samples that bend: below the first they tell no noise, below the second the heading is held."""
+RARE = 0.02
+"""Share of samples that bend, below which they tell no noise."""
 SHOWN = 5
 
 
@@ -122,32 +116,38 @@ class _Path:
         """What stands out as excess between two samples, in rad."""
         return self.least + SLACK_RAD_S * self.duration(first, last)
 
+    def stands_out(self, step: int, sign: float) -> bool:
+        """Whether a step makes more than the motion does, with a sign."""
+        return sign * self.excess(step, step + 1) > self.bar(step, step + 1)
+
 
 def _path(time: FloatArray, values: FloatArray, rate: Track | None) -> _Path | None:
     """Return what a crossing is judged by; None where no step is too fast, or too many are, or noise hides them."""
     steps, dt = np.diff(values), np.diff(time)
-    turned = steps - TURN * np.round(steps / TURN)
-    noise = noise_of_steps(np.where(np.abs(turned) > np.maximum(FASTEST_RAD_S * dt, STAIR_RAD), np.nan, turned))
+    turned = within_half_turn(steps)
+    noise = noise_of_steps(np.where(np.abs(turned) > FASTEST_RAD_S * dt, np.nan, turned))
     least = max(MIN_JUMP_RAD, NOISES * math.sqrt(2.0) * noise)
     limit = np.maximum(FASTEST_RAD_S * dt, least)
     jumps = np.flatnonzero(np.abs(steps) > limit)
     spread = float(np.ptp(values)) - TURN
-    if not jumps.size or least > LOUDEST_RAD or (2 * jumps.size > steps.size and spread > least):
+    if not jumps.size or (2 * jumps.size > steps.size and spread > least):
         return None
     calm = np.flatnonzero(np.abs(turned) <= limit)
     return _Path(time, values, least, _swept(time, turned, calm, rate), turned / dt, calm, jumps, abs(spread) <= 2.0 * least)
+
+
+def within_half_turn(angle: FloatArray) -> FloatArray:
+    """Return angles (n,) in rad within half a turn."""
+    return np.asarray(angle - TURN * np.round(angle / TURN))
 
 
 def noise_of_steps(turned: FloatArray) -> float:
     """Return the standard deviation of white noise on a heading from its steps (n-1,), NaN where they are no motion."""
     bends = np.abs(np.diff(turned))
     bends = bends[np.isfinite(bends)]
-    # A value that is held or comes in steps bends only now and then, by a step each time: its noise is in those, unless
-    # they are the exception.
+    # A value that is held bends only now and then, by a step each time: its noise is in those, unless they are the exception.
     some = bends[bends > 1e-9]
-    if some.size <= RARE * bends.size:
-        return 0.0
-    return robust_white_noise_std(some, 2 if some.size > HELD * bends.size else 1)
+    return 0.0 if some.size <= RARE * bends.size else robust_white_noise_std(some, 2)
 
 
 def _swept(time: FloatArray, turned: FloatArray, calm: npt.NDArray[np.intp], rate: Track | None) -> FloatArray | None:
@@ -168,12 +168,11 @@ def _swept(time: FloatArray, turned: FloatArray, calm: npt.NDArray[np.intp], rat
 
 def _crossings(path: _Path) -> Iterator[tuple[int, int]]:
     """Yield the samples on both sides of each line across the wrap, in order."""
-    ends = _ends(path)
     done = 0
     for jump in path.jumps.tolist():
         if jump < done:
             continue
-        found = _line(path, jump) or _there_and_back(path, jump, ends)
+        found = _line(path, jump) or (_there_and_back(path, jump) if path.is_whole else None)
         if found is not None:
             yield found
             done = found[1]
@@ -183,53 +182,27 @@ def _line(path: _Path, jump: int) -> tuple[int, int] | None:
     """Return the ends of the run of steps about a jump that stand out with its sign, if together they are a turn."""
     sign = math.copysign(1.0, path.values[jump + 1] - path.values[jump])
     first, last = jump, jump + 1
-    while (step := _next(path, sign, range(first - 1, max(first - 1 - LOOK_AHEAD, -1), -1))) is not None:
-        first = step
-    while (step := _next(path, sign, range(last, min(last + LOOK_AHEAD, path.time.size - 1)))) is not None:
-        last = step + 1
+    while first > 0 and path.stands_out(first - 1, sign):
+        first -= 1
+    while last < path.time.size - 1 and path.stands_out(last, sign):
+        last += 1
     off = abs(path.excess(first, last) - sign * TURN)
     whole = last - first > 1 and path.duration(first, last) <= TURN / FASTEST_RAD_S
     return (first, last) if whole and off <= path.bar(first, last) else None
 
 
-def _next(path: _Path, sign: float, steps: range) -> int | None:
-    """Return the first of the steps that stands out with the sign, if none before it does against it."""
-    for step in steps:
-        excess, bar = sign * path.excess(step, step + 1), path.bar(step, step + 1)
-        if excess > bar:
-            return step
-        if excess < -bar:
-            return None
-    return None
-
-
-def _ends(path: _Path) -> tuple[float, float] | None:
-    """Return both ends of the range, in rad, or None where no end is reached.
-
-    One that is reached from one side only is told by its value, which is a multiple of a right angle in every frame.
-    """
-    low, high = float(path.values.min()), float(path.values.max())
-    if path.is_whole:
-        return low, high
-    square = [abs(math.remainder(end, 0.5 * math.pi)) <= 2.0 * path.least for end in (low, high)]
-    if high - low > TURN or square[0] == square[1]:
-        return None
-    return (low, low + TURN) if square[0] else (high - TURN, high)
-
-
-def _there_and_back(path: _Path, jump: int, ends: tuple[float, float] | None) -> tuple[int, int] | None:
+def _there_and_back(path: _Path, jump: int) -> tuple[int, int] | None:
     """Return the samples at the ends of the range about an excursion from there that no motion makes.
 
     One that the log begins or ends in has -1 or n for the sample it does not hold.
     """
-    if ends is None:
-        return None
+    low, high = float(path.values.min()), float(path.values.max())
     start, stop = np.searchsorted(path.time, (path.time[jump] - HELD_S, path.time[jump] + HELD_S)).tolist()
     part = path.values[start:stop]
-    at_wrap = (start + np.flatnonzero(np.minimum(part - ends[0], ends[1] - part) <= 2.0 * path.least)).tolist()
+    at_wrap = (start + np.flatnonzero(np.minimum(part - low, high - part) <= 2.0 * path.least)).tolist()
     middle = bisect_right(at_wrap, jump)
-    first = at_wrap[middle - 1] if middle > 0 else -1 if path.is_whole and start == 0 else None
-    last = at_wrap[middle] if middle < len(at_wrap) else path.time.size if path.is_whole and stop == path.time.size else None
+    first = at_wrap[middle - 1] if middle > 0 else -1 if start == 0 else None
+    last = at_wrap[middle] if middle < len(at_wrap) else path.time.size if stop == path.time.size else None
     if not at_wrap or first is None or last is None or last - first < 2:
         return None
     steps = range(max(first, 0), min(last, path.time.size - 1))

@@ -15,13 +15,12 @@ from types import MappingProxyType
 import numpy as np
 
 from fieldsid.logs.convert.units import find_unit
-from fieldsid.logs.run import Note, signal_of
+from fieldsid.logs.run import FINS, MOTORS, Note, signal_of
 from fieldsid.numerics.arrays import FloatArray
 
 COUNTS = "counts"
-FINS = ("rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad")
 COUNTED = (*FINS, "thrust", "thrust_ratio")
-SUMMED = (*COUNTED, "propeller_rpm")
+SUMMED = (*FINS, *MOTORS)
 """What several fins or motors may make up together."""
 FULL_RAD = math.radians(30.0)
 """What the full travel of a servo is taken for where its range is not said."""

@@ -12,9 +12,10 @@ from collections.abc import Container
 import numpy as np
 
 from fieldsid.errors import DataError
-from fieldsid.logs.convert.faults.spikes import DIGITS, last_digit
-from fieldsid.logs.convert.units import UNITS, unit_of_ratio
+from fieldsid.logs.convert.faults.spikes import DIGITS, SPREADS, last_digit
+from fieldsid.logs.convert.units import UNIT_LIMIT, UNITS, unit_of_ratio
 from fieldsid.logs.doctor.stated import Stated
+from fieldsid.logs.doctor.together import over, together
 from fieldsid.logs.run import SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.shifted_correlation import lag_of, shifted_correlations, slope_of
@@ -29,9 +30,8 @@ STRONG, WEAK = 0.9, 0.5
 """Correlation of two signals of which one is the other's rate, and the one below which, at every shift, neither is."""
 MIN_NOISE_RATIO = 4.0
 """How many times its noise a change must be to be judged."""
-SLOPE_LIMIT = 0.15
-JUMP_SPREADS, FASTER, FEWEST_JUMPS = 8.0, 1.5, 2
-"""Standard deviations, and times a step at the rate of a fast tenth of the log, by which an angle and its rate may differ."""
+FASTER, FEWEST_JUMPS = 1.5, 2
+"""Times a step at the rate of a fast tenth of the log by which an angle and its rate may differ, and places that are jumps."""
 JUMP_WIDTHS = (1, 2, 4)
 """Steps over which they are compared."""
 FITS_BETTER = 2.5
@@ -128,7 +128,7 @@ def contradiction(run: Run, angle: str, rate: str) -> str:
 def _is_rate_of(changes: tuple[FloatArray, FloatArray, float], least: float) -> bool:
     """Whether changes of a signal go with the integral of another, one to one and with a correlation above a least one."""
     slope, trust = slope_of(*changes[:2])
-    return trust > least and abs(slope - 1.0) <= SLOPE_LIMIT
+    return trust > least and abs(slope - 1.0) <= UNIT_LIMIT
 
 
 def _unrelated(run: Run, angle: str, rate: str) -> list[Note]:
@@ -164,10 +164,10 @@ def _turned_in_degrees(run: Run, angle: str, rate: str, stated: Stated) -> list[
 
     The circular variances 1 - |mean exp(i (step - k turn))| of k = 1 and k = 57.3 are compared (Mardia and Jupp 2000, 2.3.1).
     """
-    both = np.isfinite(run[angle]) & np.isfinite(run[rate])
-    if both.sum() < 50:
+    both = together(run, angle, rate)
+    if both is None:
         return []
-    made, turned = np.diff(run[angle][both]), np.diff(trapezoid_integral(run.time[both], run[rate][both]))
+    made, turned = np.diff(both[1]), np.diff(trapezoid_integral(both[0], both[2]))
     as_rad, as_deg = (max(1.0 - abs(complex(np.mean(np.exp(1j * (made - k * turned))))), ROUNDING) for k in (1.0, DEGREES))
     if not as_deg < as_rad / FITS_BETTER:
         return []
@@ -186,18 +186,19 @@ def _jumps(run: Run, angle: str, rate: str) -> list[Note]:
 
     A rate that is wrong for a few samples moves the angle's noise out of no single step, so that changes over a few are taken.
     """
-    both = np.isfinite(run[angle]) & np.isfinite(run[rate])
-    if both.sum() < 50:
+    both = together(run, angle, rate)
+    if both is None:
         return []
-    time, turned, swept = run.time[both], run[angle][both], trapezoid_integral(run.time[both], run[rate][both])
-    fastest = FASTER * float(np.percentile(np.abs(run[rate][both]), 90))
+    time, turned, turning = both
+    swept = trapezoid_integral(time, turning)
+    fastest = FASTER * float(np.percentile(np.abs(turning), 90))
     found = [f for width in JUMP_WIDTHS if (f := _off_over(width, time, turned, swept, fastest)) is not None]
     if not found:
         return []
     count, size, limit, at = max(found, key=lambda f: f[1] / f[2])
     message = (
         f"{angle} and {rate} disagree at {count} places of {time.size} samples, by up to {size:.3g} rad at {at:.2f} s (limit "
-        f"{limit:.3g} rad, {JUMP_SPREADS:g} standard deviations): one of them jumps where the other does not"
+        f"{limit:.3g} rad, {SPREADS:g} standard deviations): one of them jumps where the other does not"
     )
     return [Note("disagree", message, {"signal": angle, "value": size, "limit": limit, "count": count})]
 
@@ -209,10 +210,10 @@ def _off_over(
 
     `fastest` is the rate by which they may be a step apart.
     """
-    off = (turned[width:] - turned[:-width]) - (swept[width:] - swept[:-width])
+    off = over(turned - swept, width)
     off = np.abs(off - np.median(off))
     usual = float(np.median(off)) / MEDIAN_OF_NORMAL
-    limit = max(JUMP_SPREADS * usual, DIGITS * last_digit(turned))
+    limit = max(SPREADS * usual, DIGITS * last_digit(turned))
     odd = np.flatnonzero(off > np.maximum(limit, fastest * np.diff(time)[width - 1 :]))
     places = 1 + int(np.count_nonzero(np.diff(odd) > width)) if odd.size else 0
     if places < FEWEST_JUMPS or usual == 0.0:
@@ -226,18 +227,18 @@ def changes_of(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray,
 
     None when the log is too short, or neither moves clearly more than its noise.
     """
-    both = np.isfinite(run[angle]) & np.isfinite(run[rate])
-    if both.sum() < 50:
+    both = together(run, angle, rate)
+    if both is None:
         return None
-    time, turned, swept = run.time[both], run[angle][both], trapezoid_integral(run.time[both], run[rate][both])
-    step = float(np.median(np.diff(time)))
+    time, turned, turning = both
+    swept, step = trapezoid_integral(time, turning), float(np.median(np.diff(time)))
     floor = MIN_NOISE_RATIO * math.sqrt(2.0) * _noise(turned)
-    noise = _noise(run[rate][both])
+    noise = _noise(turning)
     for window_s in (PAIR_WINDOW_S, LONG_WINDOW_S):
         width = max(1, round(window_s / step))
         if time.size <= 3 * width:
             return None
-        a, b = turned[width:] - turned[:-width], swept[width:] - swept[:-width]
+        a, b = over(turned, width), over(swept, width)
         if float(np.std(a)) > floor and float(np.std(b)) > MIN_NOISE_RATIO * noise * math.sqrt(window_s * step):
             return a, b, step
     return None
@@ -264,9 +265,9 @@ def _of_slope(angle: str, rate: str, slope: float, stated: Stated) -> list[Note]
         advice, unit = _in_degrees(rate, goes_as, angle, stated)
         message = f"{rate} is {1 / size:.3g} times the change of {angle}, as numbers in {goes_as} are: {advice}"
         found.append(Note("unit", message, {**data, "goes_as": goes_as, **unit}))
-    elif abs(size - 1.0) > SLOPE_LIMIT:
-        message = f"{angle} changes {size:.3g} times as fast as {rate} says (limit 1 +/- {SLOPE_LIMIT:g}): check both scales"
-        found.append(Note("rate_scale", message, {**data, "limit": SLOPE_LIMIT}))
+    elif abs(size - 1.0) > UNIT_LIMIT:
+        message = f"{angle} changes {size:.3g} times as fast as {rate} says (limit 1 +/- {UNIT_LIMIT:g}): check both scales"
+        found.append(Note("rate_scale", message, {**data, "limit": UNIT_LIMIT}))
     return found
 
 

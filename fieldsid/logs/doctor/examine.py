@@ -10,17 +10,14 @@ from fieldsid.logs.convert.clock import GAP_FACTOR
 from fieldsid.logs.convert.conditioning import MAIN, likely_unit
 from fieldsid.logs.convert.times.time_column import FASTEST_S, SLOW_S
 from fieldsid.logs.doctor.angle_and_rate import angle_findings
-from fieldsid.logs.doctor.course_findings import course_findings
-from fieldsid.logs.doctor.fin_findings import fin_findings
-from fieldsid.logs.doctor.limit_findings import limit_findings
-from fieldsid.logs.doctor.pair_findings import pair_findings
+from fieldsid.logs.doctor.fin_findings import fin_findings, limit_findings
+from fieldsid.logs.doctor.pair_findings import course_findings, pair_findings
 from fieldsid.logs.doctor.signal_findings import signal_findings
 from fieldsid.logs.doctor.stated import Stated
-from fieldsid.logs.run import LINES, Note, Run
+from fieldsid.logs.run import FINS, LINES, Note, Run
 
 JITTER_LIMIT = 0.2
 """Standard deviation of the sampling step over its median."""
-_FINS = ("rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad")
 
 
 def examine(run: Run, fin_max_rad: Mapping[str, float] | None = None, stated: Stated | None = None) -> tuple[Note, ...]:
@@ -84,9 +81,9 @@ def _sampling(run: Run, stated: Stated) -> list[Note]:
 
 def _fins(run: Run, limits: Mapping[str, float]) -> list[Note]:
     found = []
-    if not any(run.has(f) for f in _FINS):
+    if not any(run.has(f) for f in FINS):
         message = "no fin signal: nothing can be identified from this run; map `rudder_rad` or `elevator_rad`"
         found.append(Note("no_fin", message, {"signals": [s for s in run.signals if run.has(s)]}))
-    if not any(run.has(s) for s in MAIN if s not in _FINS):
+    if not any(run.has(s) for s in MAIN if s not in FINS):
         found.append(Note("no_motion", "neither an angle nor a rate of yaw or pitch is in the log; map one of them", {}))
     return [*found, *limit_findings(run, limits)]

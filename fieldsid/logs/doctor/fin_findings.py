@@ -1,13 +1,16 @@
-"""Findings on fins and what follows them: a range no fin has, and a motion that comes before the fin that makes it."""
+"""Findings on fins and what follows them: a range no fin has, a motion that comes before the fin, a fin beyond its limit."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from fieldsid.errors import DataError
+from fieldsid.logs.convert.conditioning import blocks_of
 from fieldsid.logs.convert.servo_counts import servo_of
+from fieldsid.logs.doctor.together import together
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
@@ -34,7 +37,7 @@ def fin_findings(run: Run) -> list[Note]:
     found = []
     for fin, rate in _AXES:
         if run.has(fin):
-            found += [*_range(run, fin), *(_early(run, fin, rate) if run.has(rate) else [])]
+            found += [*_range(run, fin), *_early(run, fin, rate)]
     return [*found, *(_roll(run) if run.has("roll_rad") else [])]
 
 
@@ -65,10 +68,10 @@ def refuse_no_angle(run: Run, fin: str) -> None:
 
 def _early(run: Run, fin: str, rate: str) -> list[Note]:
     """The mean answer of the rate about steps of the fin: what comes before the step cannot be its answer."""
-    seen = np.isfinite(run[fin]) & np.isfinite(run[rate])
-    if seen.sum() < 50:
+    both = together(run, fin, rate)
+    if both is None:
         return []
-    time, moves, answer = run.time[seen], run[fin][seen], run[rate][seen]
+    time, moves, answer = both
     at, size = _steps(time, moves)
     inside = (at > time[0] + BEFORE_S) & (at < time[-1] - AFTER_S)
     at, side = at[inside], np.sign(size[inside])
@@ -117,9 +120,51 @@ def _roll(run: Run) -> list[Note]:
 
 def _upright(time: FloatArray, roll: FloatArray) -> str:
     """Return the advice to take the longest stretch between rolls of this size; nothing where there is none."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], roll <= ROLLED, [False]]).astype(np.int8)))
-    starts, ends = edges[::2], edges[1::2] - 1
+    starts, behind = blocks_of(roll <= ROLLED)
     if not starts.size:
         return ""
-    k = int(np.argmax(time[ends] - time[starts]))
-    return f"; take the longest stretch without: `--from {time[starts[k]]:.2f} --to {time[ends[k]]:.2f}`"
+    begin, end = max(zip(time[starts], time[behind - 1], strict=True), key=lambda part: part[1] - part[0])
+    return f"; take the longest stretch without: `--from {begin:.2f} --to {end:.2f}`"
+
+
+BEYOND_SHARE = 0.05
+"""Share of a run in which a command may be beyond the fin's limit."""
+FIN_ZERO = 0.0175
+"""How far off the zero of a fin may be, in rad: commands about a trim reach so far beyond the limit."""
+
+
+def limit_findings(run: Run, fin_max_rad: Mapping[str, float]) -> list[Note]:
+    """Return the findings on a run that hang on its vehicle: fins beyond the limits (rad) given for their signals."""
+    return [note for fin, limit in fin_max_rad.items() for note in _beyond(run, fin, limit)]
+
+
+def _beyond(run: Run, fin: str, limit: float) -> list[Note]:
+    """Return that a fin was measured, or commanded for long, beyond its limit (rad)."""
+    measured, stated = f"{fin.removesuffix('_rad')}_measured_rad", f"`{fin.removesuffix('_rad')}_max_rad` of vehicle.yaml"
+    name = measured if run.has(measured) else fin
+    if not run.has(name) or (share := _share(run, name, limit)) <= BEYOND_SHARE:
+        return []
+    reach = float(np.nanmax(np.abs(run[name])))
+    message = (
+        f"{name} goes to {reach:.3g} rad, beyond the fin's limit of {limit:.3g} rad for {100 * share:.0f} % of the run (limit "
+        f"{100 * BEYOND_SHARE:.0f} %): "
+    )
+    data = {"signal": name, "value": share, "limit": BEYOND_SHARE, "reach_rad": reach}
+    if name == measured:
+        return [Note("fin_limit", f"{message}correct {stated}", data)]
+    advice = f"where the fin goes so far, correct {stated}; where it stopped, the log does not show it: log the measured fin"
+    return [Note("saturated", message + advice, data)]
+
+
+def _share(run: Run, name: str, limit: float) -> float:
+    return float(np.mean(np.abs(run[name][np.isfinite(run[name])]) > limit + FIN_ZERO))
+
+
+def share_beyond(run: Run, fin: str, limit: float) -> float:
+    """Return the share of a run in which a fin's command is beyond its limit (rad); one that is at it shows where the fin is.
+
+    Nothing is hidden where the fin itself was measured.
+    """
+    if run.has(f"{fin.removesuffix('_rad')}_measured_rad") or fin.endswith("_measured_rad"):
+        return 0.0
+    return _share(run, fin, limit)

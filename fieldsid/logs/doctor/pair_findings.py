@@ -1,13 +1,22 @@
-"""Findings on signals that must agree: a speed and the way made, a command and its fin."""
+"""Findings on signals that must agree: a speed and the way made, its course and the heading, a dive and its pitch, fins.
+
+With x north and y east the course atan2(dy, dx) goes with the heading; with x east and y north it goes against it, to pi/2. A
+vehicle dives by its pitch: d(depth)/dt = -u sin(pitch) + w cos(pitch) (Fossen 2011, eq. 2.30, without roll).
+"""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+
 import numpy as np
 
-from fieldsid.logs.convert.units import factor_to, unit_of_ratio
+from fieldsid.logs.convert.units import UNIT_LIMIT, factor_to, unit_of_ratio
 from fieldsid.logs.doctor.angle_and_rate import LAG_S, TRUSTED
 from fieldsid.logs.doctor.stated import Stated
+from fieldsid.logs.doctor.together import FEWEST, over, together, width_of
 from fieldsid.logs.run import Note, Run
+from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.shifted_correlation import lag_of, slope_of
 from fieldsid.numerics.trapezoid import trapezoid_integral
 
@@ -16,6 +25,7 @@ SPEEDS = {unit: factor_to("surge_m_s", unit) for unit in ("kn", "mph", "km/h", "
 LEAST_WAY, MOST_WAY = 0.6, 1.5
 """How many times the speed the way made in a second may be: a current and a slip lie between."""
 SLOWEST = 0.1
+"""Speed in m/s below which the way made is the sensors' noise."""
 SLOW_RPM = 30.0
 MOST_ADVANCE_M = 4.0
 """Way made in a turn of a propeller that is larger than any this program's vehicles have."""
@@ -24,13 +34,8 @@ _FINS = (("rudder_rad", "rudder_measured_rad"), ("elevator_rad", "elevator_measu
 
 def pair_findings(run: Run, stated: Stated) -> list[Note]:
     """Return the findings on pairs of signals of a run."""
-    found = _speed_and_way(run, stated)
-    if all(run.has(s) for s in ("surge_m_s", "propeller_rpm")):
-        found += _speed_and_turns(run)
-    for command, fin in _FINS:
-        if run.has(command) and run.has(fin):
-            found += _command_and_fin(run, command, fin, stated)
-    return found
+    of_fins = [note for command, fin in _FINS for note in _command_and_fin(run, command, fin, stated)]
+    return [*_speed_and_way(run, stated), *_speed_and_turns(run), *of_fins]
 
 
 def _speed_and_way(run: Run, stated: Stated) -> list[Note]:
@@ -57,18 +62,12 @@ def goes_with_way(run: Run) -> bool:
 
 def _way_by_speed(run: Run) -> float | None:
     """Return how many times the speed the way made in a second is; None where there is too little of either."""
-    if not all(run.has(s) for s in ("surge_m_s", "x_m", "y_m")):
+    seen = together(run, "x_m", "y_m", "surge_m_s")
+    if seen is None or seen[0].size <= 2 * (width := width_of(seen[0], 5.0)):
         return None
-    good = np.isfinite(run["x_m"]) & np.isfinite(run["y_m"]) & np.isfinite(run["surge_m_s"])
-    if good.sum() < 50:
-        return None
-    time, x, y, surge = run.time[good], run["x_m"][good], run["y_m"][good], run["surge_m_s"][good]
-    width = max(1, round(5.0 / float(np.median(np.diff(time)))))
-    if time.size <= 2 * width:
-        return None
-    made = np.hypot(x[width:] - x[:-width], y[width:] - y[:-width]) / (time[width:] - time[:-width])
-    said = trapezoid_integral(time, surge)
-    said = np.abs(said[width:] - said[:-width]) / (time[width:] - time[:-width])
+    time, x, y, surge = seen
+    made = np.hypot(over(x, width), over(y, width)) / over(time, width)
+    said = np.abs(over(trapezoid_integral(time, surge), width)) / over(time, width)
     # In a turn the straight way is shorter than the path, so the fastest windows decide.
     fast = float(np.percentile(said, 90))
     return float(np.percentile(made, 90)) / fast if fast > SLOWEST else None
@@ -76,11 +75,14 @@ def _way_by_speed(run: Run) -> float | None:
 
 def _speed_and_turns(run: Run) -> list[Note]:
     """The way made in a turn of the propeller: a few tenths of a metre, whatever its slip."""
-    good = np.isfinite(run["propeller_rpm"]) & np.isfinite(run["surge_m_s"])
-    turning = good & (np.abs(run["propeller_rpm"]) > SLOW_RPM) & (np.abs(run["surge_m_s"]) > SLOWEST)
-    if turning.sum() < 50:
+    seen = together(run, "propeller_rpm", "surge_m_s")
+    if seen is None:
         return []
-    advance = float(np.median(np.abs(60.0 * run["surge_m_s"][turning] / run["propeller_rpm"][turning])))
+    _, rpm, surge = np.abs(seen)
+    turning = (rpm > SLOW_RPM) & (surge > SLOWEST)
+    if turning.sum() < FEWEST:
+        return []
+    advance = float(np.median(60.0 * surge[turning] / rpm[turning]))
     if advance < MOST_ADVANCE_M:
         return []
     message = f"surge_m_s makes {advance:.3g} m in a turn of propeller_rpm (limit {MOST_ADVANCE_M:g} m): check the units of both"
@@ -88,10 +90,10 @@ def _speed_and_turns(run: Run) -> list[Note]:
 
 
 def _command_and_fin(run: Run, command: str, fin: str, stated: Stated) -> list[Note]:
-    both = np.isfinite(run[command]) & np.isfinite(run[fin])
-    if both.sum() < 50 or np.ptp(run[command][both]) == 0.0 or np.ptp(run[fin][both]) == 0.0:
+    both = together(run, fin, command)
+    if both is None or np.ptp(both[1]) == 0.0 or np.ptp(both[2]) == 0.0:
         return []
-    time, a, b = run.time[both], run[fin][both], run[command][both]
+    time, a, b = both
     step = float(np.median(np.diff(time)))
     slope, trust = slope_of(a, b)
     found = []
@@ -107,3 +109,158 @@ def _command_and_fin(run: Run, command: str, fin: str, stated: Stated) -> list[N
         )
         found.append(Note("clock_offset", message, {"signal": fin, "value": lag, "limit": -1.5 * step}))
     return found
+
+
+WINDOW_S = 3.0
+AGREES = 0.9
+"""Length of the mean unit vector of the angle between two directions from which on they agree."""
+TURNED = 0.2
+"""How much better the one must agree than the other: the heading must have turned for that."""
+ALL_BUT = 0.95
+"""Share of the windows in which the vehicle must have moved for its course to be followed round."""
+RATIO = 2.0
+"""How much further than the heading the course may turn: a hull that slides in a turn turns as far as its course in the end."""
+FEWEST_MOVED = 20
+LEAST_DIVE, MOST_DIVE = 0.7, 1.4
+"""How many times what speed and pitch say a depth may change: a heave lies between."""
+DEPTHS = {unit: factor_to("depth_m", unit) for unit in ("ft", "fathom", "cm", "mm")}
+"""Units in which a depth is logged, in m."""
+HEADINGS = {"deg": math.degrees(1.0), "rad": math.radians(1.0)}
+"""Units in which a heading is that was taken for the other one, by how many times as far it turns."""
+SPREADS = 4.0
+"""Standard deviations by which a correlation must be off zero, by Fisher's z = atanh(r) over windows that share no sample."""
+
+
+def course_findings(run: Run, stated: Stated | None = None) -> list[Note]:
+    """Return the findings on the course and the slope of the way of a run."""
+    return [*_course(run), *_dive(run, stated or Stated())]
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """The course made (m,) over windows of `width` samples in which a vehicle moved, what goes with it, and their share."""
+
+    course: FloatArray
+    heading: FloatArray
+    rate: FloatArray
+    way: FloatArray
+    moved: float
+    width: int
+
+    @property
+    def slope(self) -> float | None:
+        """How far the course turns for a turn of the heading; None where they do not go together, or it is not followed round."""
+        c, h = np.unwrap(self.course) - np.unwrap(self.course).mean(), self.heading - self.heading.mean()
+        power = math.sqrt(float(c @ c) * float(h @ h))
+        if self.moved <= ALL_BUT or power == 0.0 or float(c @ h) / power < AGREES or float(np.std(c)) < TURNED:
+            return None
+        return math.sqrt(float(c @ c) / float(h @ h))
+
+
+def course_of(run: Run, window_s: float = WINDOW_S) -> Course | None:
+    """Return the course that a run makes over windows in s; None where it makes none."""
+    seen = together(run, "x_m", "y_m", "yaw_rad")
+    if seen is None or seen[0].size <= 4 * (width := width_of(seen[0], window_s)):
+        return None
+    time, x, y, yaw = seen
+    dx, dy = over(x, width), over(y, width)
+    way = np.hypot(dx, dy)
+    moved = way > SLOWEST * window_s
+    heading = trapezoid_integral(time, yaw)
+    mean, rate = (over(v, width) / over(time, width) for v in (heading, yaw))
+    if moved.sum() < FEWEST_MOVED:
+        return None
+    share = float(moved.mean())
+    return Course(np.arctan2(dy, dx)[moved], mean[moved], rate[moved], way[moved], share, width)
+
+
+def _course(run: Run) -> list[Note]:
+    found = course_of(run)
+    if found is None:
+        return []
+    # by the way made: a course of little more than the sensors' noise says little
+    along, against = (
+        complex(np.average(np.exp(1j * (found.course - s * found.heading)), weights=found.way)) for s in (1.0, -1.0)
+    )
+    if abs(against) > AGREES and abs(against) - abs(along) > TURNED:
+        message = (
+            f"the course made from x_m and y_m turns against yaw_rad (agreement {abs(against):.2f} against and {abs(along):.2f} "
+            f"along it, limit {TURNED:g} between them): x is east and y north where the heading counts from north; "
+            "set `frame: ENU` at x_m and y_m, or `frame: ENU` at yaw_rad"
+        )
+        return [Note("course_against", message, {"signal": "yaw_rad", "value": abs(against) - abs(along), "limit": TURNED})]
+    slope = found.slope
+    if slope is not None and not 1.0 / RATIO < slope < RATIO:
+        message = (
+            f"the course made from x_m and y_m turns {slope:.3g} times as far as yaw_rad (limits {1 / RATIO:g} and {RATIO:g}): "
+            "a degree is 0.01745 rad; check the unit of the heading"
+        )
+        unit = next((u for u, factor in HEADINGS.items() if 1.0 / RATIO < slope * factor < RATIO), None)
+        data = {"signal": "yaw_rad", "value": slope, "limit": RATIO} | ({} if unit is None else {"unit": unit})
+        return [Note("course_slope", message, data)]
+    off = math.remainder(float(np.angle(along)), math.tau)
+    if abs(along) > AGREES and abs(off) > math.pi / 4:
+        message = (
+            f"the course made from x_m and y_m is {math.degrees(off):.0f} deg from yaw_rad (limit 45 deg): the heading counts "
+            "from another direction than north, or x is not north; set `frame`"
+        )
+        return [Note("course_offset", message, {"signal": "yaw_rad", "value": abs(off), "limit": math.pi / 4})]
+    return []
+
+
+def goes_along_course(run: Run) -> bool:
+    """Whether the course made turns as far as the heading does, and turns at all: so it is in the unit it is taken in."""
+    found = course_of(run)
+    return found is not None and found.slope is not None and 1.0 / RATIO < found.slope < RATIO
+
+
+def _dive_unit(slope: float, stated: Stated) -> list[Note]:
+    """Return the finding that a depth changes by a unit's factor of what speed and pitch say; the unit where one may be it."""
+    may = [("depth_m", u) for u, f in DEPTHS.items() if abs(slope * f - 1.0) < UNIT_LIMIT and stated.is_si("depth_m")]
+    may += [("surge_m_s", u) for u, f in SPEEDS.items() if abs(slope / f - 1.0) < UNIT_LIMIT and stated.is_si("surge_m_s")]
+    if not may:
+        return []
+    (signal, unit), is_one = may[0], len(may) == 1
+    advice = f"set {', or '.join(f'`unit: {u}` at {s}' for s, u in may)}"
+    message = (
+        f"depth_m changes {slope:.3g} times as fast as surge_m_s and pitch_rad say (limits {LEAST_DIVE:g} and {MOST_DIVE:g}): "
+        f"{advice}"
+    )
+    data = {"signal": signal, "value": slope, "limit": MOST_DIVE} | ({"unit": unit} if is_one else {})
+    return [Note("depth_unit" if signal == "depth_m" else "speed_unit", message, data)]
+
+
+def goes_with_depth(run: Run) -> bool:
+    """Whether the depth changes as speed and pitch say, in the units that they are taken in."""
+    found = _dived(run)
+    return found is not None and found[0] > TRUSTED and LEAST_DIVE < found[1] < MOST_DIVE
+
+
+def _dived(run: Run) -> tuple[float, float] | None:
+    """Return the correlation of the depth's change with what speed and pitch make of it, and their slope; None for too little."""
+    seen = together(run, "depth_m", "pitch_rad", "surge_m_s")
+    if seen is None or seen[0].size <= 4 * (width := width_of(seen[0], WINDOW_S)):
+        return None
+    time, depth, pitch, surge = seen
+    made, wanted = over(depth, width), over(trapezoid_integral(time, -surge * np.sin(pitch)), width)
+    enough = math.atanh(TRUSTED) * math.sqrt(max(made.size / width - 3.0, 0.0)) >= SPREADS
+    if not enough or float(np.ptp(made)) == 0.0 or float(np.ptp(wanted)) == 0.0:
+        return None
+    return float(np.corrcoef(made, wanted)[0, 1]), float(np.std(made) / np.std(wanted))
+
+
+def _dive(run: Run, stated: Stated) -> list[Note]:
+    found = _dived(run)
+    if found is None:
+        return []
+    trust, slope = found
+    if trust > TRUSTED and not LEAST_DIVE < slope < MOST_DIVE:
+        is_known_wrong = all(run.has(s) for s in ("x_m", "y_m")) and not goes_with_way(run)
+        return [] if is_known_wrong else _dive_unit(slope, stated)
+    if trust > -TRUSTED:
+        return []
+    message = (
+        f"depth_m goes against what surge_m_s and pitch_rad make of it (correlation {trust:.2f}, limit {-TRUSTED:g}): "
+        "nose up is positive, and depth downwards; set `sign: -1` at depth_m or pitch_rad"
+    )
+    return [Note("dive_sign", message, {"signal": "depth_m", "value": trust, "limit": -TRUSTED})]

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.logs.convert.conditioning import blocks_of
 from fieldsid.logs.convert.faults.spikes import spikes_of
-from fieldsid.logs.convert.servo_counts import FINS, servo_of
+from fieldsid.logs.convert.servo_counts import servo_of
 from fieldsid.logs.doctor.holes import usual_step
 from fieldsid.logs.doctor.pair_findings import goes_with_way
 from fieldsid.logs.doctor.stated import Stated
-from fieldsid.logs.run import GOALS, SIGNALS, Note, Run
+from fieldsid.logs.run import FINS, GOALS, MOTORS, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
-PROPULSION = frozenset({"thrust", "thrust_ratio", "propeller_rpm"})
-MEASURED = frozenset(SIGNALS) - PROPULSION - GOALS - {"rudder_rad", "elevator_rad"}
+MEASURED = frozenset(SIGNALS) - {*MOTORS, "rudder_rad", "elevator_rad"} - GOALS
 FITTED = frozenset({"yaw_rad", "pitch_rad", "yaw_rate_rad_s", "pitch_rate_rad_s"})
 """What the free run is fitted to."""
 MISSING_LIMIT = 0.05
@@ -39,7 +39,7 @@ def signal_findings(run: Run, name: str, stated: Stated) -> list[Note]:
         return [Note("empty", f"{name} has no sample", {"signal": name})]
     found = _missing(name, seen)
     present = values[seen]
-    if present.size > 2 and float(np.ptp(present)) == 0.0 and name not in PROPULSION | GOALS:
+    if present.size > 2 and float(np.ptp(present)) == 0.0 and name not in GOALS.union(MOTORS):
         message = f"{name} is constant at {present[0]:.6g} over {present.size} samples; check the sensor, or map another one"
         return [
             *found,
@@ -93,8 +93,7 @@ def _frozen(name: str, time: FloatArray, values: FloatArray) -> list[Note]:
     same = np.diff(values) == 0.0
     if same.mean() > COARSE_LIMIT:
         return []
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(np.int8)))
-    starts, ends = edges[::2], edges[1::2]
+    starts, ends = blocks_of(same)
     if not starts.size:
         return []
     lengths = time[ends] - time[starts]

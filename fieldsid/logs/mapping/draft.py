@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, Source
+from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion_of
-from fieldsid.logs.mapping.name_words import words_of
 from fieldsid.logs.mapping.numbers.recognise import PLACE, recognised
-from fieldsid.logs.mapping.numbers.true_north import true_north
+from fieldsid.logs.mapping.numbers.true_heading import true_north
 from fieldsid.logs.mapping.numbers.units_told import set_by_size
 from fieldsid.logs.mapping.vocabulary import LATITUDE, LONGITUDE
 from fieldsid.logs.mapping.word_meaning import meaning_of

@@ -11,10 +11,9 @@ import numpy as np
 
 from fieldsid.logs.channels import ANGLES, ATTITUDE
 from fieldsid.logs.convert.units import dimension_of
-from fieldsid.logs.mapping.canonical_names import unit_in_name, unit_of_field
-from fieldsid.logs.mapping.name_words import words_of
-from fieldsid.logs.mapping.vocabulary import COMMANDED, COMPASS, LATITUDE, LONGITUDE, TIME, word_set
-from fieldsid.logs.mapping.word_meaning import STANDARD, meaning_of, part_of
+from fieldsid.logs.mapping.canonical_names import unit_in_name, unit_of_field, words_of
+from fieldsid.logs.mapping.vocabulary import COMMANDED, COMPASS, LATITUDE, LONGITUDE, TIME, part_of, word_set
+from fieldsid.logs.mapping.word_meaning import STANDARD, meaning_of
 from fieldsid.logs.reader import DEFINED, TABLE, ChannelInfo, FieldInfo
 from fieldsid.numerics.arrays import FloatArray
 

@@ -14,13 +14,13 @@ from fieldsid.errors import MappingError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, COMBINED, POSITION, ChannelMap, Pressure, Source, TableForm
 from fieldsid.logs.convert.clock import GAP_FACTOR
 from fieldsid.logs.convert.frames import Body, Frame, World
-from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, SUMMED, counts_unit
+from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, SUMMED, counts_unit
 from fieldsid.logs.convert.times.clock_parts import parts_of
 from fieldsid.logs.convert.times.clock_text import FORMS
 from fieldsid.logs.convert.units import UNITS, find_unit
 from fieldsid.logs.mapping.canonical_names import fitting
 from fieldsid.logs.mapping.vocabulary import TIME
-from fieldsid.logs.run import PART, SIGNALS, signal_of
+from fieldsid.logs.run import FINS, PART, SIGNALS, signal_of
 from fieldsid.registry import near
 from fieldsid.strict import StrictModel, read_model, validated
 

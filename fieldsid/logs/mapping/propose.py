@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
+from fieldsid.logs.doctor.angle_and_rate import TRUSTED, changes_of
+from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.draft import Draft, draft_of, place_of, with_units_by_span
 from fieldsid.logs.mapping.fins.several import which_output, with_several_fins
-from fieldsid.logs.mapping.name_words import words_of
-from fieldsid.logs.mapping.numbers.row_rate import ASSUMED_HZ, rate_by_turning
 from fieldsid.logs.mapping.numbers.true_heading import better_heading, lead_of
 from fieldsid.logs.mapping.trial import Log, Proposal, tried
 from fieldsid.logs.mapping.vocabulary import OVER_GROUND
 from fieldsid.logs.reader import Inventory, Reader, ReadOptions
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.several.sifting import attempt
+from fieldsid.numerics.shifted_correlation import slope_of
 
 TRIES = 6
 
@@ -93,3 +95,38 @@ def _without_clock(log: Log, draft: Draft) -> Proposal:
     rate, unit, why = found
     counted["signals"]["yaw_rate_rad_s"].setdefault("unit", unit)
     return _tried(log, replace(draft, body=counted | {"time": {"rate": rate}})).saying(why)
+
+
+ASSUMED_HZ = 10.0
+USUAL_HZ = (1.0, 2.0, 4.0, 5.0, 8.0, 10.0, 16.0, 20.0, 25.0, 30.0, 32.0, 40.0, 50.0, 60.0, 64.0, 100.0, 128.0, 200.0, 250.0)
+NEAR = 0.02
+"""By how much of itself a rate may be off one that loggers have, and is that."""
+SLOWEST_HZ, FASTEST_HZ = 0.5, 400.0
+"""Rates at which vehicles log."""
+
+
+def rate_by_turning(run: Run, *, has_unit: bool) -> tuple[float, str, Note] | None:
+    """Return the rows a second of a run that was read with `ASSUMED_HZ`, the unit of its yaw rate, and why; None where open.
+
+    `has_unit` says that the yaw rate's unit is known; else it is that in which a vehicle would log so fast.
+    """
+    changes = changes_of(run, "yaw_rad", "yaw_rate_rad_s")
+    slope, trust = slope_of(*changes[:2]) if changes is not None else (0.0, 0.0)
+    if trust < TRUSTED or slope <= 0.0:
+        return None
+    units = {"rad/s": 1.0} if has_unit else {"rad/s": 1.0, "deg/s": 180.0 / math.pi}
+    rates = {unit: ASSUMED_HZ / (slope * factor) for unit, factor in units.items()}
+    likely = [unit for unit, rate in rates.items() if SLOWEST_HZ < rate < FASTEST_HZ]
+    if len(likely) != 1:
+        return None
+    rate = rates[likely[0]]
+    message = (
+        f"no column is a time: heading and yaw rate (in {likely[0]}) agree at {rate:.3g} rows a second, correlation {trust:.2f}; "
+        "set the rate that the logger has"
+    )
+    usual = min(USUAL_HZ, key=lambda known: abs(known - rate))
+    return (
+        usual if abs(usual / rate - 1.0) < NEAR else float(f"{rate:.3g}"),
+        likely[0],
+        Note("rate_guessed", message, {"value": rate, "signal": "yaw_rate_rad_s"}),
+    )

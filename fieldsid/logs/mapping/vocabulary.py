@@ -6,9 +6,12 @@ pass: a `TH` that goes round is a true heading, one between the tilts of a vehic
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+
+from fieldsid.logs.run import GOALS
 
 TIME = "time_s"
 LATITUDE, LONGITUDE = "latitude", "longitude"
@@ -141,6 +144,12 @@ GREEK = word_set("phi theta psi")
 MOST_BESIDE_GREEK = 2
 """Words beside a Greek letter up to which it is the symbol; with more it is an abbreviation, as in `PHI_HOST_PORT_DB`."""
 
+
+def is_abbreviation(words: list[str]) -> bool:
+    """Whether a Greek letter among words is no symbol."""
+    return bool(GREEK & set(words)) and len(words) > MOST_BESIDE_GREEK + 1
+
+
 _TURNS = ("roll_rate_rad_s", "pitch_rate_rad_s", "yaw_rate_rad_s")
 VECTORS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -158,3 +167,27 @@ KNOWN = (
     | COMMANDED | MEASURED | OF_ANOTHER | OVER_GROUND | OTHERS | OF_SPEED | _TURN
 )  # fmt: skip
 """Words that are told apart where they are written as one."""
+
+
+def part_of(path: str) -> str | None:
+    """Return the signal of one part of a standard message's vector, as in `twist.twist.angular.z`; None of any other."""
+    parent, _, last = path.rpartition(".")
+    vector = VECTORS.get(re.split(r"[. ]", parent)[-1])
+    return None if vector is None or last not in ("x", "y", "z") else vector["xyz".index(last)]
+
+
+def weight(rule: Rule, phrase: tuple[str, ...], words: list[str]) -> int:
+    """Return what a phrase weighs of which a name holds all words: two each, and one where it is all there is."""
+    if rule.alone:
+        return int(words == list(phrase))
+    return 2 * len(phrase) if all(p in words for p in phrase) else 0
+
+
+def of_use(signal: str, sure: int, words: set[str]) -> tuple[str, int] | None:
+    """Return a signal as what it was wanted to be or what it was, and how sure its words make it."""
+    if COMMANDED & words:
+        return (WANTED[signal], sure + (WANTED[signal] in GOALS and "next" not in words)) if signal in WANTED else None
+    if signal in GROUNDED and OVER_GROUND & words:
+        return signal, 1
+    sure += (("true" in words) - ("magnetic" in words)) * (signal in ("yaw_rad", "surge_m_s"))
+    return SEEN.get(signal, signal) if MEASURED & words else signal, sure

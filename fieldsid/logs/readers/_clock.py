@@ -1,31 +1,30 @@
-"""The clock of a table that is listed: which column is the time, how it is read, and how often each column has a number."""
+"""What is in a table: its columns, and its clock: which of them is the time, how it is read, and how often each has a number."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import FieldsidError, LogError
-from fieldsid.logs.channels import Source
+from fieldsid.logs.channels import Source, TableForm
 from fieldsid.logs.convert.conditioning import in_order
+from fieldsid.logs.convert.times.clock_parts import MOSTLY
 from fieldsid.logs.convert.times.clock_text import DAY_S, clock_of_text
 from fieldsid.logs.convert.times.time_column import YEARS_S, likely_time_unit
-from fieldsid.logs.mapping.canonical_names import unit_in_name
-from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.canonical_names import unit_in_name, words_of
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
-from fieldsid.logs.reader import ReadOptions
+from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, ReadOptions, span_of
 from fieldsid.logs.readers._clock_columns import clocks_in_parts, dates_beside, elapsed
-from fieldsid.logs.readers._columns import Columns, is_counter, time_of
+from fieldsid.logs.readers._columns import Columns, is_counter, numbers_mostly, samples_of, time_of
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
-MOSTLY = 0.9
-"""Share of the steps of a column that go on, from which it is taken for time: a damaged log may go back here and there."""
 REGULAR = 0.5
 """Standard deviation of the steps over their mean, up to which a column that nobody named goes on like time."""
 OF_WEEK = (
@@ -65,6 +64,46 @@ class Clock:
         return 1.0 / float(np.median(steps)) if steps.size else float("nan")
 
 
+def inventory_of_table(
+    path: Path,
+    form: str,
+    columns: Columns,
+    options: ReadOptions,
+    *,
+    table: TableForm | None = None,
+    notes: Sequence[Note] = (),
+    more: int = 0,
+) -> Inventory:
+    """Return the columns of a table with their count of numbers, rate, first values and range; `more` were not looked into."""
+    clock = clock_of(columns, options.clock)
+    return Inventory(
+        path,
+        form,
+        clock.duration_s if clock else float("nan"),
+        tuple(_channel(columns, i, clock) for i in range(columns.width)),
+        table,
+        (*notes, *(clock.notes if clock else ())),
+        samples_of(columns, clock.time, clock.source) if clock else None,
+        no_clock=_why_no_clock(columns) if clock is None and options.clock is None else None,
+        more=more,
+    )
+
+
+def _channel(columns: Columns, index: int, clock: Clock | None) -> ChannelInfo:
+    import pandas as pd
+
+    values = numbers_mostly(columns.take(index))
+    kind = "number" if values.dtype.kind in "fiubM" else "text"
+    there = np.isfinite(values) if values.dtype.kind in "fiub" else ~np.asarray(pd.isna(values))
+    first = values[there][:3]
+    shown: list[Any] = (first.astype(str) if values.dtype.kind == "M" else first).tolist()
+    rate = clock.rate_hz(values) if clock else float("nan")
+    field = FieldInfo("", kind, tuple(shown), span_of(values))
+    return ChannelInfo(
+        columns.name(index), kind, int(there.sum()), rate, (field,), columns.units[index] if columns.units else None
+    )
+
+
 def clock_of(columns: Columns, known: Source | None) -> Clock | None:
     """Return the clock of a table, by its mapping or by the names of its columns; None where no column goes on like time."""
     if known is not None and known.counts_rows:
@@ -75,7 +114,7 @@ def clock_of(columns: Columns, known: Source | None) -> Clock | None:
     return next((clock for clock in named if clock is not None), None) or _by_numbers(columns)
 
 
-def why_no_clock(columns: Columns) -> tuple[Source, FieldsidError] | None:
+def _why_no_clock(columns: Columns) -> tuple[Source, FieldsidError] | None:
     """Return the column that is surest called a time and why it is none, where it is none; None where no column is called so."""
     for source in _named(columns):
         first = columns.index(source.places[0], TIME)

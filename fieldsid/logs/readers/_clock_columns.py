@@ -17,7 +17,7 @@ from fieldsid.logs.convert.number_cells import as_numbers
 from fieldsid.logs.convert.times.clock_parts import PARTS, PLUS, carries, seconds_of_part
 from fieldsid.logs.convert.times.clock_text import DAY_S, MINUTE_S, clock_of_text
 from fieldsid.logs.convert.times.dates import days_of_columns
-from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.readers._columns import Columns

@@ -15,8 +15,7 @@ from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ATTITUDE, COMBINED, ChannelMap, Source
 from fieldsid.logs.convert.number_cells import as_numbers
 from fieldsid.logs.convert.times.time_column import seconds_of, seconds_of_parts
-from fieldsid.logs.mapping.canonical_names import Canonical, canonical, unit_in_name
-from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.canonical_names import Canonical, canonical, unit_in_name, words_of
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import RawLog, ReadOptions, Samples, Series

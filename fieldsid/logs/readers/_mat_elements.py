@@ -13,7 +13,7 @@ from math import prod
 from pathlib import Path
 
 from fieldsid.errors import LogError
-from fieldsid.logs.readers._unpacked_size import UnpackedSize
+from fieldsid.logs.readers._unpacked import UnpackedSize
 from fieldsid.logs.unknown_file import COPY_AGAIN
 
 HEAD = 128

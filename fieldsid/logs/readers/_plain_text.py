@@ -18,13 +18,11 @@ from tempfile import TemporaryFile
 from typing import IO
 
 from fieldsid.errors import LogError
-from fieldsid.logs.readers._unpacked_rows import LONGEST_ROW, UnpackedRows
+from fieldsid.logs.readers._unpacked import GZIP, LONGEST_ROW, PIECE_BYTES, UnpackedRows
 from fieldsid.logs.unknown_file import COPY_AGAIN
 
-GZIP = b"\x1f\x8b"
 HEAD = LONGEST_ROW
 """Bytes at the start of a table that tell how it is written."""
-PIECE_BYTES = 1 << 20
 LONGEST_CELL = 64
 """Bytes that a cell looked for may have before a piece of the text."""
 _SMALL_PIECE = 512

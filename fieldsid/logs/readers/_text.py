@@ -1,15 +1,104 @@
-"""The form of a text table: separator, decimal sign, first line of numbers, header."""
+"""The form of a text table: separator, decimal sign, first line of numbers, and names and their units above it."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import TableForm
-from fieldsid.logs.readers._cells import SENTENCE, cells, is_row, is_word
-from fieldsid.logs.readers._header import behind_sizes, header_of
+from fieldsid.logs.convert.units import find_unit
+from fieldsid.logs.mapping.word_meaning import meaning_of
+from fieldsid.logs.readers._cells import COMMENTS, SENTENCE, cells, is_number_or_date, is_row, is_word
 from fieldsid.logs.unknown_file import COPY_AGAIN, known_text
+
+OTHER_UNITS = frozenset({
+    "timestamp", "utc", "nodim", "enum", "bool", "volts", "v", "amps", "a", "ah", "mah", "w", "wh", "degc", "hz", "count",
+    "counts", "pwm", "lat", "lon", "byte", "bit", "byte/s", "s/m", "cc", "m^3", "kg", "kg/m3", "m/s2", "m/s^2", "m/s/s", "nm",
+    "n.m", "ppm", "psu", "ntu", "ug/l", "inhg", "torr", "datenum",
+})  # fmt: skip
+"""Units of what is no signal here, as rows of units state them."""
+
+
+OTHER_SEPARATORS = ("\t", ";", ",", "|", "whitespace")
+_RULE = re.compile(r"^[\s|+:=-]*[-=]{2,}[\s|+:=-]*$")
+"""A line drawn below the names."""
+
+
+def header_of(
+    lines: list[str], at: int, first: int, separator: str, width: int, *, asked: bool | None
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names and the units of the columns; a row of units stands below one of names."""
+    if asked is False:
+        return (), ()
+    names, units = _above(lines, at, first, separator, width)
+    if not names and width > 2 and cells(lines[at], separator)[-1] == "":
+        # rows that end in a separator have a cell more than there are names
+        names, units = _above(lines, at, first, separator, width - 1)
+        return (*names, "") if names else (), (*units, "") if units else ()
+    return names, units
+
+
+def _above(lines: list[str], at: int, first: int, separator: str, width: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    units: tuple[str, ...] = ()
+    for i in range(at - 1, max(first, 0) - 1, -1):
+        if not lines[i].strip() or _RULE.match(lines[i]):
+            continue
+        names = _names(lines[i], separator, width)
+        if names and not units and _state_units(names) and any(_names(up, separator, width) for up in lines[max(first, 0) : i]):
+            units = names
+        elif names:
+            return names, units
+        elif _are_units(lines[i], separator, width):
+            units = tuple(cells(lines[i], separator))
+        elif not lines[i].lstrip().startswith(tuple(COMMENTS)):
+            return (), ()
+    return (), ()
+
+
+def _state_units(names: tuple[str, ...]) -> bool:
+    """Whether most words of a line, and more than one, are units of measurement."""
+    said = [name for name in names if name]
+    known = sum(find_unit(name) is not None or name.lower() in OTHER_UNITS for name in said)
+    return known > 1 and 2 * known > len(said)
+
+
+def behind_sizes(lines: list[str], at: int, names: tuple[str, ...]) -> int:
+    """Return the first row of numbers; a glider's tables state the bytes of each column below its name and unit."""
+    head = {key.strip(): value.strip() for key, colon, value in (line.partition(":") for line in lines[:at]) if colon}
+    return at + 1 if names and head.get("num_label_lines") == "3" else at
+
+
+def _names(line: str, separator: str, width: int) -> tuple[str, ...]:
+    """Return a header line's names when it has one word for each column, else nothing."""
+    bare = line.strip().lstrip(COMMENTS).strip() if line.lstrip().startswith(tuple(COMMENTS)) else line
+    names = cells(bare, separator)
+    if separator == "whitespace":
+        names = [n.strip(",;|") for n in names]
+    if len(names) != width and separator == "whitespace":
+        names = [n.strip() for n in re.split(r"\s{2,}|\t", bare.strip())]  # names of several words, further apart than these
+    if len(names) != width:
+        names = _otherwise(bare, separator, width)
+    if len(names) != width or any(is_number_or_date(n) for n in names) or not any(names):
+        return ()
+    return () if _are_units(line, separator, width) else tuple(names)
+
+
+def _otherwise(line: str, separator: str, width: int) -> list[str]:
+    """Return the words of a line above a table that are parted otherwise than its rows, where they name signals or units."""
+    for other in OTHER_SEPARATORS:
+        words = cells(line, other) if other != separator else []
+        if len(words) == width and (_state_units(tuple(words)) or sum(meaning_of(w) is not None for w in words) > 1):
+            return words
+    return []
+
+
+def _are_units(line: str, separator: str, width: int) -> bool:
+    """Whether a line below the names only states units, such as `[s];[deg];[deg/s]`."""
+    parts = cells(line, separator)
+    return len(parts) == width and all(p == "" or (p[:1] in "[(" and p[-1:] in "])") for p in parts)
+
 
 SEPARATORS = ("\t", ";", ",", "|", "whitespace")
 LOOKED_AT = 400
@@ -31,12 +120,7 @@ class Form:
     width: int
     names: tuple[str, ...]
     units: tuple[str, ...] = ()
-
     is_sentences: bool = False
-
-    def label(self, index: int) -> str:
-        """The name of a column, or its index where there is no header."""
-        return self.names[index] if self.names else str(index)
 
 
 def form_of(text: str, asked: TableForm, path: Path) -> Form:

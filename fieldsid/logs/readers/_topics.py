@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -14,9 +14,20 @@ from typing import Any
 import numpy as np
 
 from fieldsid.errors import LogError, MappingError
-from fieldsid.logs.channels import COMBINED, ChannelMap, Source
+from fieldsid.logs.channels import COMBINED, ChannelMap, Source, TableForm
 from fieldsid.logs.mapping.canonical_names import unit_of_field
-from fieldsid.logs.reader import DEFINED, MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, RawLog, Series, span_of
+from fieldsid.logs.reader import (
+    DEFINED,
+    MOST_CHANNELS,
+    ChannelInfo,
+    FieldInfo,
+    Inventory,
+    RawLog,
+    Reader,
+    ReadOptions,
+    Series,
+    span_of,
+)
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.logs.unknown_file import COPY_AGAIN
@@ -25,6 +36,8 @@ from fieldsid.registry import near
 
 DATA = "data"
 """Field of a topic that is one number."""
+SHOWN = 12
+"""Topics that a message names."""
 Means = Mapping[str, tuple[str, Mapping[str, Any]]]
 """What a format's own definition says: by `topic.field`, the signal and how a mapping reads it."""
 
@@ -36,7 +49,45 @@ class Topic:
     time: FloatArray
     fields: Mapping[str, FloatArray]
     unit: str | None = None
-    notes: tuple[Note, ...] = field(default=())
+
+
+@dataclass(frozen=True, slots=True)
+class Topics:
+    """What was read of a log: topics by name, what its format says of them, notes, and how many others were not looked into."""
+
+    by_name: Mapping[str, Topic | None]
+    means: Means = field(default_factory=lambda: MappingProxyType({}))
+    notes: tuple[Note, ...] = ()
+    more: int = 0
+
+
+def topic_reader(
+    name: str,
+    says: str,
+    suffixes: tuple[str, ...],
+    form: str,
+    sniff: Callable[[Path], bool],
+    found: Callable[[Path, ReadOptions, frozenset[str]], Topics],
+    kind: str = DEFINED,
+) -> Reader:
+    """Return the reader of a format of topics, by what finds those of a log, at least the ones that are wanted of all there are.
+
+    Its inventory has each topic with count, rate and first numbers; raises LogError as what finds them does. What it reads are
+    the mapped fields; raises MappingError also, for one that is not there.
+    """
+
+    def inventory(path: Path, options: ReadOptions, written: TableForm) -> Inventory:
+        return inventory_of(path, form, found(path, options, frozenset()), kind=kind)
+
+    def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
+        return raw_log_of(path, found(path, options, wanted_by(mapping)), mapping)
+
+    return Reader(name, says, suffixes, sniff, inventory, read)
+
+
+def wanted_by(mapping: ChannelMap) -> frozenset[str]:
+    """Return the topics that a mapping names."""
+    return frozenset(source.topic for source in mapping.sources.values() if source.topic is not None)
 
 
 def library(module: str, path: Path, what: str, extra: str) -> Any:
@@ -59,27 +110,18 @@ def unheard() -> Iterator[None]:
         yield
 
 
-def inventory_of(
-    path: Path,
-    form: str,
-    topics: Mapping[str, Topic],
-    means: Means,
-    notes: tuple[Note, ...] = (),
-    *,
-    kind: str = DEFINED,
-    more: int = 0,
-) -> Inventory:
+def inventory_of(path: Path, form: str, log: Topics, *, kind: str = DEFINED) -> Inventory:
     """Return what is in a log of topics, all of them north-east-down; raises LogError where it holds none.
 
-    `kind` is what a topic is called; of what the format has defined nothing is guessed by its name. `more` are topics that were
-    not looked into.
+    `kind` is what a topic is called; of what the format has defined nothing is guessed by its name.
     """
-    _check_not_empty(path, topics)
+    topics = _not_empty(path, log)
     names = sorted(topics)
-    channels = tuple(_channel(name, topics[name], means, kind) for name in names[:MOST_CHANNELS])
+    channels = tuple(_channel(name, topics[name], log.means, kind) for name in names[:MOST_CHANNELS])
     ends = [(float(t.time[0]), float(t.time[-1])) for t in topics.values()]
     duration = max(end for _, end in ends) - min(start for start, _ in ends)
-    return Inventory(path, form, duration, channels, notes=notes, frame="NED/FRD", more=more + len(names) - len(channels))
+    more = log.more + len(names) - len(channels)
+    return Inventory(path, form, duration, channels, notes=log.notes, frame="NED/FRD", more=more)
 
 
 def _channel(name: str, topic: Topic, means: Means, kind: str) -> ChannelInfo:
@@ -96,25 +138,29 @@ def _channel(name: str, topic: Topic, means: Means, kind: str) -> ChannelInfo:
     return ChannelInfo(name, kind, int(topic.time.size), rate, tuple(fields), topic.unit)
 
 
-def _check_not_empty(path: Path, topics: Mapping[str, Topic]) -> None:
+def _not_empty(path: Path, log: Topics) -> dict[str, Topic]:
+    """Return the topics of a log that have a time; raises LogError where none has."""
+    topics = {name: topic for name, topic in log.by_name.items() if topic is not None}
     if not topics:
         raise LogError(f"`{path}` has no data", found="no topic with a number and a time", hint=COPY_AGAIN)
+    return topics
 
 
-def raw_log_of(path: Path, topics: Mapping[str, Topic], mapping: ChannelMap, notes: tuple[Note, ...] = ()) -> RawLog:
+def raw_log_of(path: Path, log: Topics, mapping: ChannelMap) -> RawLog:
     """Return the mapped fields on the time from the first of them; raises MappingError for a topic or field that is not there."""
-    _check_not_empty(path, topics)
+    topics = _not_empty(path, log)
     picked = {signal: _picked(path, topics, signal, source) for signal, source in mapping.sources.items()}
     origin = min((float(s.time[0]) for s in picked.values()), default=0.0)
     series = {signal: Series(s.time - origin, s.values, s.label, s.unit, s.is_height) for signal, s in picked.items()}
     started = Note("time_origin", f"time 0 is {origin:.6f} s of the log's clock", {"origin_ns": round(origin * 1e9)})
-    return RawLog(stem_of(path), series, (*notes, started), one_clock=False)
+    return RawLog(stem_of(path), series, (*log.notes, started), one_clock=False)
 
 
-def _picked(path: Path, topics: Mapping[str, Topic], signal: str, source: Source) -> Series:
+def topic_name(path: Path, what: str, topics: Collection[str], signal: str, source: Source) -> str:
+    """Return the topic that a source names, of those of a log; raises MappingError where it names none, or another."""
     if source.topic is None:
         raise MappingError(
-            f"`{signal}` is mapped to a {source.label}, but `{path}` is a log of topics",
+            f"`{signal}` is mapped to a {source.label}, but `{path}` is {what}",
             found=source.label,
             hint="name a `topic` and a `field`",
             signal=signal,
@@ -122,24 +168,28 @@ def _picked(path: Path, topics: Mapping[str, Topic], signal: str, source: Source
     if source.topic not in topics:
         raise MappingError(
             f"`{path}` has no topic `{source.topic}` for `{signal}`",
-            found=", ".join(sorted(topics)[:12]),
+            found=", ".join(sorted(topics)[:SHOWN]) or "no topics",
             hint=near(source.topic, list(topics)),
             signal=signal,
         )
-    topic = topics[source.topic]
+    return source.topic
+
+
+def _picked(path: Path, topics: Mapping[str, Topic], signal: str, source: Source) -> Series:
+    called = topic_name(path, "a log of topics", topics, signal, source)
+    topic = topics[called]
     fields = [part.strip() for part in (source.path or DATA).split(",")]
     for name in fields:
         if name not in topic.fields:
             raise MappingError(
-                f"topic `{source.topic}` has no field `{name}` for `{signal}`",
+                f"topic `{called}` has no field `{name}` for `{signal}`",
                 found=", ".join(topic.fields),
                 hint=near(name, list(topic.fields)),
                 signal=signal,
             )
     values = [topic.fields[name] for name in fields]
-    label = f"{source.topic}.{source.path}" if source.path else source.topic
-    unit = None if signal in COMBINED else unit_of_field(source.topic, fields[0], signal, topic.unit)
-    return Series(topic.time, values[0] if len(values) == 1 else np.stack(values, axis=1), label, unit)
+    unit = None if signal in COMBINED else unit_of_field(called, fields[0], signal, topic.unit)
+    return Series(topic.time, values[0] if len(values) == 1 else np.stack(values, axis=1), source.label, unit)
 
 
 def topic_of(time: FloatArray, fields: Mapping[str, FloatArray], unit: str | None = None) -> Topic | None:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
 
-from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.reader import MOST_CHANNELS, Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.readers._topics import DATA, Means, Topic, inventory_of, raw_log_of, topic_of
+from fieldsid.logs.reader import MOST_CHANNELS, ReadOptions
+from fieldsid.logs.readers._topics import DATA, Means, Topics, topic_of, topic_reader
 from fieldsid.logs.run import Note
+from fieldsid.logs.unknown_file import head_of
 
-HEAD = 4096
 _ENU = {"frame": "ENU/FRD"}
 MEANS: Means = {
     f"NAV_HEADING.{DATA}": ("yaw_rad", {"unit": "deg"}),
@@ -32,15 +30,12 @@ MEANS: Means = {
 
 def sniff(path: Path) -> bool:
     """Whether a file has the logger's head."""
-    if path.is_dir():
-        return False
-    with path.open("rb") as stream:
-        head = stream.read(HEAD)
+    head = head_of(path)
     return head.startswith(b"%%") and b"%% LOGSTART" in head
 
 
-def _topics(path: Path, wanted: Collection[str] = ()) -> tuple[dict[str, Topic], tuple[Note, ...], int]:
-    """Return as many topics as are looked into and those that are wanted, what was noticed, and how many others there are."""
+def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
+    """Return the variables that are numbers: as many as are looked into, and those that are wanted."""
     times: dict[str, list[float]] = {}
     values: dict[str, list[float]] = {}
     odd = 0
@@ -61,7 +56,7 @@ def _topics(path: Path, wanted: Collection[str] = ()) -> tuple[dict[str, Topic],
     found = {name: topic_of(np.array(times[name]), {DATA: np.array(values[name])}) for name in taken}
     message = f"lines of the log that are cut off or no posting, left out: {odd}"
     notes = (Note("truncated", message, {"count": odd}),) if odd else ()
-    return {n: t for n, t in found.items() if t is not None}, notes, len(times) - len(taken)
+    return Topics(found, MEANS, notes, len(times) - len(taken))
 
 
 def _number(text: str) -> float | None:
@@ -72,23 +67,4 @@ def _number(text: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
-    """Return the variables that are numbers, with count, rate and first values."""
-    topics, notes, more = _topics(path)
-    return inventory_of(path, "MOOS log", topics, MEANS, notes, kind="variable", more=more)
-
-
-def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
-    """Return the mapped variables; raises MappingError for one that is not there."""
-    topics, notes, _ = _topics(path, {s.topic for s in mapping.sources.values() if s.topic is not None})
-    return raw_log_of(path, topics, mapping, notes)
-
-
-READER = Reader(
-    name="alog",
-    says="MOOS log: .alog",
-    suffixes=(".alog",),
-    sniff=sniff,
-    inventory=inventory,
-    read=read,
-)
+READER = topic_reader("alog", "MOOS log: .alog", (".alog",), "MOOS log", sniff, _topics, "variable")

@@ -10,19 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.errors import LogError
-from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.convert.servo_counts import COUNTS, SERVOS
 from fieldsid.logs.convert.times.time_column import YEARS_S
-from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.readers._topics import Means, Topic, inventory_of, library, raw_log_of, topic_of, unheard
+from fieldsid.logs.reader import ReadOptions
+from fieldsid.logs.readers._topics import Means, Topic, Topics, library, topic_of, topic_reader, unheard
 from fieldsid.logs.run import Note
-from fieldsid.logs.unknown_file import COPY_AGAIN, DATAFLASH
+from fieldsid.logs.unknown_file import DATAFLASH, head_of, unreadable
 
 MAVLINK = (0xFE, 0xFD)
 """How a packet of either version of the protocol starts, behind eight bytes of time."""
 FORMAT, FORMAT_LENGTH = 128, 89
-HEAD = 4096
 PARAMETERS = {"PARM": ("Name", "Value"), "PARAM_VALUE": ("param_id", "param_value")}
 """Messages of the vehicle's parameters, with the fields of their name and value."""
 TEXT = re.compile(rb"^FMT, ?128,", re.MULTILINE)
@@ -64,19 +61,18 @@ def _outputs(parameters: Mapping[str, float]) -> dict[str, tuple[str, Mapping[st
 
 def sniff(path: Path) -> bool:
     """Whether a file starts as a DataFlash log, binary or text, or as a packet with its time."""
-    if path.is_dir():
-        return False
-    with path.open("rb") as stream:
-        head = stream.read(HEAD)
+    head = head_of(path)
     if head.startswith(DATAFLASH) or TEXT.search(head):
         return True
     return len(head) >= 9 and head[8] in MAVLINK and YEARS_S[0] < 1e-6 * int.from_bytes(head[:8], "big") < YEARS_S[1]
 
 
-def _topics(path: Path) -> tuple[dict[str, Topic], Means]:
-    """Return the topics of a log, and what they mean: by the definitions, the outputs by the vehicle's own parameters."""
-    with path.open("rb") as stream:
-        head = stream.read(HEAD)
+def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
+    """Return all topics, and what they mean: by the definitions, the outputs by the vehicle's own parameters.
+
+    Raises LogError for a damaged file, or without pymavlink.
+    """
+    head = head_of(path)
     is_flash = head.startswith(DATAFLASH) or TEXT.search(head) is not None
     what = "a DataFlash log (ArduPilot)" if is_flash else "a telemetry log (MAVLink)"
     mavutil = library("pymavlink.mavutil", path, what, "ardupilot")
@@ -84,11 +80,9 @@ def _topics(path: Path) -> tuple[dict[str, Topic], Means]:
         with unheard(), closing(mavutil.mavlink_connection(str(path)) if not is_flash else _flash(path)) as log:
             rows, parameters = _rows(log, is_flash=is_flash)
     except Exception as error:  # pymavlink raises this very class for a format it does not know
-        found = f"{type(error).__name__}: {error}"[:160]
-        raise LogError(f"`{path}` is {what} that cannot be read", found=found, hint=COPY_AGAIN) from error
-    found_topics = {name: _joined(messages) for name, messages in rows.items()}
-    topics = {name: topic for name, topic in found_topics.items() if topic is not None}
-    return topics, {**MEANS, **_outputs(parameters)}
+        raise unreadable(path, f"{what} that cannot be read", error) from error
+    topics = {name: _joined(messages) for name, messages in rows.items()}
+    return Topics(topics, {**MEANS, **_outputs(parameters)}, _cut(path))
 
 
 def _rows(log: Any, *, is_flash: bool) -> tuple[Rows, dict[str, float]]:
@@ -101,7 +95,8 @@ def _rows(log: Any, *, is_flash: bool) -> tuple[Rows, dict[str, float]]:
         if message.get_type() in PARAMETERS:
             name, value = (getattr(message, field) for field in PARAMETERS[message.get_type()])
             parameters[str(name)] = float(value)
-        name, time, fields = _of_flash(message) if is_flash else _of_packet(message)
+        fields = {k: v for k, v in message.to_dict().items() if isinstance(v, (int, float)) and not isinstance(v, bool)}
+        name, time = _of_flash(message, fields) if is_flash else _of_packet(message)
         if time is not None and fields:
             rows.setdefault(name, []).append((time, fields))
     return rows, parameters
@@ -109,9 +104,7 @@ def _rows(log: Any, *, is_flash: bool) -> tuple[Rows, dict[str, float]]:
 
 def _flash(path: Path) -> Any:
     forms = library("pymavlink.DFReader", path, "a DataFlash log (ArduPilot)", "ardupilot")
-    with path.open("rb") as stream:
-        is_binary = stream.read(len(DATAFLASH)) == DATAFLASH
-    its_own = forms.DFReader_binary if is_binary else forms.DFReader_text
+    its_own = forms.DFReader_binary if head_of(path).startswith(DATAFLASH) else forms.DFReader_text
     # its compiled index writes a line for each damaged byte to the process's own stderr, where nothing keeps it from the user
     kind: Any = type("Quiet", (its_own,), {"init_arrays_fast": its_own.init_arrays})  # the text form has none
     log = kind.__new__(kind)
@@ -125,18 +118,17 @@ def _flash(path: Path) -> Any:
     return log
 
 
-def _of_flash(message: Any) -> tuple[str, float | None, dict[str, float]]:
-    body = {k: v for k, v in message.to_dict().items() if isinstance(v, (int, float)) and not isinstance(v, bool)}
+def _of_flash(message: Any, body: dict[str, float]) -> tuple[str, float | None]:
+    """Return the name and the time in s of a message of the vehicle, which are taken out of its numbers."""
     stamp, unit_s = (body.pop("TimeUS"), 1e-6) if "TimeUS" in body else (body.pop("TimeMS", None), 1e-3)
     # without the units of its fields a format does not say which is the number of the sensor: then it stands behind the time
     which = getattr(message.fmt, "instance_field", None) or ("I" if list(message.fmt.columns[1:2]) == ["I"] else None)
     name = f"{message.get_type()}[{int(body.pop(which))}]" if which in body else message.get_type()
-    return name, None if stamp is None else float(stamp) * unit_s, body
+    return name, None if stamp is None else float(stamp) * unit_s
 
 
-def _of_packet(message: Any) -> tuple[str, float | None, dict[str, float]]:
-    body = {k: v for k, v in message.to_dict().items() if isinstance(v, (int, float)) and not isinstance(v, bool)}
-    return message.get_type(), float(message._timestamp), body  # noqa: SLF001 - pymavlink's only name for the log's time
+def _of_packet(message: Any) -> tuple[str, float]:
+    return message.get_type(), float(message._timestamp)  # noqa: SLF001 - pymavlink's only name for the log's time
 
 
 def _cut(path: Path) -> tuple[Note, ...]:
@@ -158,22 +150,11 @@ def _joined(messages: list[tuple[float, dict[str, float]]]) -> Topic | None:
     return topic_of(np.array([t for t, _ in messages]), fields)
 
 
-def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
-    """Return the messages with count, rate and first values; raises LogError for a damaged file, or without pymavlink."""
-    topics, means = _topics(path)
-    return inventory_of(path, "ArduPilot log", topics, means, _cut(path))
-
-
-def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
-    """Return the mapped fields; raises MappingError for one that is not there, LogError as `inventory` does."""
-    return raw_log_of(path, _topics(path)[0], mapping, _cut(path))
-
-
-READER = Reader(
-    name="ardupilot",
-    says="ArduPilot log: .bin, its text form .log, .tlog, with the extra `ardupilot`",
-    suffixes=(".bin", ".BIN", ".log", ".tlog"),
-    sniff=sniff,
-    inventory=inventory,
-    read=read,
+READER = topic_reader(
+    "ardupilot",
+    "ArduPilot log: .bin, its text form .log, .tlog, with the extra `ardupilot`",
+    (".bin", ".BIN", ".log", ".tlog"),
+    "ArduPilot log",
+    sniff,
+    _topics,
 )

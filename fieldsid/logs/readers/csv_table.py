@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -15,16 +15,47 @@ import numpy.typing as npt
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, span_of
+from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.readers._cells import ERRORS, MISSING, SENTENCE, cells, has_number, is_word
-from fieldsid.logs.readers._clock import Clock, clock_of, why_no_clock
-from fieldsid.logs.readers._columns import Columns, numbers_mostly, own_map_of, samples_of, series_of, used_by
-from fieldsid.logs.readers._growing import NUMBERS, GrowingColumn
-from fieldsid.logs.readers._plain_text import GZIP, HEAD, PlainText, plain_text
+from fieldsid.logs.readers._clock import inventory_of_table
+from fieldsid.logs.readers._columns import Columns, own_map_of, series_of, used_by
+from fieldsid.logs.readers._plain_text import HEAD, PlainText, plain_text
 from fieldsid.logs.readers._text import LOOKED_AT, Form, form_of
-from fieldsid.logs.readers._unpacked_rows import LONGEST_ROW, refuse_endless
+from fieldsid.logs.readers._unpacked import GZIP, LONGEST_ROW, refuse_endless
 from fieldsid.logs.run import Note
-from fieldsid.logs.unknown_file import COPY_AGAIN, is_text, known_text
+from fieldsid.logs.unknown_file import COPY_AGAIN, head_of, is_text, known_text
+
+NUMBERS = "fiub"
+ROOM = 1.01
+"""By how much a column is made longer than it is expected to become: one that is too short is moved once more."""
+
+
+class GrowingColumn:
+    """Cells (n,) of a column: numbers as long as all blocks hold nothing else, words from then on."""
+
+    def __init__(self) -> None:
+        self._cells: npt.NDArray[Any] = np.zeros(0)
+        self._count = 0
+
+    def add(self, block: npt.NDArray[Any], expected: float) -> None:
+        """Append a block; `expected` is the number of cells that the column will probably have."""
+        if not self._count:
+            self._cells = self._cells.astype(block.dtype)
+        elif block.dtype != self._cells.dtype:
+            has_words = any(dtype.kind not in NUMBERS for dtype in (block.dtype, self._cells.dtype))
+            self._cells = self._cells.astype(object if has_words else np.result_type(block, self._cells))
+        end = self._count + block.size
+        if end > self._cells.size:
+            self._cells.resize(max(end, round(ROOM * expected)), refcheck=False)
+        self._cells[self._count : end] = block
+        self._count = end
+
+    def whole(self) -> npt.NDArray[Any]:
+        """Return the cells (n,), read-only; the column grows no more."""
+        self._cells.resize(self._count, refcheck=False)
+        self._cells.setflags(write=False)
+        return self._cells
+
 
 _LINE = re.compile(r"line (\d+)")
 BLOCK_ROWS = 100_000
@@ -33,29 +64,18 @@ BLOCK_ROWS = 100_000
 
 def sniff(path: Path) -> bool:
     """Whether a file may be text: anything that has no binary format's signature."""
-    if path.is_dir():
-        return False
-    with path.open("rb") as stream:
-        if stream.read(len(GZIP)) == GZIP:
-            return True
-    return is_text(path)
+    return not path.is_dir() and (head_of(path).startswith(GZIP) or is_text(path))
 
 
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     """Return the columns with their count of numbers, the table's rate and the first values."""
     with opened(path, form, options) as table:
         columns = table.columns(range(table.form.width))
-        clock = clock_of(columns, options.clock)
-        channels = tuple(_channel(columns, i, clock) for i in range(table.form.width))
         written = table.form
         found = TableForm(
             written.separator, bool(written.names), written.start, form.encoding, "," if written.decimal == "," else "."
         )
-        duration = clock.duration_s if clock else float("nan")
-        samples = samples_of(columns, clock.time, clock.source) if clock else None
-        notes = (*table.notes, *(clock.notes if clock else ()))
-        problem = why_no_clock(columns) if clock is None and options.clock is None else None
-        return Inventory(path, "text table", duration, channels, found, notes, samples, no_clock=problem)
+        return inventory_of_table(path, "text table", columns, options, table=found, notes=table.notes)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
@@ -151,7 +171,7 @@ class _Table:
         with TemporaryFile() as blanked, TemporaryFile() as own, TemporaryFile() as plain:
             if self.text.holds(ERRORS, b"#", self.begin, self.end):
                 self._without_errors(blanked)
-            if self.text.holds(SENTENCE, b"$", self.begin, self.end):
+            if not self.form.is_sentences and self.text.holds(SENTENCE, b"$", self.begin, self.end):
                 self._without_sentences(own)
             try:
                 return self._parsed(wanted)
@@ -160,50 +180,56 @@ class _Table:
                     raise
                 return self._parsed(wanted)
 
-    def _without_errors(self, plain: IO[bytes]) -> None:
-        """Copy the rows, with an empty cell for each in which a program says that there is no number."""
-        count, first = 0, b""
+    def _copied(self, plain: IO[bytes], line_of: Callable[[bytes], bytes]) -> None:
+        """Read on from a copy of the rows, each as a function gives it."""
         with self.text.between(self.begin, self.end) as rows:
-            for raw in rows:
-                found = ERRORS.findall(raw) if b"#" in raw else []
-                count, first = count + len(found), first or (found[0] if found else b"")
-                plain.write(ERRORS.sub(b"", raw) if found else raw)
-        self._turn_to(plain)
-        message = f"cells that say there is no number, as {first.decode()!r}, taken as missing: {count}"
-        self.notes.append(Note("error_cells", message, {"count": count}))
-
-    def _without_sentences(self, plain: IO[bytes]) -> None:
-        """Copy the rows, with an empty line for each sentence of NMEA among them; a log of nothing else stays as it is."""
-        found: list[bytes] = []
-        with self.text.between(self.begin, self.end) as rows:
-            for raw in rows:
-                is_sentence = SENTENCE.match(raw) is not None
-                found += [raw] if is_sentence else []
-                plain.write(b"\n" if is_sentence else raw)
-        if self.form.is_sentences:
-            return
-        self._turn_to(plain)
-        first = found[0].decode("latin-1").strip()[:60]
-        message = f"lines of another talker (NMEA 0183) between the rows, left out: {len(found)}, the first {first!r}"
-        self.notes.append(Note("nmea_lines", message, {"count": len(found)}))
-
-    def _turn_to(self, plain: IO[bytes]) -> None:
-        """Read the rows from a copy of them."""
+            plain.writelines(map(line_of, rows))
         self.text = replace(self.text, stream=plain, size=plain.tell(), encoding=self.text.encoding.removesuffix("-sig"))
         self.begin, self.end = 0, plain.tell()
 
+    def _without_errors(self, plain: IO[bytes]) -> None:
+        """Leave an empty cell for each in which a program says that there is no number."""
+        found: list[bytes] = []
+
+        def without(raw: bytes) -> bytes:
+            said = ERRORS.findall(raw) if b"#" in raw else []
+            found.extend(said)
+            return ERRORS.sub(b"", raw) if said else raw
+
+        self._copied(plain, without)
+        if found:
+            message = f"cells that say there is no number, as {found[0].decode()!r}, taken as missing: {len(found)}"
+            self.notes.append(Note("error_cells", message, {"count": len(found)}))
+
+    def _without_sentences(self, plain: IO[bytes]) -> None:
+        """Leave an empty line for each sentence of NMEA among the rows."""
+        found: list[bytes] = []
+
+        def without(raw: bytes) -> bytes:
+            is_sentence = SENTENCE.match(raw) is not None
+            found.extend([raw] if is_sentence else [])
+            return b"\n" if is_sentence else raw
+
+        self._copied(plain, without)
+        if found:
+            first = found[0].decode("latin-1").strip()[:60]
+            message = f"lines of another talker (NMEA 0183) between the rows, left out: {len(found)}, the first {first!r}"
+            self.notes.append(Note("nmea_lines", message, {"count": len(found)}))
+
     def _without_words(self, plain: IO[bytes]) -> bool:
-        """Copy the rows, with an empty line for each line without a number that is no row; return whether there was one."""
+        """Leave an empty line for each line without a number that is no row; return whether there was one."""
         found: list[str] = []
-        with self.text.between(self.begin, self.end) as rows:
-            for raw in rows:
-                line = raw.decode(self.text.encoding, errors="replace").strip()
-                is_row = not line or line.startswith("#") or has_number(line, self.form.separator, self.form.decimal)
-                plain.write(raw if is_row else b"\n")
-                found += [] if is_row else [line]
-        self._turn_to(plain)
-        message = f"lines of words between the rows, left out: {len(found)}, the first {found[0][:60]!r}" if found else ""
-        self.notes += [Note("text_rows", message, {"count": len(found)})] if found else []
+
+        def without(raw: bytes) -> bytes:
+            line = raw.decode(self.text.encoding, errors="replace").strip()
+            is_row = not line or line.startswith("#") or has_number(line, self.form.separator, self.form.decimal)
+            found.extend([] if is_row else [line])
+            return raw if is_row else b"\n"
+
+        self._copied(plain, without)
+        if found:
+            message = f"lines of words between the rows, left out: {len(found)}, the first {found[0][:60]!r}"
+            self.notes.append(Note("text_rows", message, {"count": len(found)}))
         return bool(found)
 
     def _parsed(self, wanted: Sequence[int]) -> dict[int, npt.NDArray[Any]]:
@@ -272,20 +298,6 @@ def _exact(version: str) -> dict[str, Any]:
     """Ask pandas for the last digit; from 3.1 on it gives it unasked, and warns when asked."""
     major, minor = (int(n) for n in version.split(".")[:2])
     return {} if (major, minor) >= (3, 1) else {"float_precision": "round_trip"}
-
-
-def _channel(columns: Columns, index: int, clock: Clock | None) -> ChannelInfo:
-    import pandas as pd
-
-    values = numbers_mostly(columns.take(index))
-    numeric = values.dtype.kind in NUMBERS
-    seen = np.isfinite(values.astype(float)) if numeric else ~np.asarray(pd.isna(values))
-    first: Sequence[Any] = values[seen][:3].tolist()
-    kind = "number" if numeric else "text"
-    span = span_of(values) if numeric else None
-    rate = clock.rate_hz(values) if clock else float("nan")
-    unit = columns.units[index] if columns.units else None
-    return ChannelInfo(columns.name(index), kind, int(seen.sum()), rate, (FieldInfo("", kind, tuple(first), span),), unit)
 
 
 READER = Reader(

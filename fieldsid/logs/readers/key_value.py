@@ -12,20 +12,20 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import LogError
-from fieldsid.logs.channels import ChannelMap, TableForm
+from fieldsid.logs.channels import TableForm
 from fieldsid.logs.convert.number_cells import as_numbers
 from fieldsid.logs.convert.times.time_column import seconds_of
-from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
-from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
+from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.readers import csv_table
 from fieldsid.logs.readers._cells import cells, is_word
 from fieldsid.logs.readers._clock import unit_by_size
 from fieldsid.logs.readers._columns import Columns
 from fieldsid.logs.readers._plain_text import HEAD, plain_text
 from fieldsid.logs.readers._text import Form, form_of
-from fieldsid.logs.readers._topics import DATA, Topic, inventory_of, raw_log_of, topic_of
+from fieldsid.logs.readers._topics import DATA, Topic, Topics, topic_of, topic_reader
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
@@ -74,7 +74,7 @@ def _places(form: Form, head: str) -> _Places | None:
     return None
 
 
-def _topics(path: Path, options: ReadOptions) -> tuple[dict[str, Topic], tuple[Note, ...]]:
+def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
     """Return the keys whose values are numbers as topics of one number, in the order of their times."""
     with csv_table.opened(path, TableForm(), options) as table:
         with plain_text(path, limit=HEAD) as text:
@@ -86,7 +86,7 @@ def _topics(path: Path, options: ReadOptions) -> tuple[dict[str, Topic], tuple[N
         said = columns.take(places.key).astype(str)
         values = as_numbers(columns.take(places.value))[0]
         found = {str(key): _topic(time, values, said == key) for key in np.unique(said)}
-        return {k: t for k, t in found.items() if t is not None}, (*table.notes, *notes)
+        return Topics(found, notes=(*table.notes, *notes))
 
 
 def _times(columns: Columns, place: int) -> tuple[FloatArray, list[Note]]:
@@ -104,23 +104,12 @@ def _topic(time: FloatArray, values: FloatArray, rows: npt.NDArray[np.bool_]) ->
     return topic_of(time[seen], {DATA: values[seen]})
 
 
-def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
-    """Return the keys whose values are numbers, with count, rate, least and largest."""
-    topics, notes = _topics(path, options)
-    return inventory_of(path, "key-value table", topics, {}, notes, kind="key")
-
-
-def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
-    """Return the mapped keys; raises MappingError for one that is not there."""
-    topics, notes = _topics(path, options)
-    return raw_log_of(path, topics, mapping, notes)
-
-
-READER = Reader(
-    name="key_value",
-    says="text table of one reading a row: time, key, value",
-    suffixes=(".csv", ".csv.gz", ".tsv", ".txt"),
-    sniff=sniff,
-    inventory=inventory,
-    read=read,
+READER = topic_reader(
+    "key_value",
+    "text table of one reading a row: time, key, value",
+    (".csv", ".csv.gz", ".tsv", ".txt"),
+    "key-value table",
+    sniff,
+    _topics,
+    "key",
 )

@@ -11,26 +11,79 @@ import gzip
 import struct
 import zlib
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import LogError
-from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.readers._imc_definition import Message, definition_of
-from fieldsid.logs.readers._topics import Means, Topic, inventory_of, raw_log_of, topic_of
-from fieldsid.logs.readers._unpacked_size import UnpackedSize
+from fieldsid.logs.reader import ReadOptions
+from fieldsid.logs.readers._topics import Means, Topic, Topics, topic_of, topic_reader
+from fieldsid.logs.readers._unpacked import GZIP, inflated
 from fieldsid.logs.run import Note
-from fieldsid.logs.unknown_file import COPY_AGAIN, imc_order
+from fieldsid.logs.unknown_file import COPY_AGAIN, head_of, imc_order
 from fieldsid.numerics.arrays import FloatArray
 
-GZIP = b"\x1f\x8b"
+FILES = ("IMC.xml", "IMC.xml.gz")
+NUMBERS: Mapping[str, str] = MappingProxyType(
+    {"int8_t": "i1", "uint8_t": "u1", "int16_t": "i2", "uint16_t": "u2", "int32_t": "i4", "uint32_t": "u4", "int64_t": "i8",
+     "fp32_t": "f4", "fp64_t": "f8"}
+)  # fmt: skip
+"""NumPy's types of the protocol's numbers; text, raw data and messages inside a message have no length of their own."""
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A kind of message: its name, and its numbers (name and NumPy type) before the first field of variable length."""
+
+    name: str
+    numbers: tuple[tuple[str, str], ...]
+
+
+def definition_of(path: Path, folder: Path | None) -> dict[int, Message]:
+    """Return the kinds of messages by number, from beside a log or from a folder; raises LogError for no definition."""
+    place = folder or path.parent
+    file = next((f for name in FILES if (f := place / name).is_file()), None)
+    if file is None:
+        raise LogError(
+            f"`{path}` is an IMC log (DUNE, LSTS), and the definition of its messages is missing",
+            found=f"no {' and no '.join(FILES)} in `{place}`",
+            hint="copy the IMC.xml that the vehicle wrote beside the log, or name its folder: `--msg-path DIR`",
+        )
+    try:
+        return _messages(*inflated(file))
+    except (ET.ParseError, LookupError, ValueError) as error:
+        raise LogError(
+            f"`{file}` is no definition of IMC messages", found=f"{type(error).__name__}: {error}", hint=COPY_AGAIN
+        ) from error
+
+
+def _messages(text: bytes, is_cut: bool) -> dict[int, Message]:  # noqa: FBT001 - as `inflated` gives them
+    if is_cut:
+        raise ValueError("it is cut off")
+    if b"<!ENTITY" in text:
+        raise ValueError("it defines entities of its own")
+    root = ET.fromstring(text)  # noqa: S314 - what could grow without bound is refused above
+    return {int(m.attrib["id"]): Message(m.attrib["abbrev"], _numbers_of(m)) for m in root.iter("message")}
+
+
+def _numbers_of(message: ET.Element) -> tuple[tuple[str, str], ...]:
+    found: list[tuple[str, str]] = []
+    for part in message.iter("field"):
+        kind = NUMBERS.get(part.attrib["type"])
+        if kind is None:
+            break
+        found.append((part.attrib["abbrev"], kind))
+    if len({name for name, _ in found}) < len(found):
+        raise ValueError(f"message {message.attrib['abbrev']} has a field twice")
+    return tuple(found)
+
+
 HEADER, FOOTER = 20, 2
-BLOCK = 1 << 20
 MOST_IDS = 32
 """Numbers of servos, motors and the like in one kind of message; more are no numbers of devices."""
 _STATE = {
@@ -49,33 +102,14 @@ MEANS: Means = {f"EstimatedState.{name}": (signal, {"unit": unit}) for name, (si
 
 def sniff(path: Path) -> bool:
     """Whether a file, packed or not, starts with a synchronisation number."""
-    if path.is_dir():
-        return False
-    with path.open("rb") as stream:
-        head = stream.read(2)
-    if head == GZIP:
+    head = head_of(path)
+    if head.startswith(GZIP):
         try:
             with gzip.open(path) as packed:
                 head = packed.read(2)
         except (OSError, EOFError, zlib.error):  # whatever it is, this reader does not take it
             return False
     return imc_order(head) is not None
-
-
-def _unpacked(path: Path) -> tuple[bytes, bool]:
-    """Return the bytes of a log, and whether they end before it does."""
-    raw = path.read_bytes()
-    if not raw.startswith(GZIP):
-        return raw, False
-    unpack, out, size = zlib.decompressobj(wbits=31), bytearray(), UnpackedSize(path)
-    try:
-        for start in range(0, len(raw), BLOCK):
-            piece = unpack.decompress(raw[start : start + BLOCK], size.left + 1)
-            size.add(len(piece))
-            out += piece
-    except zlib.error:
-        return bytes(out), True
-    return bytes(out), not unpack.eof
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,9 +161,10 @@ def _whole(messages: npt.NDArray[np.uint8], order: str) -> npt.NDArray[np.bool_]
     return np.asarray(made == said)
 
 
-def _topics(path: Path, options: ReadOptions) -> tuple[dict[str, Topic], tuple[Note, ...]]:
+def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
+    """Return the messages of all kinds that have numbers; raises LogError for a log without its definition."""
     kinds = definition_of(path, options.msg_path)
-    data, is_cut = _unpacked(path)
+    data, is_cut = inflated(path)
     order = imc_order(data[:2])
     if order is None:
         raise LogError(f"`{path}` is a damaged IMC log", found="no message at its start", hint=COPY_AGAIN)
@@ -147,8 +182,7 @@ def _topics(path: Path, options: ReadOptions) -> tuple[dict[str, Topic], tuple[N
         time = np.ascontiguousarray(good[:, 6:14]).view(f"{order}f8")[:, 0].astype(np.float64)
         numbers = np.ascontiguousarray(good[:, HEADER : HEADER + layout.itemsize]).view(layout)[:, 0]
         parts[kind, source, entity].append((time, {n: numbers[n].astype(np.float64) for n in layout.names or ()}))
-    notes = _notes(places, wrong, is_cut=is_cut)
-    return dict(_named(kinds, parts, _most(own))), notes
+    return Topics(dict(_named(kinds, parts, _most(own))), MEANS, _notes(places, wrong, is_cut=is_cut))
 
 
 def _notes(places: _Places, wrong: int, *, is_cut: bool) -> tuple[Note, ...]:
@@ -171,7 +205,7 @@ def _most(counts: Counter[tuple[int, int, int, int]]) -> int:
 
 def _named(
     kinds: dict[int, Message], parts: dict[tuple[int, int, int], list[tuple[FloatArray, dict[str, FloatArray]]]], own: int
-) -> Iterator[tuple[str, Topic]]:
+) -> Iterator[tuple[str, Topic | None]]:
     """Yield topics: the own system's busiest entity has the message's name, others their source, entity or device beside it."""
     sizes = {key: sum(len(time) for time, _ in blocks) for key, blocks in parts.items()}
     for (kind, source, entity), blocks in parts.items():
@@ -183,34 +217,13 @@ def _named(
         fields = {n: np.concatenate([f[n] for _, f in blocks]) for n in blocks[0][1]}
         devices = np.unique(fields["id"]) if "id" in fields else np.zeros(0)
         if not 1 < devices.size <= MOST_IDS:
-            topic = topic_of(time, fields)
-            if topic is not None:
-                yield name, topic
+            yield name, topic_of(time, fields)
             continue
         for device in devices:
             rows = fields["id"] == device
-            topic = topic_of(time[rows], {n: v[rows] for n, v in fields.items()})
-            if topic is not None:
-                yield f"{name}[{device:.0f}]", topic
+            yield f"{name}[{device:.0f}]", topic_of(time[rows], {n: v[rows] for n, v in fields.items()})
 
 
-def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
-    """Return the messages with count, rate and first numbers; raises LogError for a log without its definition."""
-    topics, notes = _topics(path, options)
-    return inventory_of(path, "IMC log", topics, MEANS, notes)
-
-
-def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
-    """Return the mapped fields; raises MappingError for one that is not there, LogError as `inventory` does."""
-    topics, notes = _topics(path, options)
-    return raw_log_of(path, topics, mapping, notes)
-
-
-READER = Reader(
-    name="lsf",
-    says="DUNE log (LSTS): .lsf, .lsf.gz, with its IMC.xml beside it",
-    suffixes=(".lsf", ".lsf.gz"),
-    sniff=sniff,
-    inventory=inventory,
-    read=read,
+READER = topic_reader(
+    "lsf", "DUNE log (LSTS): .lsf, .lsf.gz, with its IMC.xml beside it", (".lsf", ".lsf.gz"), "IMC log", sniff, _topics
 )

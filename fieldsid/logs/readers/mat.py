@@ -13,13 +13,13 @@ import numpy as np
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, span_of
-from fieldsid.logs.readers._clock import clock_of, why_no_clock
-from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
+from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
+from fieldsid.logs.readers._clock import inventory_of_table
+from fieldsid.logs.readers._columns import Columns, own_map_of, series_of
 from fieldsid.logs.readers._mat_elements import refuse_damaged
 from fieldsid.logs.readers._topics import library
-from fieldsid.logs.readers._unpacked_size import UnpackedSize
-from fieldsid.logs.unknown_file import COPY_AGAIN
+from fieldsid.logs.readers._unpacked import UnpackedSize
+from fieldsid.logs.unknown_file import head_of, unreadable
 from fieldsid.numerics.arrays import FloatArray
 
 MAGIC = b"MATLAB "
@@ -32,16 +32,11 @@ _FAILURES = (ValueError, TypeError, KeyError, IndexError, OSError, EOFError, Not
 
 def sniff(path: Path) -> bool:
     """Whether a file has MATLAB's head."""
-    if path.is_dir():
-        return False
-    with path.open("rb") as stream:
-        return stream.read(len(MAGIC)) == MAGIC
+    return head_of(path).startswith(MAGIC)
 
 
 def _columns(path: Path) -> Columns:
-    with path.open("rb") as stream:
-        is_hdf5 = stream.read(len(HDF5)) == HDF5
-    found = dict(_of_hdf5(path) if is_hdf5 else _of_mat(path))
+    found = dict(_of_hdf5(path) if head_of(path).startswith(HDF5) else _of_mat(path))
     lengths = Counter(v.size for v in found.values())
     if not lengths:
         raise LogError(
@@ -70,11 +65,11 @@ def _of_mat(path: Path) -> Iterator[tuple[str, FloatArray]]:
             warnings.simplefilter("ignore", scipy_io.matlab.MatReadWarning)
             variables = scipy_io.loadmat(str(path), squeeze_me=True, struct_as_record=False)
     except _FAILURES as error:
-        raise _damaged(path, error) from error
+        raise unreadable(path, "a MATLAB file that cannot be read", error) from error
     except Exception as error:  # scipy raises its own kind, and zlib another
         if type(error).__module__.partition(".")[0] not in ("scipy", "zlib"):
             raise
-        raise _damaged(path, error) from error
+        raise unreadable(path, "a MATLAB file that cannot be read", error) from error
     for name, value in variables.items():
         if not name.startswith("__"):
             yield from _walked(name, value, 0)
@@ -112,33 +107,13 @@ def _of_hdf5(path: Path) -> Iterator[tuple[str, FloatArray]]:
         with h5py.File(str(path), "r") as file:
             file.visititems(visit)
     except _FAILURES as error:
-        raise _damaged(path, error) from error
+        raise unreadable(path, "a MATLAB file that cannot be read", error) from error
     yield from found
-
-
-def _damaged(path: Path, error: Exception) -> LogError:
-    found = f"{type(error).__name__}: {error}"[:160]
-    return LogError(f"`{path}` is a MATLAB file that cannot be read", found=found, hint=COPY_AGAIN)
 
 
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     """Return the columns with their count of numbers, rate and first values; raises LogError where there are none."""
-    columns = _columns(path)
-    clock = clock_of(columns, options.clock)
-    channels = tuple(
-        ChannelInfo(
-            name,
-            "number",
-            int(np.isfinite(values).sum()),
-            clock.rate_hz(values) if clock else float("nan"),
-            (FieldInfo("", "number", tuple(values[:3].tolist()), span_of(values)),),
-        )
-        for name, values in ((n, columns.take(i)) for i, n in enumerate(columns.names))
-    )
-    samples = samples_of(columns, clock.time, clock.source) if clock else None
-    problem = why_no_clock(columns) if clock is None and options.clock is None else None
-    duration, notes = (clock.duration_s, clock.notes) if clock else (float("nan"), ())
-    return Inventory(path, "MATLAB file", duration, channels, notes=notes, samples=samples, no_clock=problem)
+    return inventory_of_table(path, "MATLAB file", _columns(path), options)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:

@@ -12,14 +12,13 @@ import numpy as np
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.mapping.vocabulary import TIME
-from fieldsid.logs.reader import MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, Series, span_of
-from fieldsid.logs.readers._clock import clock_of, why_no_clock
-from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
-from fieldsid.logs.readers._unpacked_rows import refuse_repeated
-from fieldsid.logs.readers._unpacked_size import UnpackedSize
+from fieldsid.logs.reader import MOST_CHANNELS, Inventory, RawLog, Reader, ReadOptions, Series
+from fieldsid.logs.readers._clock import inventory_of_table
+from fieldsid.logs.readers._columns import Columns, own_map_of, series_of
+from fieldsid.logs.readers._unpacked import UnpackedSize, refuse_repeated
 from fieldsid.logs.run import COLUMNS, Note
 from fieldsid.logs.several.run_names import stem_of
-from fieldsid.logs.unknown_file import COPY_AGAIN
+from fieldsid.logs.unknown_file import COPY_AGAIN, head_of
 from fieldsid.records.check import check
 from fieldsid.records.kinds import RUN_HEAD
 from fieldsid.records.reading import read_json
@@ -34,30 +33,14 @@ AGAIN = "import the log again, with `--force`"
 
 def sniff(path: Path) -> bool:
     """Whether a file starts like Parquet."""
-    if path.is_dir():
-        return False
-    with path.open("rb") as stream:
-        return stream.read(4) == MAGIC
+    return head_of(path).startswith(MAGIC)
 
 
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     """Return the columns with their count of numbers and first values."""
     table = _table(path)
-    columns = _columns(path, table)
-    clock = clock_of(columns, options.clock)
-    channels = []
-    for i, name in enumerate(table.column_names):
-        column, cells = table.column(i), columns.take(i)
-        count = len(column) - column.null_count
-        kind = "text" if cells.dtype.kind == "O" else "number"
-        rate = clock.rate_hz(cells) if clock else float("nan")
-        first = cells[:3].astype(str) if cells.dtype.kind == "M" else cells[:3]
-        channels.append(ChannelInfo(name, kind, count, rate, (FieldInfo("", kind, tuple(first.tolist()), span_of(cells)),)))
-    samples = samples_of(columns, clock.time, clock.source) if clock else None
-    problem = why_no_clock(columns) if clock is None and options.clock is None else None
-    duration, notes = (clock.duration_s, clock.notes) if clock else (float("nan"), ())
-    more = len(import_module("pyarrow.parquet").read_schema(path).names) - len(channels)
-    return Inventory(path, "Parquet table", duration, tuple(channels), notes=notes, samples=samples, no_clock=problem, more=more)
+    more = len(import_module("pyarrow.parquet").read_schema(path).names) - len(table.column_names)
+    return inventory_of_table(path, "Parquet table", _columns(path, table), options, more=more)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:

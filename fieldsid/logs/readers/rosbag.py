@@ -22,7 +22,7 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     """Return the mapped signals; raises MappingError for an unknown topic or field, LogError for an empty bag."""
-    from fieldsid.logs.readers.bags.signals import read_signals
+    from fieldsid.logs.readers.bags.contents import read_signals
 
     return read_signals(path, mapping, options)
 

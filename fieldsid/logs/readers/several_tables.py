@@ -13,18 +13,19 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ATTITUDE, ChannelMap, TableForm
 from fieldsid.logs.convert.times.time_column import EPOCH_FROM_S
+from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.guesses import quaternion_of
 from fieldsid.logs.reader import JOINED, TABLE, Inventory, RawLog, Reader, ReadOptions, reader_of
 from fieldsid.logs.readers import csv_table, parquet
 from fieldsid.logs.readers._clock import Clock, clock_of
 from fieldsid.logs.readers._columns import Columns, numbers_mostly
-from fieldsid.logs.readers._devices import devices_of
 from fieldsid.logs.readers._tables_of_run import names_in_run, run_of, runs_in
-from fieldsid.logs.readers._topics import Means, Topic, inventory_of, raw_log_of, topic_of
+from fieldsid.logs.readers._topics import Means, Topic, Topics, inventory_of, raw_log_of, topic_of, wanted_by
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import name_of_run
 from fieldsid.numerics.arrays import FloatArray
@@ -62,19 +63,19 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     topics = {name: part.topic for name, part in parts.items()}
     apart = _apart(parts)
     notes = (*notes, *([Note("clocks_apart", f"{apart.what} ({apart.found})", {})] if apart else _joined(parts)))
-    return inventory_of(path, "tables of one run", topics, _attitudes(topics), notes, kind=TABLE)
+    return inventory_of(path, "tables of one run", Topics(topics, _attitudes(topics), notes), kind=TABLE)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     """Return the mapped columns; raises MappingError for one that is not there, LogError where their clocks are not one."""
-    wanted = {source.topic for source in mapping.sources.values() if source.topic is not None}
+    wanted = wanted_by(mapping)
     parts, notes = _parts(path, options, mapping.table, mapping, wanted)
     used = {name: part for name, part in parts.items() if name in wanted}
     apart = _apart(used)
     if apart is not None:
         raise apart
     topics = {name: part.topic for name, part in parts.items()}
-    raw = raw_log_of(path, topics, mapping, (*notes, *_joined(used)))
+    raw = raw_log_of(path, Topics(topics, notes=(*notes, *_joined(used))), mapping)
     return replace(raw, name=name_of_run(run_of(path, options.joined)) if options.joined else raw.name)
 
 
@@ -193,3 +194,36 @@ READER = Reader(
     inventory=inventory,
     read=read,
 )
+
+
+CALLED = frozenset({"id", "device", "instance", "servo", "channel", "fin", "motor", "actuator", "thruster", "number", "no", "nr"})
+"""Words of a column that tells the device."""
+MOST_DEVICES = 32
+IN_TURN = 0.5
+"""Share of the rows that are another device's than the one before."""
+
+
+def devices_of(columns: Columns) -> dict[str, Columns]:
+    """Return the rows of each device under its number or word in brackets, as `[3]`; the table itself under nothing elsewhere."""
+    for i, name in enumerate(columns.names):
+        words = set(words_of(name))
+        if not words or not words <= CALLED:
+            continue
+        cells = columns.take(i)
+        told = _told(cells)
+        if told:
+            rest = replace(columns, names=tuple(n if k != i else "" for k, n in enumerate(columns.names)))
+            return {f"[{label}]": rest.rows(rows) for label, rows in told.items()}
+    return {"": columns}
+
+
+def _told(cells: npt.NDArray[Any]) -> dict[str, npt.NDArray[np.bool_]]:
+    """Return the rows (n,) of each device that cells (n,) tell; none where they tell no devices."""
+    if cells.size < 2 or float(np.mean(cells[1:] != cells[:-1])) < IN_TURN:
+        return {}
+    if cells.dtype.kind == "f" and not bool((cells == np.round(cells)).all()):
+        return {}
+    known = sorted(set(cells.tolist()), key=str) if cells.dtype.kind in "iufO" else []
+    if not 1 < len(known) <= MOST_DEVICES:
+        return {}
+    return {(f"{k:.0f}" if isinstance(k, (int, float)) else str(k).strip()): cells == k for k in known}

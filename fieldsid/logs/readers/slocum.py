@@ -11,14 +11,12 @@ from typing import Any
 import numpy as np
 
 from fieldsid.errors import LogError
-from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.readers._topics import DATA, Means, Topic, inventory_of, library, raw_log_of, topic_of
+from fieldsid.logs.reader import ReadOptions
+from fieldsid.logs.readers._topics import DATA, Means, Topic, Topics, library, topic_of, topic_reader
 from fieldsid.logs.run import Note
-from fieldsid.logs.unknown_file import COPY_AGAIN, is_glider_log
+from fieldsid.logs.unknown_file import COPY_AGAIN, head_of, is_glider_log, unreadable
 
 END = b"X"
-HEAD = 2048
 SIZES = {1, 2, 4, 8}
 """Bytes of a sensor's number."""
 MEANS: Means = {
@@ -40,13 +38,11 @@ _FAILURES = (ValueError, KeyError, IndexError, TypeError, OSError, UnicodeDecode
 
 def sniff(path: Path) -> bool:
     """Whether a file has the head of a glider's binary log."""
-    if path.is_dir():
-        return False
-    with path.open("rb") as stream:
-        return is_glider_log(stream.read(HEAD))
+    return is_glider_log(head_of(path))
 
 
-def _topics(path: Path, wanted: set[str] | None = None) -> dict[str, Topic]:
+def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
+    """Return the sensors that are wanted, all where they are not all there; raises LogError, also without dbdreader."""
     dbdreader = library("dbdreader", path, "a Slocum glider's log", "slocum")
     _refuse_cut_head(path)
     cache = _cache_of(path)
@@ -59,17 +55,17 @@ def _topics(path: Path, wanted: set[str] | None = None) -> dict[str, Topic]:
             log = dbdreader.DBD(str(path), cacheDir=own)
             log.close()  # it opens the file again to read it
             _refuse_other_lengths(path, log)
-            found = _sensors(log, [n for n in log.parameterNames if wanted is None or n in wanted])
+            found = _sensors(log, sorted(wanted.intersection(log.parameterNames)))
+            if not wanted or any(found.get(name) is None for name in wanted):
+                found = _sensors(log, log.parameterNames)
     except (*_FAILURES, dbdreader.DbdError) as error:
-        what = f"`{path}` is a Slocum glider's log that cannot be read"
-        raise LogError(what, found=f"{type(error).__name__}: {error}"[:160], hint=COPY_AGAIN) from error
-    return {n: topic for n, topic in found.items() if topic is not None}
+        raise unreadable(path, "a Slocum glider's log that cannot be read", error) from error
+    return Topics(found, MEANS, _cut(path))
 
 
 def _refuse_cut_head(path: Path) -> None:
     """Raise LogError where the head ends before the lines that it counts: dbdreader would look for them for ever."""
-    with path.open("rb") as stream:
-        head = stream.read(HEAD)
+    head = head_of(path)
     tags = _TAGS.search(head)
     lines = head.count(b"\n")
     if tags is None or lines < int(tags[1]) or head.count(b"\n", 0, tags.start()) >= int(tags[1]):
@@ -108,8 +104,7 @@ def _cut(path: Path) -> tuple[Note, ...]:
 
 def _cache_of(path: Path) -> Path | None:
     """Return the list of sensors that a log refers to, None where it brings the list; raises LogError."""
-    with path.open("rb") as stream:
-        head = stream.read(HEAD)
+    head = head_of(path)
     found = _CACHE.search(head)
     if found is None or not _FACTORED.search(head):
         return None
@@ -127,23 +122,11 @@ def _cache_of(path: Path) -> Path | None:
     )
 
 
-def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
-    """Return the sensors that were written, with count, rate and first values; raises LogError, also without dbdreader."""
-    return inventory_of(path, "Slocum glider log", _topics(path), MEANS, _cut(path))
-
-
-def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
-    """Return the mapped sensors; raises MappingError for one that is not there, LogError as `inventory` does."""
-    wanted = {source.topic for source in mapping.sources.values() if source.topic is not None}
-    topics = _topics(path, wanted or None)
-    return raw_log_of(path, topics if wanted <= topics.keys() else _topics(path), mapping, _cut(path))
-
-
-READER = Reader(
-    name="slocum",
-    says="Slocum glider log: .dbd, .ebd and their kin, with the extra `slocum`",
-    suffixes=(".dbd", ".ebd", ".mbd", ".nbd", ".sbd", ".tbd"),
-    sniff=sniff,
-    inventory=inventory,
-    read=read,
+READER = topic_reader(
+    "slocum",
+    "Slocum glider log: .dbd, .ebd and their kin, with the extra `slocum`",
+    (".dbd", ".ebd", ".mbd", ".nbd", ".sbd", ".tbd"),
+    "Slocum glider log",
+    sniff,
+    _topics,
 )

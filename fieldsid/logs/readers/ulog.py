@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from fieldsid.errors import LogError
-from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.readers._topics import Means, Topic, inventory_of, library, raw_log_of, topic_of, unheard
+from fieldsid.logs.reader import ReadOptions
+from fieldsid.logs.readers._topics import Means, Topics, library, topic_of, topic_reader, unheard
 from fieldsid.logs.run import Note
-from fieldsid.logs.unknown_file import COPY_AGAIN, ULOG, ULOG_HEADER
+from fieldsid.logs.unknown_file import ULOG, ULOG_HEADER, head_of, unreadable
 
 MESSAGE_HEADER = 3
 """Bytes before a message's body: its length and its type."""
@@ -34,14 +33,11 @@ MEANS: Means = {
 
 def sniff(path: Path) -> bool:
     """Whether a file has the signature."""
-    if path.is_dir():
-        return False
-    with path.open("rb") as stream:
-        return stream.read(len(ULOG)) == ULOG
+    return head_of(path).startswith(ULOG)
 
 
-def _topics(path: Path) -> tuple[dict[str, Topic], tuple[Note, ...]]:
-    """Return the topics by name, and the notes on a log that is damaged, or cut off inside a message."""
+def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
+    """Return all topics, and notes on a log that is cut off inside a message; raises LogError for damage, or without pyulog."""
     size = path.stat().st_size
     if size <= ULOG_HEADER:
         what = f"`{path}` is a ULog file (PX4) without data"
@@ -51,19 +47,16 @@ def _topics(path: Path) -> tuple[dict[str, Topic], tuple[Note, ...]]:
         with path.open("rb") as stream, unheard():
             log = pyulog.ULog(stream)
     except Exception as error:  # pyulog has no error of its own for what it cannot parse
-        found = f"{type(error).__name__}: {error}"[:160]
-        raise LogError(f"`{path}` is a damaged ULog file", found=found, hint=COPY_AGAIN) from error
+        raise unreadable(path, "a damaged ULog file", error) from error
     topics = {}
     for part in log.data_list:
         if "timestamp" not in part.data:  # the format asks for it: a definition that was damaged
             continue
         fields = {n: np.asarray(v, dtype=np.float64) for n, v in part.data.items() if n != "timestamp"}
         stamps = np.asarray(part.data["timestamp"], dtype=np.float64) / 1e6
-        topic = topic_of(stamps, fields)
-        if topic is not None:
-            topics[f"{part.name}[{part.multi_id}]" if part.multi_id else part.name] = topic
+        topics[f"{part.name}[{part.multi_id}]" if part.multi_id else part.name] = topic_of(stamps, fields)
     damaged = (Note("damaged", "the log is damaged: what is no message of its definitions was left out", {}),)
-    return topics, _cut(path) + (damaged if log.file_corruption else ())
+    return Topics(topics, MEANS, _cut(path) + (damaged if log.file_corruption else ()))
 
 
 def _cut(path: Path) -> tuple[Note, ...]:
@@ -76,23 +69,4 @@ def _cut(path: Path) -> tuple[Note, ...]:
     return () if at == size else (Note("truncated", "the log is cut off inside a message, which was left out", {}),)
 
 
-def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
-    """Return the topics with count, rate and first values; raises LogError for a damaged file, or without pyulog."""
-    topics, notes = _topics(path)
-    return inventory_of(path, "ULog", topics, MEANS, notes)
-
-
-def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
-    """Return the mapped fields; raises MappingError for one that is not there, LogError as `inventory` does."""
-    topics, notes = _topics(path)
-    return raw_log_of(path, topics, mapping, notes)
-
-
-READER = Reader(
-    name="ulog",
-    says="PX4 log: .ulg, with the extra `ulog`",
-    suffixes=(".ulg",),
-    sniff=sniff,
-    inventory=inventory,
-    read=read,
-)
+READER = topic_reader("ulog", "PX4 log: .ulg, with the extra `ulog`", (".ulg",), "ULog", sniff, _topics)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.logs.convert.conditioning import MAIN
-from fieldsid.logs.run import Note, Run
+from fieldsid.logs.convert.conditioning import MAIN, OWN_STEPS, blocks_of
+from fieldsid.logs.run import MOTORS, Note, Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 OFF_S = 10.0
@@ -26,8 +26,6 @@ LEAST_SPEED = 0.1
 DIVES_M, DIVES = 1.0, 0.2
 """Depth in m, and share of the log below it, from which on a log is one of dives."""
 SURFACE_M = 0.3
-GAP_STEPS = 5.0
-_MOTORS = ("thrust", "thrust_ratio", "propeller_rpm")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +51,7 @@ def stretches_of(run: Run) -> tuple[tuple[Stretch, ...], tuple[Note, ...]]:
     }
     off = {why: _long(run.time, mask) for why, mask in reasons.items()}
     away = np.any(np.stack(list(off.values())), axis=0)
-    breaks = np.flatnonzero((np.diff(run.time) > max(OFF_S, GAP_STEPS * float(np.median(np.diff(run.time))))) | np.diff(away)) + 1
+    breaks = np.flatnonzero((np.diff(run.time) > max(OFF_S, OWN_STEPS * float(np.median(np.diff(run.time))))) | np.diff(away)) + 1
     parts = [p for p in np.split(np.arange(run.time.size), breaks) if not away[p[0]]]
     kept = tuple(s for p in parts if (s := Stretch(float(run.time[p[0]]), float(run.time[p[-1]]))).end_s - s.start_s >= LEAST_S)
     if not kept or kept == whole:
@@ -78,7 +76,7 @@ def _seconds(time: FloatArray, mask: BoolArray) -> float:
 def _idle(run: Run) -> BoolArray:
     """Where no way is made and the motor, if it is in the log, is off."""
     speed = _speed(run)
-    motor = next((run[m] for m in _MOTORS if run.has(m)), None)
+    motor = next((run[m] for m in MOTORS if run.has(m)), None)
     off = np.zeros(run.time.size, dtype=np.bool_)
     if motor is not None:
         full = float(np.nanpercentile(np.abs(motor), 95))
@@ -120,8 +118,7 @@ def _tails(run: Run) -> BoolArray:
 def _long(time: FloatArray, mask: BoolArray) -> BoolArray:
     """Return only those runs of a mask (n,) that last."""
     kept = mask.copy()
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+    for begin, end in zip(*blocks_of(mask), strict=True):
         if time[end - 1] - time[begin] < OFF_S:
             kept[begin:end] = False
     return kept

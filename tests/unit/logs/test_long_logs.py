@@ -14,10 +14,10 @@ from fieldsid.logs.channels import TableForm
 from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.reader import ReadOptions, reader_of
 from fieldsid.logs.readers import csv_table
-from fieldsid.logs.readers._growing import GrowingColumn
 from fieldsid.logs.readers.bags import packets
 from fieldsid.logs.readers.bags.containers import mcap
 from fieldsid.logs.readers.bags.stores import collected
+from fieldsid.logs.readers.csv_table import GrowingColumn
 
 ROWS = 200
 TIME = np.arange(ROWS) / 20

@@ -15,19 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.faults.spikes import DIGITS, OF_MEDIAN, SPREADS, last_digit
-from fieldsid.logs.run import GOALS, SIGNALS, Note
+from fieldsid.logs.run import FINS, GOALS, MOTORS, SIGNALS, Note
 from fieldsid.numerics.arrays import FloatArray
 
 MOST_CHANCE = 1e-3
 """Chance, of any number at all, that jumps land on it as often, above which it is one of few digits."""
 FEWEST = 3
 """Jumps to one number from which on it is a drop-out; a spike may stand alone."""
-SENSED = (
-    frozenset(SIGNALS)
-    - GOALS
-    - {"thrust", "thrust_ratio", "propeller_rpm"}
-    - {n for n in SIGNALS if n.startswith(("rudder", "elevator"))}
-)
+SENSED = frozenset(SIGNALS) - GOALS - {*MOTORS, *FINS}
 """A fin jumps, and to the same angles."""
 
 

@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.clock import Track
-from fieldsid.logs.convert.heading_unwrap import FASTEST_RAD_S, MIN_JUMP_RAD, NOISES, TURN, noise_of_steps
+from fieldsid.logs.convert.conditioning import blocks_of
+from fieldsid.logs.convert.heading_unwrap import FASTEST_RAD_S, MIN_JUMP_RAD, NOISES, noise_of_steps, within_half_turn
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
@@ -60,20 +61,20 @@ def _note(end: float, count: int, of: int) -> Note:
 def _fills(time: FloatArray, values: FloatArray, end: float) -> BoolArray:
     """Return which samples (n,) are a fill at an end of the range."""
     at_end = values == end
-    begins, stops = _blocks(at_end)
+    begins, stops = blocks_of(at_end)
     inside = (begins > 0) & (stops < values.size)
     before, after = begins[inside] - 1, stops[inside]
     others = np.flatnonzero(~at_end)
     none = np.zeros(values.size, dtype=np.bool_)
     if others.size < 3 or before.size < FEWEST or at_end[before[0] : after[-1]].mean() > MOSTLY:
         return none
-    steps, dt = _around(np.diff(values[others])), np.diff(time[others])
+    steps, dt = within_half_turn(np.diff(values[others])), np.diff(time[others])
     least = max(MIN_JUMP_RAD, NOISES * math.sqrt(2.0) * noise_of_steps(steps))
-    jumped = (np.abs(_around(values[before] - end)) > least + FASTEST_RAD_S * (time[before + 1] - time[before])) & (
-        np.abs(_around(values[after] - end)) > least + FASTEST_RAD_S * (time[after] - time[after - 1])
+    jumped = (np.abs(within_half_turn(values[before] - end)) > least + FASTEST_RAD_S * (time[before + 1] - time[before])) & (
+        np.abs(within_half_turn(values[after] - end)) > least + FASTEST_RAD_S * (time[after] - time[after - 1])
     )
     fastest = 1.5 * float(np.quantile(np.abs(steps) / dt, FAST))
-    over = np.abs(_around(values[after] - values[before])) <= least + fastest * (time[after] - time[before])
+    over = np.abs(within_half_turn(values[after] - values[before])) <= least + fastest * (time[after] - time[before])
     if jumped.sum() < FEWEST or over[jumped].mean() < GOES_ON:
         return none
     return np.asarray(at_end & _far(values, others, end, least))
@@ -82,16 +83,5 @@ def _fills(time: FloatArray, values: FloatArray, end: float) -> BoolArray:
 def _far(values: FloatArray, others: npt.NDArray[np.intp], end: float, least: float) -> BoolArray:
     """Return the samples (n,) beside which, before or after, the heading was away from an end of its range."""
     low = np.searchsorted(others, np.arange(values.size)).clip(1, others.size - 1)
-    off = np.abs(_around(values[others] - end))
+    off = np.abs(within_half_turn(values[others] - end))
     return np.asarray((off[low - 1] > least) | (off[low] > least))
-
-
-def _blocks(mask: BoolArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """Return where the runs of a mask (n,) begin, and where the samples behind them are."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return edges[::2], edges[1::2]
-
-
-def _around(angle: FloatArray) -> FloatArray:
-    """Return angles (n,) in rad within half a turn."""
-    return np.asarray(angle - TURN * np.round(angle / TURN))

@@ -1,7 +1,10 @@
 """Times written as on a clock: `hh:mm:ss.s`, `mm:ss.s` that starts again each hour, dates before or beside them.
 
 What a clock leaves out is put back by its going on: where it falls back by more than half of what it counts to (a day, or an
-hour where a spreadsheet has dropped the hours), the next one has begun.
+hour where a spreadsheet has dropped the hours), the next one has begun. So do numbers of time that start again with each minute,
+hour, day or week, or where a counter of 16 or 32 bits is full. What has passed between the last number and the first of the next
+round is a step of the log like its others, which tells such a round from a clock that was set back: of two logs in one file the
+second starts anywhere.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.number_cells import as_numbers
-from fieldsid.logs.convert.times.dates import DATE, days_of, texts
+from fieldsid.logs.convert.times.dates import DATE, MOSTLY, days_of, stamps_in, texts
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
@@ -32,8 +35,6 @@ IN_WORDS = (
     "%a, %d %b %Y %H:%M:%S",
 )  # fmt: skip
 """Dates in words as the C library, spreadsheets and mail write them."""
-MOSTLY = 0.5
-"""Share of the cells that must be of a form for a column to be taken for it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,13 +126,8 @@ def _of_a_day(cells: npt.NDArray[Any]) -> Clock | None:
 
 def _in_words(cells: npt.NDArray[Any]) -> FloatArray | None:
     """Return the seconds (n,) since 1970 of dates that name the month before the day; None where less than half are."""
-    import pandas as pd
-
-    for form in IN_WORDS:
-        stamps = pd.to_datetime(texts(cells), format=form, errors="coerce").to_numpy(dtype="datetime64[us]")
-        if np.isnat(stamps).mean() < 1.0 - MOSTLY:
-            return np.where(np.isnat(stamps), np.nan, stamps.astype(np.int64) / 1e6)
-    return None
+    stamps = stamps_in(texts(cells), IN_WORDS)
+    return None if stamps is None else np.where(np.isnat(stamps), np.nan, stamps.astype(np.int64) / 1e6)
 
 
 def lost_hours(name: str, times: int, period_s: float) -> Note:
@@ -139,3 +135,43 @@ def lost_hours(name: str, times: int, period_s: float) -> Note:
     counts, lacks = ("minutes and seconds", "hour") if period_s == HOUR_S else ("seconds", "minute")
     again = f"; it starts again {times} time{'s' * (times != 1)}, each taken for the next {lacks}" if times else ""
     return Note("lost_hours", f"`{name}` counts {counts}, the {lacks} is not in it{again}", {"count": times})
+
+
+FEW_STEPS = 5.0
+"""Steps of a log that may be missing where its time starts again."""
+ROUNDS_S = {"minute": MINUTE_S, "hour": HOUR_S, "day": DAY_S, "week": WEEK_S}
+COUNTERS = {"16 bits": 2.0**16, "32 bits": 2.0**32}
+"""Numbers after which a counter starts again, whatever its unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """What a time starts again with, in words, and after which number."""
+
+    words: str
+    period: float
+
+
+def round_of(values: npt.NDArray[Any], factor: float) -> Round | None:
+    """Return the shortest round in which numbers (n,) of time start again, `factor` s each; None where they do not.
+
+    At most of the places where they fall back, the next round must go on with a step like the log's others.
+    """
+    steps = np.diff(values.astype(np.float64))
+    ahead = steps[steps > 0.0]
+    if not ahead.size or not bool((steps < 0.0).any()):
+        return None
+    usual, span = float(np.median(ahead)), float(np.ptp(values.astype(np.float64)))
+    rounds = [Round(f"each {name}", s / factor) for name, s in ROUNDS_S.items()]
+    for found in [*rounds, *(Round(f"after {bits}", size) for bits, size in COUNTERS.items())]:
+        falls = steps[steps < -0.5 * found.period] + found.period
+        if span <= found.period and falls.size and float((falls <= FEW_STEPS * usual).mean()) > 0.5:
+            return found
+    return None
+
+
+def gone_on(values: FloatArray, found: Round, name: str) -> tuple[FloatArray, Note]:
+    """Return numbers (n,) of time that do not start again, and the note that says how often they did."""
+    whole, times = going_on(values, found.period)
+    message = f"`{name}` starts again {found.words}, {times} time{'s' * (times != 1)}: taken for one time that goes on"
+    return whole, Note("starts_again", message, {"count": times, "period": found.period})

@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from fieldsid.logs.convert.times.clock_text import FEW_STEPS
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
@@ -27,7 +28,6 @@ ROUGH = 0.25
 """Share of a step from which on the last digit of its stamps makes steps uneven that are not."""
 SAME = 1e-3
 """Share of a step within which stamps are at even steps already: 0.2, 0.4, 0.6 has all the digits that it needs."""
-GAP_STEPS = 5.0
 MOST = 99.0
 """Percentile of the steps up to which they tell the usual one: what is longer may be a gap."""
 SHORT = 3.0
@@ -107,7 +107,7 @@ def _even(stamps: FloatArray, last: FloatArray, rows: npt.NDArray[np.intp]) -> F
     """Return the even steps (n,) of each stretch between gaps, of stamps in these rows (n,); None where one has none."""
     whole, steps = np.empty_like(stamps), np.diff(stamps)
     usual = float(np.mean(steps[steps <= np.percentile(steps, MOST)]))
-    gaps = [int(i) + 1 for i in np.flatnonzero(steps > 2.0 * last[1:] + GAP_STEPS * usual)]
+    gaps = [int(i) + 1 for i in np.flatnonzero(steps > 2.0 * last[1:] + FEW_STEPS * usual)]
     for begin, end in pairwise([0, *gaps, stamps.size]):
         part = _of_stretch(stamps[begin:end], last[begin:end], usual, rows[begin:end] - rows[begin])
         if part is None:

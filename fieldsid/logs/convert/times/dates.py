@@ -16,9 +16,11 @@ if TYPE_CHECKING:
     from pandas import Series
 
 DATE = re.compile(r"(\d{1,4})([-/.])(\d{1,2}|[A-Za-z]{3})[-/.](\d{1,4})")
+OF_WEEK_OR_YEAR = r"\d{4}-(?:W\d\d-\d|\d{3})"
+"""2024-W09-5, the fifth day of a week, and 2024-061, the 61st day of a year."""
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 MOSTLY = 0.5
-"""Share of the cells that must be dates for a column to be taken for it."""
+"""Share of the cells that must be of a form for a column to be taken for it."""
 LONGEST_YEAR = 4
 YEARS = (1970.0, 2120.0)
 """Years of a log, the last one not among them."""
@@ -34,10 +36,11 @@ def days_of(cells: npt.NDArray[Any]) -> FloatArray | None:
     digits = _digits(cells)
     if digits is not None:
         return _of_digits(digits)
-    by_week = _of_weeks_or_days(cells)
-    if by_week is not None:
-        return by_week
-    parts = texts(cells).str.extract(f"^{DATE.pattern}$")
+    words = texts(cells)
+    if words.str.fullmatch(OF_WEEK_OR_YEAR).fillna(value=False).mean() > MOSTLY:
+        by_week = stamps_in(words, ("%G-W%V-%u", "%Y-%j"))
+        return None if by_week is None else _as_days(by_week)
+    parts = words.str.extract(f"^{DATE.pattern}$")
     if parts[0].notna().mean() <= MOSTLY:
         return None
     a, b, c = (_month_numbers(parts[i]) for i in (0, 2, 3))
@@ -67,15 +70,12 @@ def texts(cells: npt.NDArray[Any]) -> Series[str]:
     return pd.Series(cells).astype("string").str.strip()
 
 
-def _of_weeks_or_days(cells: npt.NDArray[Any]) -> FloatArray | None:
-    """Return the days (n,) since 1970 of 2024-W09-5 or of 2024-061, the 61st day of the year; None where less than half are."""
-    parts = texts(cells).str.extract(r"^(\d{4})-(?:W(\d\d)-(\d)|(\d{3}))$")
-    year, week, day, yearday = (parts[i].astype("float64").to_numpy(dtype=np.float64, na_value=np.nan) for i in range(4))
-    if np.isfinite(year).mean() <= MOSTLY:
-        return None
-    fourth = _days(np.asarray(year), np.ones(year.size), np.full(year.size, 4.0))  # of January, which is in the first week
-    monday = fourth - (fourth + 3.0) % 7.0
-    return np.where(np.isfinite(week), monday + 7.0 * (week - 1.0) + day - 1.0, fourth - 3.0 + yearday - 1.0)
+def stamps_in(words: Series[str], forms: Sequence[str]) -> npt.NDArray[np.datetime64] | None:
+    """Return the stamps (n,) of texts in the first of some forms in which most are, NaT where one is not; None for none."""
+    import pandas as pd
+
+    found = (pd.to_datetime(words, format=form, errors="coerce").to_numpy(dtype="datetime64[us]") for form in forms)
+    return next((stamps for stamps in found if np.isnat(stamps).mean() < 1.0 - MOSTLY), None)
 
 
 def _digits(cells: npt.NDArray[Any]) -> FloatArray | None:
@@ -122,5 +122,9 @@ def _days(year: FloatArray, month: FloatArray, day: FloatArray) -> FloatArray:
 
     full = np.where(year < 100.0, np.where(year < 70.0, 2000.0, 1900.0) + year, year)
     stamps = pd.to_datetime(pd.DataFrame({"year": full, "month": month, "day": day}), errors="coerce")
-    days = stamps.to_numpy(dtype="datetime64[D]")
+    return _as_days(stamps.to_numpy(dtype="datetime64[us]"))
+
+
+def _as_days(stamps: npt.NDArray[np.datetime64]) -> FloatArray:
+    days = stamps.astype("datetime64[D]")
     return np.where(np.isnat(days), np.nan, days.astype(np.int64).astype(np.float64))

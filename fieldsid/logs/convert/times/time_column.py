@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from fieldsid.logs.convert.number_cells import as_numbers
 from fieldsid.logs.convert.times.clock_parts import PLUS, clock_of_parts, parts_of, put_together
 from fieldsid.logs.convert.times.clock_text import (
     DAY_S,
+    FEW_STEPS,
     FORMS,
     HOUR_S,
     STAMP,
@@ -23,22 +25,50 @@ from fieldsid.logs.convert.times.clock_text import (
     clock_of_stamps,
     clock_of_text,
     going_on,
+    gone_on,
     lost_hours,
+    round_of,
     stamps_of_text,
 )
 from fieldsid.logs.convert.times.coarse_stamps import rebuilt
-from fieldsid.logs.convert.times.dates import days_of_columns
-from fieldsid.logs.convert.times.starting_again import FEW_STEPS, gone_on, round_of
+from fieldsid.logs.convert.times.dates import days_of_columns, texts
 from fieldsid.logs.convert.units import UNITS, pick_unit
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 EPOCH_FROM_S = 1e8
 """A time that starts later than this many seconds (three years) counts from an epoch, not from the start of the run."""
 GPS_EPOCH_S = 315964800.0
 """6 January 1980, from which GPS weeks count, in seconds since 1970."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Column:
+    """The cells (n,) of a column of times, its name, and how it is read."""
+
+    cells: npt.NDArray[Any]
+    name: str
+    options: ReadOptions
+
+    def refuse_empty(self) -> None:
+        if self.cells.size == 0:
+            raise LogError("the table has no rows", found=f"only the header, with column `{self.name}`", hint=COPY_AGAIN)
+
+    def refused(self, what: str, places: npt.NDArray[np.intp]) -> LogError:
+        """Return the error of cells at some places (k,) that are no times."""
+        found = f"{places.size} of {self.cells.size}, the first in row {int(places[0]) + 1}: {str(self.cells[places[0]])[:40]!r}"
+        hint = self.options.salvaging("mend the column, or leave such rows out", 1.0 - places.size / self.cells.size)
+        return LogError(f"column `{self.name}` {what}", found=found, hint=hint or "check which column is the time")
+
+    def without_time(self, there: BoolArray) -> list[Note]:
+        """Return the note on rows (n,) without a time, where there are some; raises LogError unless it is asked to salvage."""
+        missing = np.flatnonzero(~there)
+        if missing.size and not self.options.salvage:
+            raise self.refused("has rows without a time", missing)
+        message = f"rows left out because they have no time: {missing.size}"
+        return [Note("no_time", message, {"count": int(missing.size)})] if missing.size else []
 
 
 def seconds_of(
@@ -58,20 +88,19 @@ def seconds_of(
     note `time_origin` keeps its start. Stamps with too few digits are rebuilt, see coarse_stamps.py. Cells that are no times
     become NaN when salvaging. Raises LogError for a cell that is no time, and MappingError for a unit that is not one of time.
     """
-    options = options or ReadOptions()
-    if cells.size == 0:
-        raise LogError("the table has no rows", found=f"only the header, with column `{name}`", hint=COPY_AGAIN)
+    column = _Column(cells, name, options or ReadOptions())
+    column.refuse_empty()
     if unit in FORMS or (dates and cells.dtype.kind == "O"):
-        return _of_clock(cells, unit if unit in FORMS else None, name, options, dates)
+        return _going_on(_clock(column, unit if unit in FORMS else None), column, dates)
     if cells.dtype.kind == "M":
-        return _of_integers(cells.astype("datetime64[ns]").astype(np.int64), 1e-9, name)
+        return _of_integers(cells.astype("datetime64[ns]").astype(np.int64), 1e-9, column)
     if weeks is not None:
-        return _of_weeks(cells, unit, name, options, weeks)
+        return _of_weeks(column, unit, weeks)
     if cells.dtype.kind in "iu":
-        return _of_integers(cells.astype(np.int64), _factor(unit), name)
+        return _of_integers(cells.astype(np.int64), _factor(unit), column)
     if cells.dtype.kind == "f":
-        return _of_floats(cells.astype(np.float64), _factor(unit), name, options)
-    return _of_text(cells, unit, name, options)
+        return _of_floats(cells.astype(np.float64), _factor(unit), column)
+    return _of_text(column, unit)
 
 
 def seconds_of_parts(
@@ -87,13 +116,10 @@ def seconds_of_parts(
 
     Raises MappingError for a form that does not fit, LogError for a row that lacks a part.
     """
-    options = options or ReadOptions()
-    if columns[0].size == 0:
-        raise LogError("the table has no rows", found=f"only the header, with column `{names[0]}`", hint=COPY_AGAIN)
+    _Column(columns[0], names[0], options or ReadOptions()).refuse_empty()
     parts = parts_of(form, names)
     clock = clock_of_parts(columns, parts)
-    name = PLUS.join(names)
-    time, notes = _going_on(clock, clock.seconds, name, options, dates)
+    time, notes = _going_on(clock, _Column(clock.seconds, PLUS.join(names), options or ReadOptions()), dates)
     return time, [put_together(names, parts, date_names if dates else ()), *notes]
 
 
@@ -166,28 +192,26 @@ def _factor(unit: str | None) -> float:
     return picked.factor
 
 
-def _of_integers(values: npt.NDArray[np.int64], factor: float, name: str) -> tuple[FloatArray, list[Note]]:
+def _of_integers(values: npt.NDArray[np.int64], factor: float, column: _Column) -> tuple[FloatArray, list[Note]]:
     """Subtract the start before scaling, so that nanoseconds of an epoch keep every digit."""
     if round_of(values, factor) is not None:
-        return _of_floats(values.astype(np.float64), factor, name, ReadOptions())
+        return _of_floats(values.astype(np.float64), factor, column)
     start = int(values[0])
-    time, notes = rebuilt((values - start).astype(np.float64), name)
+    time, notes = rebuilt((values - start).astype(np.float64), column.name)
     if start * factor <= EPOCH_FROM_S:
         return _scaled(time + start, factor), notes
     return _scaled(time, factor), [*notes, _origin(start * factor)]
 
 
-def _of_floats(values: FloatArray, factor: float, name: str, options: ReadOptions) -> tuple[FloatArray, list[Note]]:
-    notes: list[Note] = []
-    missing = np.flatnonzero(~(np.abs(values) * factor <= LATEST_S))
-    if missing.size:
-        notes.append(_no_times(missing, values, name, options))
-        values = np.where(np.isin(np.arange(values.size), missing), np.nan, values)
-    again = round_of(values[np.isfinite(values)], factor)
+def _of_floats(values: FloatArray, factor: float, column: _Column) -> tuple[FloatArray, list[Note]]:
+    there = np.abs(values) * factor <= LATEST_S
+    notes = column.without_time(there)
+    values = values if there.all() else np.where(there, values, np.nan)
+    again = round_of(values[there], factor)
     if again is not None:
-        values, note = gone_on(values, again, name)
+        values, note = gone_on(values, again, column.name)
         notes.append(note)
-    values, coarse = rebuilt(values, name)
+    values, coarse = rebuilt(values, column.name)
     seen = values[np.isfinite(values)]
     start = float(seen[0]) if seen.size else 0.0
     if start * factor <= EPOCH_FROM_S:
@@ -202,105 +226,76 @@ def _scaled(values: FloatArray, factor: float) -> FloatArray:
     return values / round(1.0 / factor) if factor < 1.0 else values * factor
 
 
-def _of_text(cells: npt.NDArray[Any], unit: str | None, name: str, options: ReadOptions) -> tuple[FloatArray, list[Note]]:
+def _of_text(column: _Column, unit: str | None) -> tuple[FloatArray, list[Note]]:
+    cells = column.cells
     values, wrong = as_numbers(cells)
     if not wrong.size or wrong.size < cells.size // 2:
-        if wrong.size and not options.salvage:
-            raise _refused(f"column `{name}` holds cells that are no times", wrong, cells, options)
-        return _of_floats(values, _factor(unit), name, options)
+        if wrong.size and not column.options.salvage:
+            raise column.refused("holds cells that are no times", wrong)
+        return _of_floats(values, _factor(unit), column)
     stamps = _iso(cells)
     if np.isnat(stamps).mean() > 0.5:
         other = stamps_of_text(cells)
         if other is not None:
-            return _from_start(other, cells, name, options)
+            return _from_start(other, column)
         clock = clock_of_text(cells) or clock_behind_dates(cells)
         if clock is not None:
-            return _going_on(clock, cells, name, options, ())
-    missing = np.flatnonzero(np.isnat(stamps))
-    if missing.size == cells.size and wrong.size < cells.size:
-        raise _refused(f"column `{name}` holds cells that are no times", wrong, cells, options)
-    notes = [_no_times(missing, cells, name, options)] if missing.size else []
+            return _going_on(clock, column, ())
+    there = ~np.isnat(stamps)
+    if not there.any() and wrong.size < cells.size:
+        raise column.refused("holds cells that are no times", wrong)
+    notes = column.without_time(there)
     nanoseconds = stamps.astype(np.int64)
-    start = int(nanoseconds[~np.isnat(stamps)][0]) if missing.size < cells.size else 0
-    seconds, coarse = rebuilt(np.where(np.isnat(stamps), np.nan, (nanoseconds - start) / 1e9), name)
+    start = int(nanoseconds[there][0]) if there.any() else 0
+    seconds, coarse = rebuilt(np.where(there, (nanoseconds - start) / 1e9, np.nan), column.name)
     return seconds, [*notes, *coarse, _origin(start / 1e9)]
 
 
-def _of_clock(
-    cells: npt.NDArray[Any], form: str | None, name: str, options: ReadOptions, dates: Sequence[npt.NDArray[Any]]
-) -> tuple[FloatArray, list[Note]]:
-    return _going_on(_clock(cells, form, name, options), cells, name, options, dates)
-
-
-def _going_on(
-    clock: Clock, cells: npt.NDArray[Any], name: str, options: ReadOptions, dates: Sequence[npt.NDArray[Any]]
-) -> tuple[FloatArray, list[Note]]:
+def _going_on(clock: Clock, column: _Column, dates: Sequence[npt.NDArray[Any]]) -> tuple[FloatArray, list[Note]]:
     """Return a clock's time, midnights and full hours passed over; dates count the days where the clock counts all of one."""
     days = days_of_columns(dates) if dates and clock.period_s == DAY_S else None
     if days is not None:
-        return _from_start(clock.seconds + DAY_S * days, cells, name, options)
+        return _from_start(clock.seconds + DAY_S * days, column)
     seconds, rounds = going_on(clock.seconds, clock.period_s)
-    time, notes = _from_start(seconds, cells, name, options, is_of_day=np.isfinite(clock.period_s))
-    return time, [*notes, lost_hours(name, rounds, clock.period_s)] if clock.period_s <= HOUR_S else notes
+    time, notes = _from_start(seconds, column, is_of_day=np.isfinite(clock.period_s))
+    return time, [*notes, lost_hours(column.name, rounds, clock.period_s)] if clock.period_s <= HOUR_S else notes
 
 
-def _clock(cells: npt.NDArray[Any], form: str | None, name: str, options: ReadOptions) -> Clock:
+def _clock(column: _Column, form: str | None) -> Clock:
     if form == "hhmmss":
-        return clock_of_digits(as_numbers(cells)[0])
-    found = clock_of_stamps(cells) if form == STAMP else clock_of_text(cells, form)
+        return clock_of_digits(as_numbers(column.cells)[0])
+    found = clock_of_stamps(column.cells) if form == STAMP else clock_of_text(column.cells, form)
     if found is None:
-        raise _refused(f"column `{name}` holds cells that are no clock", np.arange(cells.size), cells, options)
+        raise column.refused("holds cells that are no clock", np.arange(column.cells.size))
     return found
 
 
-def _from_start(
-    seconds: FloatArray, cells: npt.NDArray[Any], name: str, options: ReadOptions, *, is_of_day: bool = False
-) -> tuple[FloatArray, list[Note]]:
+def _from_start(seconds: FloatArray, column: _Column, *, is_of_day: bool = False) -> tuple[FloatArray, list[Note]]:
     """Return seconds (n,) from the first on, and the notes on cells without one and on the start."""
-    missing = np.flatnonzero(~np.isfinite(seconds))
-    notes = [_no_times(missing, cells, name, options)] if missing.size else []
-    seen = seconds[np.isfinite(seconds)]
-    start = float(seen[0]) if seen.size else 0.0
+    there = np.isfinite(seconds)
+    notes = column.without_time(there)
+    start = float(seconds[there][0]) if there.any() else 0.0
     # A clock's digits are those of a second's parts: what is subtracted leaves rounding behind the ninth.
-    time, coarse = rebuilt(np.round(seconds - start, 9), name)
-    return time, [*notes, *coarse, _of_midnight(start) if is_of_day else _origin(start)]
+    time, coarse = rebuilt(np.round(seconds - start, 9), column.name)
+    return time, [*notes, *coarse, _origin(start, is_of_day=is_of_day)]
 
 
-def _of_weeks(
-    cells: npt.NDArray[Any], unit: str | None, name: str, options: ReadOptions, weeks: npt.NDArray[Any]
-) -> tuple[FloatArray, list[Note]]:
+def _of_weeks(column: _Column, unit: str | None, weeks: npt.NDArray[Any]) -> tuple[FloatArray, list[Note]]:
     """Return the time of GPS weeks and of what has passed of each, in seconds or in milliseconds, by its size."""
-    values, _ = as_numbers(cells)
+    values, _ = as_numbers(column.cells)
     largest = float(np.nanmax(values, initial=0.0))
     factor = _factor(unit or ("s" if largest <= WEEK_S else "ms"))
     since = WEEK_S * as_numbers(weeks)[0] + GPS_EPOCH_S
-    return _from_start(_scaled(values, factor) + since, cells, name, options)
+    return _from_start(_scaled(values, factor) + since, column)
 
 
 def _iso(cells: npt.NDArray[Any]) -> npt.NDArray[np.datetime64]:
     import pandas as pd
 
-    parsed = pd.to_datetime(pd.Series(cells).astype("string").str.strip(), format="ISO8601", utc=True, errors="coerce")
+    parsed = pd.to_datetime(texts(cells), format="ISO8601", utc=True, errors="coerce")
     return np.asarray(parsed.dt.tz_localize(None).to_numpy(dtype="datetime64[ns]"))
 
 
-def _no_times(missing: npt.NDArray[np.intp], cells: npt.NDArray[Any], name: str, options: ReadOptions) -> Note:
-    if not options.salvage:
-        raise _refused(f"column `{name}` has rows without a time", missing, cells, options)
-    return Note("no_time", f"rows left out because they have no time: {missing.size}", {"count": int(missing.size)})
-
-
-def _refused(what: str, places: npt.NDArray[np.intp], cells: npt.NDArray[Any], options: ReadOptions) -> LogError:
-    found = f"{places.size} of {cells.size}, the first in row {int(places[0]) + 1}: {str(cells[places[0]])[:40]!r}"
-    hint = options.salvaging("mend the column, or leave such rows out", 1.0 - places.size / cells.size)
-    return LogError(what, found=found, hint=hint or "check which column is the time")
-
-
-def _origin(start_s: float) -> Note:
-    return Note("time_origin", f"time 0 is {start_s:.6f} s of the log's clock", {"origin_ns": round(start_s * 1e9)})
-
-
-def _of_midnight(start_s: float) -> Note:
-    return Note(
-        "time_origin", f"time 0 is {start_s:.3f} s of the log's clock, which has no date", {"origin_ns": round(start_s * 1e9)}
-    )
+def _origin(start_s: float, *, is_of_day: bool = False) -> Note:
+    where = f"{start_s:.3f} s of the log's clock, which has no date" if is_of_day else f"{start_s:.6f} s of the log's clock"
+    return Note("time_origin", f"time 0 is {where}", {"origin_ns": round(start_s * 1e9)})

@@ -13,7 +13,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from fieldsid.logs.mapping.numbers.windows import FEWEST
+from fieldsid.logs.doctor.together import FEWEST, over
 from fieldsid.numerics.arrays import FloatArray
 
 TOGETHER = 0.05
@@ -52,12 +52,12 @@ def moved_by(
     """
     righting = angle if rights else None
     if rate is None and angle is not None and time.size > width:
-        rate = (angle[width:] - angle[:-width]) / (time[width:] - time[:-width])
+        rate = over(angle, width) / over(time, width)
         fins, righting = [window_mean(time, v, width) for v in fins], window_mean(time, angle, width) if rights else None
         time = time[:-width]
     if rate is None or time.size < width + FEWEST:
         return None
-    grows = (rate[width:] - rate[:-width]) / (time[width:] - time[:-width])
+    grows = over(rate, width) / over(time, width)
     beside = [window_mean(time, v, width) for v in (rate, righting) if v is not None]
     base, means = (
         np.stack(columns, axis=1) for columns in ([np.ones(grows.size), *beside], [window_mean(time, v, width) for v in fins])
@@ -93,7 +93,7 @@ def window_mean(time: FloatArray, values: FloatArray, width: int) -> FloatArray:
     """Return the mean (n - width,) of values that stand from one sample to the next, over each window."""
     swept = np.concatenate([[0.0], np.cumsum(np.where(np.isfinite(values[:-1]), values[:-1], 0.0) * np.diff(time))])
     gone = np.concatenate([[0], np.cumsum(~np.isfinite(values))])
-    mean = (swept[width:] - swept[:-width]) / (time[width:] - time[:-width])
+    mean = over(swept, width) / over(time, width)
     return np.asarray(np.where(gone[width + 1 :] - gone[: -width - 1] == 0, mean, np.nan))
 
 

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.logs.convert.geodetic import north_and_east
+from fieldsid.logs.convert.frames import north_and_east
 from fieldsid.logs.convert.units import UNITS
 from fieldsid.logs.doctor.angle_and_rate import PAIRS
+from fieldsid.logs.doctor.together import FEWEST, change, width_of
 from fieldsid.logs.mapping.fins.shares import EXPLAINS, beyond, explained, explains, moved_by
 from fieldsid.logs.mapping.fins.shares import WINDOWS_S as SHORT_S
 from fieldsid.logs.mapping.numbers.units_told import Reading, fin_reading, in_radians
-from fieldsid.logs.mapping.numbers.windows import FEWEST, change, width_of
 from fieldsid.logs.reader import Samples
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.shifted_correlation import slope_of

@@ -1,23 +1,36 @@
-"""Which of several headings is the vehicle's own: a course over ground under a heading's name turns with the way, not before it.
+"""Which of several headings is the vehicle's own, and which way it counts: a course is one thing, and east is not north.
 
 A hull slides out of its turn: its heading is ahead of its course by the sideslip, which goes with the rate of turn (Fossen 2021,
 section 6.5). The time by which an angle leads the course of x and y, psi - chi = T r + current, is nil or negative for a course,
 whose receiver is late, and clearly positive for a compass. Where a rate of turn is logged, the heading is the one it makes.
+
+Heading, x and y from north and clockwise, and all three from east and counterclockwise, are mirror images of each other: no
+number of theirs tells which. A latitude and longitude does, a course over ground, and speeds north and east.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from fieldsid.logs.convert.frames import north_and_east
 from fieldsid.logs.doctor.angle_and_rate import PAIRS, changes_of
-from fieldsid.logs.doctor.course_findings import course_of
+from fieldsid.logs.doctor.pair_findings import AGREES, TURNED, WINDOW_S, course_of
+from fieldsid.logs.doctor.together import FEWEST, change, width_of
+from fieldsid.logs.mapping.canonical_names import unit_in_name, words_of
+from fieldsid.logs.mapping.numbers.units_told import in_radians
+from fieldsid.logs.mapping.vocabulary import COMMANDED, COMPASS, LATITUDE, LONGITUDE, OF_ANOTHER, OVER_GROUND
+from fieldsid.logs.mapping.word_meaning import meaning_of
+from fieldsid.logs.reader import Samples
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
-WINDOW_S = 1.0
+LEAD_S = 1.0
 """Time over which a course is taken: in a longer one a vehicle turns more than once."""
 SURE = 4.0
 """Standard errors by which one heading must lead, and the other not."""
@@ -66,13 +79,13 @@ def _taken(names: Sequence[str], best: int, why: str) -> Note:
 
 def _off_rate(run: Run) -> float:
     """Return by how many rad a heading's change over a window is off the integral of the yaw rate; infinite without one."""
-    changes = changes_of(run, *PAIRS[0]) if run.has("yaw_rad") and run.has("yaw_rate_rad_s") else None
+    changes = changes_of(run, *PAIRS[0])
     return float("inf") if changes is None else float(np.std(changes[0] - changes[1]))
 
 
 def lead_of(run: Run) -> Lead | None:
     """Return by how much the heading of a run leads its course; None where the log does not show it."""
-    made = course_of(run, WINDOW_S) if all(run.has(s) for s in ("yaw_rad", "x_m", "y_m")) else None
+    made = course_of(run, LEAD_S)
     return None if made is None else _regressed(made.heading - made.course, made.heading, made.rate, made.width)
 
 
@@ -89,3 +102,115 @@ def _regressed(off: FloatArray, yaw: FloatArray, rate: FloatArray, width: int) -
     spread = width * float(left @ left) / max(angle.size - width * base.shape[1], 1)
     covariance = np.linalg.inv(base.T @ base) * spread
     return Lead(float(values[0]), float(np.sqrt(covariance[0, 0])))
+
+
+NEAR = math.pi / 4
+"""How far the angle between them may be from what it should be: sideslip, a current and a compass' error lie in it."""
+ENU = "ENU"
+GEOGRAPHIC = frozenset({"north", "northing", "east", "easting", "n", "e", "utm"})
+"""Words of a column of metres that say which way it counts."""
+ComplexArray = npt.NDArray[np.complex128]
+
+
+def true_north(samples: Samples, names: Sequence[str], signals: Mapping[str, Any]) -> list[Note]:
+    """Set the frame of a heading, and of x and y, that count from east; return why, or that and how it stays open."""
+    place, yaw = _untold(samples, signals, "x_m", "y_m"), _untold(samples, signals, "yaw_rad")
+    ways: dict[tuple[str, ...], ComplexArray] = {("x_m", "y_m"): _made(samples, *place)} if place else {}
+    ways |= {("yaw_rad",): np.exp(1j * in_radians(yaw[0], signals["yaw_rad"].get("unit")))} if yaw else {}
+    notes, settled = list[Note](), set[tuple[str, ...]]()
+    for said_by, travel in _travels(samples, names):
+        for turned, way in ways.items():
+            along, against, off = _agreement(way, travel)
+            is_open = max(along, against) < AGREES or abs(along - against) < TURNED or (against > along and abs(off) > NEAR)
+            if turned not in settled and not is_open:
+                settled.add(turned)
+                notes += _turned(turned, signals, said_by, against, along) if against > along else []
+    if len(ways) < 2 or ("yaw_rad",) in settled or _is_named(signals):
+        return notes
+    along, against, _ = _agreement(*ways.values())
+    return [*notes, _open()] if len(settled) == 0 and along > AGREES and along - against > TURNED else notes
+
+
+def _turned(turned: tuple[str, ...], signals: Mapping[str, Any], said_by: str, against: float, along: float) -> list[Note]:
+    """Take signals as counted from east, and return why."""
+    for signal in turned:
+        signals[signal]["frame"] = ENU
+    message = (
+        f"{' and '.join(turned)}: taken with `frame: {ENU}`, counted from east: the way by {said_by} turns against it (agreement "
+        f"{against:.2f} against and {along:.2f} along it, limit {TURNED:g} between them)"
+    )
+    return [Note("evidence", message, {"signal": turned[0], "value": against - along, "limit": TURNED})]
+
+
+def _open() -> Note:
+    message = (
+        "yaw_rad goes with x_m and y_m whether all three count from north, clockwise, or from east, counterclockwise: the log "
+        "does not tell port from starboard; a latitude and longitude or a course over ground beside them would, and so does a "
+        "turn whose side is known; where it is east set `frame: ENU/FLU` at the top of the mapping"
+    )
+    return Note("frame_open", message, {"signal": "yaw_rad"})
+
+
+def _is_named(signals: Mapping[str, Any]) -> bool:
+    """Whether the names of the columns say themselves which way they count."""
+    words = {s: set(words_of(str(signals[s].get("column")))) for s in ("yaw_rad", "x_m", "y_m")}
+    return bool((COMPASS | {"true", "magnetic"}) & words["yaw_rad"] or GEOGRAPHIC & (words["x_m"] | words["y_m"])) or any(
+        "frame" in signals[s] for s in words
+    )
+
+
+def _untold(samples: Samples, signals: Mapping[str, Any], *wanted: str) -> list[FloatArray]:
+    """Return the columns (n,) of some signals; nothing where one is not there, or its frame is known."""
+    items = [item for s in wanted if not {"frame", "sign"} & (item := signals.get(s, {})).keys()]
+    found = [samples.columns[item["column"]] for item in items if item.get("column") in samples.columns]
+    return found if len(found) == len(wanted) else []
+
+
+def _made(samples: Samples, north: FloatArray, east: FloatArray) -> ComplexArray:
+    """Return the way made (n,) over a window about each sample, NaN at the ends."""
+    return change(north + 1j * east, width_of(samples.time, WINDOW_S))
+
+
+def _travels(samples: Samples, names: Sequence[str]) -> Iterator[tuple[str, ComplexArray]]:
+    """Yield the columns that are north and east by what they are, and the way (n,) that a vehicle goes by them."""
+    known = [n for n in names if n in samples.columns and not (COMMANDED | OF_ANOTHER) & set(words_of(n))]
+    means = {n: (meaning_of(n) or ("", 0))[0] for n in known}
+    latitude, longitude = (next((n for n in known if means[n] == s), None) for s in (LATITUDE, LONGITUDE))
+    if latitude is not None and longitude is not None:
+        north, east = north_and_east(np.stack([samples.columns[latitude], samples.columns[longitude]], axis=1))
+        yield f"`{latitude}` and `{longitude}`", _made(samples, north, east)
+    fast = [next((n for n in known if _is_speed(n, side)), None) for side in ("n", "e")]
+    if fast[0] is not None and fast[1] is not None:
+        yield f"`{fast[0]}` and `{fast[1]}`", samples.columns[fast[0]] + 1j * samples.columns[fast[1]]
+    for name in known:
+        values = samples.columns[name]
+        if _is_course(name, means[name], values):
+            yield f"the course over ground `{name}`", np.exp(1j * in_radians(values, unit_in_name(name, "yaw_rad")))
+
+
+def _is_course(name: str, means: str, values: FloatArray) -> bool:
+    """Whether a column is a course over ground, which counts from north: so it is called, or a course that is never negative."""
+    words = set(words_of(name))
+    if "cog" in words or (means == "yaw_rad" and OVER_GROUND & words):
+        return True
+    return "course" in words and float(np.nanmin(values, initial=np.inf)) >= 0.0
+
+
+def _is_speed(name: str, side: str) -> bool:
+    words = set(words_of(name))
+    whole = {"n": "north", "e": "east"}[side]
+    return f"v{side}" in words or (bool(words & {"v", "vel", "velocity", "speed"}) and bool(words & {side, whole, f"{whole}ing"}))
+
+
+def _agreement(ways: ComplexArray, travel: ComplexArray) -> tuple[float, float, float]:
+    """Return how well a direction (n,) goes with the travel and with its mirror image, and the angle off the latter in rad.
+
+    From east and counterclockwise x + iy is i (north - i east): what goes with the mirror image is pi/2 from it.
+    """
+    weight = np.abs(travel) * np.abs(ways)
+    seen = np.isfinite(weight) & (weight > 0.0)
+    if seen.sum() < FEWEST:
+        return 0.0, 0.0, 0.0
+    a, b, w = ways[seen] / np.abs(ways[seen]), travel[seen] / np.abs(travel[seen]), weight[seen]
+    along, against = complex(np.average(a * np.conj(b), weights=w)), complex(np.average(a * b, weights=w))
+    return abs(along), abs(against), math.remainder(float(np.angle(against)) - 0.5 * math.pi, math.tau)

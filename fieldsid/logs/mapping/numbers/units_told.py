@@ -15,13 +15,12 @@ from typing import Any
 import numpy as np
 
 from fieldsid.logs.channels import POSITION
-from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, FULL_RAD, Servo, servo_of
+from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FULL_RAD, Servo, servo_of
 from fieldsid.logs.convert.units import DEGREE, UNITS, pick_unit
 from fieldsid.logs.doctor.angle_and_rate import PAIRS, agrees_with_rate
-from fieldsid.logs.doctor.course_findings import goes_along_course, goes_with_depth
-from fieldsid.logs.doctor.pair_findings import goes_with_way
+from fieldsid.logs.doctor.pair_findings import goes_along_course, goes_with_depth, goes_with_way
 from fieldsid.logs.doctor.signal_findings import LARGEST
-from fieldsid.logs.run import GOALS, SIGNALS, Note, Run
+from fieldsid.logs.run import FINS, GOALS, MOTORS, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
 TURN = 6.4
@@ -38,8 +37,6 @@ OFTEN = 0.05
 """Share of the samples that must be beyond a turn in degrees: fewer may be damage."""
 MOST_TURNS = 10.0
 """Turns that a heading of a log of maneuvers may count on."""
-NEEDS_NONE = frozenset({"thrust", "thrust_ratio", "propeller_rpm"})
-"""Signals whose scale no estimate hangs on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,17 +152,13 @@ def assumed_units(run: Run, known: Collection[str], places: Mapping[str, tuple[s
     sure = {s for s in run.signals if s in known}
     if goes_with_way(run):
         sure |= {"x_m", "y_m", "surge_m_s"}
-    if _all_there(run, "x_m", "y_m", "yaw_rad") and goes_along_course(run):
+    if goes_along_course(run):
         sure.add("yaw_rad")
-    agreeing = [{a, r} for a, r in PAIRS if _all_there(run, a, r) and agrees_with_rate(run, a, r)]
-    if _all_there(run, "depth_m", "pitch_rad", "surge_m_s") and goes_with_depth(run):
+    agreeing = [{a, r} for a, r in PAIRS if agrees_with_rate(run, a, r)]
+    if goes_with_depth(run):
         agreeing += [{"depth_m", "surge_m_s"}]
     sure |= {s for both in agreeing if both & sure for s in both}
-    assumed = [s for s in run.signals if s in SIGNALS and run.has(s) and s not in sure and s not in NEEDS_NONE]
+    assumed = [s for s in run.signals if s in SIGNALS and run.has(s) and s not in sure and s not in MOTORS]
     shown = ", ".join(f"{s} from `{place}` in {unit}" for s in assumed for place, unit in [places.get(s, ("", SIGNALS[s]))])
     message = f"no name and no other signal tells the unit of what is taken as it is: {shown}; write `unit:` where it is another"
     return [Note("unit_assumed", message, {"signals": assumed})] if assumed else []
-
-
-def _all_there(run: Run, *signals: str) -> bool:
-    return all(run.has(s) for s in signals)

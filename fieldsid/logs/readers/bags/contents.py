@@ -1,4 +1,4 @@
-"""What is in a bag: topics with their type, count and rate, and the first value, least and largest of every number inside."""
+"""What is in a bag, and its mapped signals: topics with count, rate and ranges; stamps of the header or of the recorder."""
 
 from __future__ import annotations
 
@@ -9,11 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.errors import LogError
-from fieldsid.logs.reader import MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, ReadOptions, span_of
-from fieldsid.logs.readers.bags.messages.definitions import AnyDecoder, DefinitionSearch, decoder_of
+from fieldsid.errors import LogError, MappingError
+from fieldsid.logs.channels import ChannelMap, Source, Stamp
+from fieldsid.logs.reader import MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, RawLog, ReadOptions, span_of
+from fieldsid.logs.readers._topics import topic_name
+from fieldsid.logs.readers.bags.messages.definitions import DefinitionSearch, decoder_of
+from fieldsid.logs.readers.bags.messages.message_layout import Decoder
+from fieldsid.logs.readers.bags.messages.topic import TopicDecoding, TopicSeries
 from fieldsid.logs.readers.bags.packets import CDR, ROS1, Collector, Connection, TopicPackets, keep_first
-from fieldsid.logs.readers.bags.signals import check_not_empty, undecodable
+from fieldsid.logs.readers.bags.stores import collected
 from fieldsid.logs.run import Note
 
 MOST_NUMBERS = 200
@@ -27,7 +31,7 @@ Span = tuple[float, float]
 class _Topic:
     """The numbers of one topic: first values by path, and the ranges seen so far; or the error that says why there are none."""
 
-    decoder: AnyDecoder | None = None
+    decoder: Decoder | None = None
     first: dict[str, Any] = field(default_factory=dict)
     spans: dict[str, Span] = field(default_factory=dict)
     note: Note | None = None
@@ -105,3 +109,102 @@ class Contents:
         period = float(np.median(steps)) / 1e9 if steps.size else 0.0
         rate = 1.0 / period if period > 0.0 else float("nan")
         return ChannelInfo(connection.topic, connection.type_name, len(packets.stamps), rate, fields)
+
+
+LATE_S = 1.0
+"""Header and receive stamps further apart than this are two clocks, not a delay."""
+
+
+def read_signals(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
+    """Return the series that a mapping names; raises MappingError for an unknown topic or field, LogError for an empty bag."""
+    decoding: dict[str, TopicDecoding] = {}
+    for topic in dict.fromkeys(s.topic for s in mapping.sources.values() if s.topic is not None):
+        sources = {signal: s for signal, s in mapping.sources.items() if s.topic == topic}
+        decoding[topic] = TopicDecoding(sources, DefinitionSearch(path, options.msg_path))
+    collector = collected(path, decoding.keys(), lambda c, packets: decoding[c.topic].settle(c, packets), options.progress)
+    if not decoding and mapping.sources:
+        _topic(path, collector, *next(iter(mapping.sources.items())))
+    check_not_empty(path, collector)
+    for signal, source in mapping.sources.items():
+        _topic(path, collector, signal, source)
+    topics = [d.joined(collector.connections[t], collector.packets[t]) for t, d in decoding.items()]
+    return _raw_log(path, collector, mapping, topics)
+
+
+def _raw_log(path: Path, collector: Collector, mapping: ChannelMap, topics: list[TopicSeries]) -> RawLog:
+    notes = [*collector.notes, *(n for t in topics for n in t.notes), *_two_clocks(topics, mapping.stamp)]
+    stamps = {signal: (t, t.stamps(source, mapping.stamp)) for t in topics for signal, source in t.sources.items()}
+    origin = min(int(s[0]) for _, s in stamps.values())
+    series = {signal: t.series(signal, s, origin) for signal, (t, s) in stamps.items()}
+    notes.append(Note("time_origin", f"time 0 is {origin / 1e9:.9f} s of the bag's clock", {"origin_ns": origin}))
+    return RawLog(path.name if path.is_dir() else path.stem, series, tuple(notes), one_clock=False)
+
+
+def check_not_empty(path: Path, collector: Collector) -> None:
+    """Raise LogError for a bag without messages."""
+    if not collector.connections:
+        cut = next((n.message for n in collector.notes if n.code in ("truncated", "damaged")), "no topics")
+        raise LogError(f"`{path}` has no messages", found=cut, hint="copy it from the vehicle again")
+    if any(packets.stamps for packets in collector.packets.values()) or (
+        collector.wanted is not None and collector.wanted - collector.connections.keys()
+    ):
+        return
+    topics = ", ".join(sorted(collector.connections)) or "no topics"
+    damage = [n.message for n in collector.notes if n.code in ("truncated", "damaged")]
+    if damage:
+        raise LogError(
+            f"`{path}` holds no message that can be read",
+            found=f"{damage[0]}; topics {topics}",
+            hint="copy it from the vehicle again",
+        )
+    what = "has no messages" if collector.wanted is None else "has no messages on the mapped topics"
+    raise LogError(
+        f"`{path}` {what}",
+        found=topics,
+        hint="check that the recorder ran: its topics and their types are all that is in the file",
+    )
+
+
+def _topic(path: Path, collector: Collector, signal: str, source: Source) -> None:
+    topic, hint = topic_name(path, "a bag", collector.connections, signal, source), f"map `{signal}` to another topic"
+    if not collector.packets[topic].stamps:
+        raise LogError(f"topic `{topic}` has no messages", found="0 messages", hint=hint, signal=signal)
+    if topic in collector.mixed:
+        raise LogError(f"topic `{topic}` cannot be decoded", found="messages of two types", hint=hint, signal=signal)
+    connection = collector.connections[topic]
+    if not connection.is_decodable:
+        raise undecodable(connection, signal)
+
+
+def undecodable(connection: Connection, signal: str = "") -> LogError:
+    """Return the error of messages in a serialization that is not known."""
+    return LogError(
+        f"the messages of `{connection.topic}` are serialized as `{connection.serialization}`, and only `{CDR}` and `{ROS1}` are "
+        "known",
+        found=f"type `{connection.type_name}`",
+        hint="convert it with `ros2 bag convert` where that format is installed, or record with `rmw_fastrtps_cpp`",
+        signal=signal,
+    )
+
+
+def _two_clocks(topics: list[TopicSeries], asked: Stamp | None) -> list[Note]:
+    """Refuse header stamps of one clock beside receive stamps of another; note a plain delay."""
+    late: dict[str, float] = {}
+    receive = False
+    for topic in topics:
+        for source in topic.sources.values():
+            by_header = topic.header is not None and topic.stamps(source, asked) is topic.header
+            receive |= not by_header
+            if topic.header is not None and by_header:
+                late[topic.connection.topic] = float(np.median(topic.received - topic.header)) / 1e9
+    if not late or not receive:
+        return []
+    worst = max(late, key=lambda t: abs(late[t]))
+    if abs(late[worst]) > LATE_S:
+        raise MappingError(
+            f"header stamps of `{worst}` are on another clock than the recorder's: {late[worst]:.3f} s (limit {LATE_S:g} s)",
+            found="topics without a header, which have receive stamps only",
+            hint="write `stamp: receive` at the top of the mapping",
+        )
+    message = f"header stamps of {worst} are {late[worst] * 1e3:.1f} ms before the recorder's, which other topics go by"
+    return [Note("stamp_latency", message, {"seconds": late[worst], "topic": worst})] if abs(late[worst]) > 1e-3 else []

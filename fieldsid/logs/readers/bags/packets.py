@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from fieldsid.errors import LogError
-from fieldsid.logs.readers._unpacked_size import UnpackedSize
+from fieldsid.logs.readers._unpacked import UnpackedSize
 from fieldsid.logs.run import Note
 
 ROS1, CDR = "ros1", "cdr"
@@ -25,10 +24,6 @@ DAY_NS = 86_400 * 1_000_000_000
 
 SETTLE_BYTES = 1 << 23
 """Bytes of a file that are read before what waits is settled: enough to decode in blocks, little beside 500 MiB."""
-
-
-class UnknownFormError(LogError):
-    """A bag written in a way that the readers of this room do not know; rosbags may."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""The files of a bag, read one after the other: by the readers of this room, by rosbags where these do not know the form."""
+"""The files of a bag, read one after the other."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from fieldsid.errors import LogError
-from fieldsid.logs.readers._unpacked_size import UnpackedSize
+from fieldsid.logs.readers._unpacked import UnpackedSize
 from fieldsid.logs.readers.bags.containers import db3, mcap, ros1
 from fieldsid.logs.readers.bags.containers.metadata import check_against_metadata
-from fieldsid.logs.readers.bags.packets import Collector, Connection, Settle, TopicPackets, UnknownFormError, keep_all
+from fieldsid.logs.readers.bags.packets import Collector, Connection, Settle, TopicPackets, keep_all
 from fieldsid.logs.run import Note
+from fieldsid.logs.unknown_file import head_of
 
 Scan = Callable[[Path, Collector], None]
 SCANS: Mapping[bytes, Scan] = {ros1.MAGIC: ros1.scan, mcap.MAGIC: mcap.scan, db3.MAGIC: db3.scan}
@@ -48,7 +49,7 @@ def collected(
     for part in parts:
         with _plain_part(part, collector) as plain:
             collector.file = plain.name
-            _collect(plain, collector)
+            (_scan_of(plain) or _unknown)(plain, collector)
     collector.settle()
     progress(1.0)
     collector.say_untold_places()
@@ -56,29 +57,13 @@ def collected(
     return collector
 
 
-def _collect(part: Path, collector: Collector) -> None:
-    """Read one file; one whose form is unknown is left to rosbags, with the reason should that fail too."""
-    scan = _scan_of(part) or _unknown
-    before = sum(len(p.stamps) for p in collector.packets.values())
-    try:
-        scan(part, collector)
-    except UnknownFormError as error:
-        if sum(len(p.stamps) for p in collector.packets.values()) > before:
-            raise
-        from fieldsid.logs.readers.bags.messages.by_rosbags import collect
-
-        collect(part, collector, error)
-
-
 def _unknown(path: Path, collector: Collector) -> None:
-    with path.open("rb") as stream:
-        start = stream.read(16)
-    raise UnknownFormError(f"`{path}` is not a bag", found=f"it starts with {start!r}", hint="copy it from the vehicle again")
+    start = head_of(path)[:16]
+    raise LogError(f"`{path}` is not a bag", found=f"it starts with {start!r}", hint="copy it from the vehicle again")
 
 
 def _scan_of(path: Path) -> Scan | None:
-    with path.open("rb") as stream:
-        head = stream.read(16)
+    head = head_of(path)
     return next((scan for magic, scan in SCANS.items() if head.startswith(magic)), None)
 
 

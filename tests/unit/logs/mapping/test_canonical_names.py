@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fieldsid.logs.mapping.canonical_names import STEMS, canonical, unit_in_name
-from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.canonical_names import STEMS, canonical, unit_in_name, words_of
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.run import SIGNALS
 

@@ -2,8 +2,7 @@
 
 import pytest
 
-from fieldsid.logs.mapping.canonical_names import unit_in_name, unit_of_field
-from fieldsid.logs.mapping.name_words import tokens_of, words_of
+from fieldsid.logs.mapping.canonical_names import tokens_of, unit_in_name, unit_of_field, words_of
 from fieldsid.logs.mapping.word_meaning import meaning_of
 
 

@@ -11,7 +11,7 @@ import pytest
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import TableForm
 from fieldsid.logs.reader import ReadOptions
-from fieldsid.logs.readers._unpacked_rows import LEAST_BYTES, MANY, UnpackedRows
+from fieldsid.logs.readers._unpacked import LEAST_BYTES, MANY, UnpackedRows
 from fieldsid.logs.readers.csv_table import READER as TABLE
 from fieldsid.logs.readers.parquet import READER as PARQUET
 

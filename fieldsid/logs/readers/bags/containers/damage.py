@@ -1,11 +1,18 @@
-"""Where a file of records can be read on behind damage: the first place from which several records follow each other."""
+"""Records one behind the other, in a file and in its chunks, whatever the format: how they are read on behind damage.
+
+They go on at the first place from which several records follow each other.
+"""
 
 from __future__ import annotations
 
 import mmap
-from collections.abc import Callable, Iterable, Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+
+from fieldsid.logs.readers.bags.packets import LAST_NS, Collector, TopicPackets
 
 Bytes = bytes | mmap.mmap
 CHAIN = 3
@@ -39,3 +46,98 @@ def forget(data: Bytes, place: int) -> None:
     """Give back the memory of a mapped file up to a place; the bytes are read again should anybody ask for them."""
     if isinstance(data, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
         data.madvise(mmap.MADV_DONTNEED, 0, place // mmap.PAGESIZE * mmap.PAGESIZE)
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where the bytes stand that are being read: in the chunk at byte `chunk`, of stamps from `low` to `high`, or in none (0)."""
+
+    chunk: int = 0
+    is_packed: bool = False
+    is_cut: bool = False
+    low: int = 0
+    high: int = LAST_NS
+
+
+class Records(ABC):
+    """The records of a file, and of the chunks inside it: topics and their packets by the number that the file gives each."""
+
+    cut_where = ""
+    """What a file that ends inside a record is said to be cut in, where nothing else of the format says that it is cut."""
+
+    def __init__(self, collector: Collector) -> None:
+        self.collector = collector
+        self.topics: dict[int, str] = {}
+        self.by_number: dict[int, TopicPackets | None] = {}
+        self.last: TopicPackets | None = None
+        self.near = (0, LAST_NS)
+
+    @abstractmethod
+    def run(self, data: Bytes, pos: int, end: int, place: Place) -> None:
+        """Read the records from `pos` to `end`, and on behind damage."""
+
+    @abstractmethod
+    def candidates(self, data: Bytes, pos: int, end: int) -> Iterator[int]:
+        """Yield the places from which a record may start."""
+
+    @abstractmethod
+    def end_behind_damage(self, data: Bytes, pos: int, end: int, place: Place) -> int | None:
+        """Return the end of the record at `pos`, or None where none can be; a message has a stamp near the last one."""
+
+    @abstractmethod
+    def is_cut(self, data: Bytes, pos: int, end: int) -> bool:
+        """Whether the last record is cut by the end of the file; what is left of a chunk is taken."""
+
+    @abstractmethod
+    def stated_stamps(self, data: Bytes, pos: int) -> Iterator[tuple[int, Iterable[int]]]:
+        """Yield the stamps in ns that the index records at `pos`, behind a chunk, state of its messages, by number."""
+
+    def behind_damage(self, data: Bytes, pos: int, end: int, place: Place) -> int:
+        """Return where records go on; leave out the message before damage, which may begin inside that one."""
+        self.near = self.collector.stamps_near(self.last)
+        go_on = resumed(self.candidates(data, pos + 1, end), lambda at: self.end_behind_damage(data, at, end, place), end)
+        if go_on is None and (not place.chunk or place.is_cut) and self.is_cut(data, pos, end):
+            if self.cut_where and not place.chunk:
+                self.collector.truncated(self.cut_where, end)
+            return end
+        self.leave_out_last()
+        stop = end if go_on is None else go_on
+        if place.is_packed:
+            self.collector.damaged_at(f"{stop - pos} bytes of the compressed chunk", place.chunk)
+        else:
+            self.collector.damaged_at(f"{stop - pos} bytes", pos)
+        return stop
+
+    def leave_out_last(self) -> None:
+        """Forget the message that came last, where it waits."""
+        if self.last is not None:
+            self.last.leave_out_last()
+            self.last = None
+
+    def packed_chunk(self, plain: bytes | None, says: str, place: Place, data: Bytes, stop: int, *, sure: bool = False) -> int:
+        """Read what a compressed chunk that ends at `stop` holds, None where it is damaged, or leave it out; return its bytes.
+
+        `sure` tells that a checksum holds: else the stamps of its messages must be those that the index behind it states.
+        """
+        if plain is None:
+            self.collector.damaged_at(says, place.chunk)
+            return 0
+        self.collector.unpacked.add(len(plain))
+        counts = self.collector.counts()
+        self.run(plain, 0, len(plain), place)
+        if not (sure or place.is_cut or self._agrees_with_index(data, stop, counts)):
+            self.collector.leave_out_from(counts)
+            self.collector.damaged_at(says, place.chunk)
+        return len(plain)
+
+    def _agrees_with_index(self, data: Bytes, pos: int, counts: Mapping[str, int]) -> bool:
+        """Whether the messages of a chunk have the stamps that the index records behind it state; true without any.
+
+        Damaged data may unpack without an error. The stamps are the numbers that differ in every record, so that damage
+        shows in them.
+        """
+        stated: dict[str, list[int]] = {}
+        for number, stamps in self.stated_stamps(data, pos):
+            stated.setdefault(self.topics.get(number, ""), []).extend(stamps)
+        found = self.collector.stamps_since(counts)
+        return all(sorted(found[topic]) == sorted(stamps) for topic, stamps in stated.items() if topic in found)

@@ -2,7 +2,7 @@
 
 Over rosbags: packets 2 to 3 times as fast (tests/benchmarks/bag_reading.py; SQLite reads the bytes in both, without counting
 and sorting here), and a file that is cut off, has damaged pages or was left by a crash with a write-ahead log gives what is
-left. A database with other tables is left to rosbags.
+left.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 from urllib.parse import quote
 
 from fieldsid.errors import LogError
-from fieldsid.logs.readers.bags.packets import LAST_NS, SETTLE_BYTES, Collector, Connection, TopicPackets, UnknownFormError
+from fieldsid.logs.readers.bags.packets import LAST_NS, SETTLE_BYTES, Collector, Connection, TopicPackets
 
 MAGIC = b"SQLite format 3\x00"
 DAMAGE = (sqlite3.DatabaseError, MemoryError, UnicodeDecodeError)
@@ -92,7 +92,7 @@ def _connections(path: Path, base: sqlite3.Connection, collector: Collector) -> 
         topics = base.execute("SELECT id, name, type, serialization_format FROM topics ORDER BY id").fetchall()
     except sqlite3.OperationalError as error:
         what, hint = f"`{path}` has no table of topics", "copy it from the vehicle again"
-        raise UnknownFormError(what, found=str(error), hint=hint) from error
+        raise LogError(what, found=str(error), hint=hint) from error
     except DAMAGE as error:
         raise LogError(
             f"`{path}` is not a readable ROS 2 bag: {error}",

@@ -11,10 +11,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from fieldsid.logs.readers._unpacked_size import MOST_TIMES, UnpackedSize
-from fieldsid.logs.readers.bags.packets import UnknownFormError
+from fieldsid.errors import LogError
+from fieldsid.logs.readers._unpacked import MOST_TIMES, PIECE_BYTES, UnpackedSize
 
-PIECE_BYTES = 1 << 20
 LARGEST = 1 << 26
 """Bytes of a chunk or message that is one: recorders write some 1e6, and a few packed bytes may claim any number. Larger ones are
 unpacked where so many are packed that they can be meant."""
@@ -25,7 +24,7 @@ def unpacked(data: bytes, compression: str, size: int) -> bytes | None:
     """Return the plain bytes, or those of the blocks that are whole; None where the data are damaged.
 
     `size` is the number of bytes that they should be: of more no more than one is unpacked, and none where so many are too many.
-    Raises UnknownFormError for a compression that is not one of KNOWN.
+    Raises LogError for a compression that is not one of KNOWN.
     """
     if compression in ("", "none"):
         return data
@@ -40,9 +39,7 @@ def unpacked(data: bytes, compression: str, size: int) -> bytes | None:
         return None
     if compression == "zstd":
         return unzstd(data, size)
-    raise UnknownFormError(
-        f"the bag is compressed with {compression!r}", found=compression, hint="record or convert it with zstd or lz4"
-    )
+    raise LogError(f"the bag is compressed with {compression!r}", found=compression, hint="record or convert it with zstd or lz4")
 
 
 def unzstd(data: bytes, size: int = LARGEST) -> bytes | None:

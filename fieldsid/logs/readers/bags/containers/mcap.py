@@ -1,7 +1,7 @@
 """MCAP files (mcap.dev, specification 0), read from front to back.
 
 Over rosbags: packets 3 times as fast (tests/benchmarks/bag_reading.py), and a file that is cut off, has no footer or
-damaged records gives what is left; files of other recorders than ROS 2's. Another compression is left to rosbags.
+damaged records gives what is left; files of other recorders than ROS 2's.
 
 A record is an opcode (u8), a length (u64) and that many bytes; a chunk holds more records. The summary behind the data
 repeats schemas and channels and counts the messages; it is used where it is there.
@@ -11,16 +11,16 @@ from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from struct import Struct, error
 from types import MappingProxyType
 from typing import Literal
 
-from fieldsid.logs.readers.bags.containers.damage import Bytes, forget, mapped, resumed
+from fieldsid.logs.readers.bags.containers.damage import Bytes, Place, Records, forget, mapped
 from fieldsid.logs.readers.bags.containers.decompress import unpacked
-from fieldsid.logs.readers.bags.packets import LAST_NS, SETTLE_BYTES, Collector, Connection, TopicPackets
+from fieldsid.logs.readers.bags.packets import LAST_NS, SETTLE_BYTES, Collector, Connection
 
 MAGIC = b"\x89MCAP0\r\n"
 FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, STATISTICS, DATA_END = 2, 3, 4, 5, 6, 7, 11, 15
@@ -50,20 +50,9 @@ def scan(path: Path, collector: Collector) -> None:
     with mapped(path) as data:
         records = _Records(collector)
         records.summary(data)
-        records.run(data, len(MAGIC), len(data), _Place())
+        records.run(data, len(MAGIC), len(data), Place())
         if not records.done:
             collector.truncated("no footer", len(data))
-
-
-@dataclass(frozen=True, slots=True)
-class _Place:
-    """Where the bytes stand that are being read: in the chunk at byte `chunk`, of stamps from `low` to `high`, or in none (0)."""
-
-    chunk: int = 0
-    is_packed: bool = False
-    is_cut: bool = False
-    low: int = 0
-    high: int = LAST_NS
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,16 +72,12 @@ class _ChunkHead:
         return max(self.high - self.low, 0) / 1e9
 
 
-class _Records:
+class _Records(Records):
     """The records of a file, and of the chunks inside it."""
 
     def __init__(self, collector: Collector) -> None:
-        self.collector = collector
+        super().__init__(collector)
         self.schemas: dict[int, tuple[str, str, str]] = {}
-        self.topics: dict[int, str] = {}
-        self.by_channel: dict[int, TopicPackets | None] = {}
-        self.last: TopicPackets | None = None
-        self.near = (0, LAST_NS)
         self.done = False
 
     def summary(self, data: Bytes) -> None:
@@ -110,9 +95,9 @@ class _Records:
                 self._parsed(op, bytes(data[pos + 9 : stop]))
             pos = stop
 
-    def run(self, data: Bytes, pos: int, end: int, place: _Place) -> None:
+    def run(self, data: Bytes, pos: int, end: int, place: Place) -> None:
         """Read the records from `pos` to `end`, and on behind damage."""
-        record, message, by_channel = _RECORD.unpack_from, _MESSAGE.unpack_from, self.by_channel
+        record, message, by_number = _RECORD.unpack_from, _MESSAGE.unpack_from, self.by_number
         self.last = None
         settle_at = pos + SETTLE_BYTES if not place.chunk else end
         while pos < end and not self.done:
@@ -120,10 +105,10 @@ class _Records:
             stop = pos + 9 + length
             if op == MESSAGE and length >= 22 and stop <= end:
                 channel, _, stamp, _ = message(data, pos + 9)
-                if channel in by_channel and stamp <= LAST_NS:
+                if channel in by_number and stamp <= LAST_NS:
                     if pos > settle_at:
                         settle_at = self._settle(data, pos)
-                    packets = self.last = by_channel[channel]
+                    packets = self.last = by_number[channel]
                     if packets is not None:
                         packets.stamps.append(stamp)
                         packets.payloads.append(bytes(data[pos + 31 : stop]))
@@ -132,7 +117,7 @@ class _Records:
             elif stop <= end and self._is_other(op, data, pos, stop, place):
                 pos = stop
                 continue
-            pos = self._behind_damage(data, pos, end, place)
+            pos = self.behind_damage(data, pos, end, place)
 
     def _settle(self, data: Bytes, pos: int) -> int:
         """Settle what stands before a sound record; return where to do so next."""
@@ -140,7 +125,7 @@ class _Records:
         forget(data, pos)
         return pos + SETTLE_BYTES
 
-    def _is_other(self, op: int, data: Bytes, pos: int, stop: int, place: _Place) -> bool:
+    def _is_other(self, op: int, data: Bytes, pos: int, stop: int, place: Place) -> bool:
         """Take a record that is no message; return whether one like it can stand in this place.
 
         The last message of a chunk is the one before what follows the chunk.
@@ -158,22 +143,7 @@ class _Records:
         self.done = op == DATA_END
         return op != MESSAGE
 
-    def _behind_damage(self, data: Bytes, pos: int, end: int, place: _Place) -> int:
-        """Return where records go on; leave out the message before damage, which may begin inside that one."""
-        self.near = self.collector.stamps_near(self.last)
-        candidates = (m.start() for m in _LIKE_A_RECORD.finditer(data, pos + 1, end))
-        go_on = resumed(candidates, lambda at: self._end_of_sound(data, at, end, place), end)
-        if go_on is None and (not place.chunk or place.is_cut) and self._is_cut(data, pos, end):
-            return end
-        self._leave_out_last()
-        stop = end if go_on is None else go_on
-        if place.is_packed:
-            self.collector.damaged_at(f"{stop - pos} bytes of the compressed chunk", place.chunk)
-        else:
-            self.collector.damaged_at(f"{stop - pos} bytes", pos)
-        return stop
-
-    def _is_cut(self, data: Bytes, pos: int, end: int) -> bool:
+    def is_cut(self, data: Bytes, pos: int, end: int) -> bool:
         """Whether the last record is cut by the end of the file; what is left of a chunk is taken."""
         if pos + 9 > end:
             return True
@@ -182,8 +152,12 @@ class _Records:
             return False
         return op != CHUNK or self._is_chunk(data, pos, end, pos + 9 + length)
 
-    def _end_of_sound(self, data: Bytes, pos: int, end: int, place: _Place) -> int | None:
-        """Return the end of the record at `pos`, or None where none can be."""
+    def candidates(self, data: Bytes, pos: int, end: int) -> Iterator[int]:
+        """Yield the places that look like the opcode and the length of a record."""
+        return (match.start() for match in _LIKE_A_RECORD.finditer(data, pos, end))
+
+    def end_behind_damage(self, data: Bytes, pos: int, end: int, place: Place) -> int | None:
+        """Return the end of the record at `pos`, or None where none can be; a message has a stamp of its chunk."""
         if pos + 9 > end:
             return None
         op, length = _RECORD.unpack_from(data, pos)
@@ -193,7 +167,7 @@ class _Records:
         if op == MESSAGE:
             channel, _, stamp, _ = _MESSAGE.unpack_from(data, pos + 9)
             low, high = (place.low, place.high) if place.chunk else self.near
-            return stop if channel in self.by_channel and low <= stamp <= high else None
+            return stop if channel in self.by_number and low <= stamp <= high else None
         if place.chunk and op not in (SCHEMA, CHANNEL):
             return None
         return None if op == CHUNK and _head_of_chunk(data, pos, stop) is None else stop
@@ -205,60 +179,40 @@ class _Records:
             return False
         self.collector.has_read(stop - pos)
         forget(data, pos)
-        place = _Place(pos, is_packed=bool(head.compression), is_cut=stop < whole, low=head.low, high=head.high)
-        got = self._packed_chunk(data, stop, head, place) if place.is_packed else self._plain_chunk(data, stop, head, place)
+        place = Place(pos, is_packed=bool(head.compression), is_cut=stop < whole, low=head.low, high=head.high)
+        got = self._unpacked_chunk(data, stop, head, place) if place.is_packed else self._plain_chunk(data, stop, head, place)
         if place.is_cut:
             self.collector.cut_chunk(pos, got, head.size)
         return True
 
-    def _leave_out_last(self) -> None:
-        if self.last is not None:
-            self.last.leave_out_last()
-            self.last = None
-
-    def _packed_chunk(self, data: Bytes, stop: int, head: _ChunkHead, place: _Place) -> int:
+    def _unpacked_chunk(self, data: Bytes, stop: int, head: _ChunkHead, place: Place) -> int:
         """Read a compressed chunk as far as it is whole, or leave it out; return its bytes."""
         plain = unpacked(bytes(data[head.start : stop]), head.compression, head.size)
-        if plain is None or (not place.is_cut and (len(plain) != head.size or _is_wrong(plain, head.crc))):
-            self.collector.damaged_at(f"a compressed chunk of {head.seconds:.2f} s", place.chunk)
-            return 0
-        self.collector.unpacked.add(len(plain))
-        counts = self.collector.counts()
-        self.run(plain, 0, len(plain), place)
-        if not head.crc and not place.is_cut and not self._agrees_with_index(data, stop, counts):
-            self.collector.leave_out_from(counts)
-            self.collector.damaged_at(f"a compressed chunk of {head.seconds:.2f} s", place.chunk)
-        return len(plain)
+        is_whole = plain is not None and (place.is_cut or (len(plain) == head.size and not _is_wrong(plain, head.crc)))
+        says = f"a compressed chunk of {head.seconds:.2f} s"
+        return self.packed_chunk(plain if is_whole else None, says, place, data, stop, sure=head.crc != 0)
 
-    def _agrees_with_index(self, data: Bytes, pos: int, counts: Mapping[str, int]) -> bool:
-        """Whether the messages of a chunk have the stamps that the index records behind it state; true without any.
-
-        Damaged data may unpack without an error. The stamps are the numbers that differ in every record, so that damage
-        shows in them.
-        """
-        stated: dict[str, list[int]] = {}
+    def stated_stamps(self, data: Bytes, pos: int) -> Iterator[tuple[int, Iterable[int]]]:
+        """Yield the stamps in ns that the index records at `pos` state, by channel."""
         while pos + 9 <= len(data) and data[pos] == MESSAGE_INDEX:
             (_, length) = _RECORD.unpack_from(data, pos)
             stop = pos + 9 + length
             if length < LEAST[MESSAGE_INDEX] or stop > len(data):
-                break
+                return
             (channel,) = _U16.unpack_from(data, pos + 9)
-            stated.setdefault(self.topics.get(channel, ""), []).extend(
-                stamp for stamp, _ in _ENTRY.iter_unpack(data[pos + 15 : stop - (length - 6) % _ENTRY.size])
-            )
+            entries = _ENTRY.iter_unpack(data[pos + 15 : stop - (length - 6) % _ENTRY.size])
+            yield channel, (stamp for stamp, _ in entries)
             pos = stop
-        found = self.collector.stamps_since(counts)
-        return all(sorted(found[topic]) == sorted(stamps) for topic, stamps in stated.items() if topic in found)
 
-    def _plain_chunk(self, data: Bytes, stop: int, head: _ChunkHead, place: _Place) -> int:
+    def _plain_chunk(self, data: Bytes, stop: int, head: _ChunkHead, place: Place) -> int:
         """Read a chunk that is not compressed; one whose checksum fails though its records look sound is left out."""
         counts = self.collector.counts()
         damages = self.collector.damages
         self.run(data, head.start, stop, place)
         if place.is_cut or damages < self.collector.damages or not _is_wrong(data[head.start : stop], head.crc):
             return stop - head.start
-        if self._end_of_sound(data, stop, len(data), _Place()) is None:
-            self._leave_out_last()  # the damage is that behind the chunk, and begins inside its last message
+        if self.end_behind_damage(data, stop, len(data), Place()) is None:
+            self.leave_out_last()  # the damage is that behind the chunk, and begins inside its last message
         else:
             self.collector.leave_out_from(counts)
             self.collector.damaged_at(f"a chunk of {head.seconds:.2f} s whose checksum does not hold", place.chunk)
@@ -284,7 +238,7 @@ class _Records:
 
     def _channel(self, body: bytes) -> None:
         number, schema = int.from_bytes(body[:2], "little"), int.from_bytes(body[2:4], "little")
-        if number in self.by_channel:
+        if number in self.by_number:
             return
         topic, pos = _text(body, 4)
         encoding, _ = _text(body, pos)
@@ -292,7 +246,7 @@ class _Records:
         parts = name.split("/")
         full = f"{parts[0]}/msg/{parts[-1]}" if len(parts) == 2 else name
         connection = Connection(topic, full, encoding, definition, LANGUAGES.get(language, ""))
-        self.by_channel[number] = self.collector.connect(connection)
+        self.by_number[number] = self.collector.connect(connection)
         self.topics[number] = topic
 
     def _statistics(self, body: bytes) -> None:

@@ -1,7 +1,7 @@
 """ROS 1 bags (format 2.0), read from front to back.
 
 Over rosbags: packets 3 to 4 times as fast (tests/benchmarks/bag_reading.py), and a bag that is cut off, has no index or
-damaged records gives what is left. Another version or compression, and encryption, are left to rosbags.
+damaged records gives what is left.
 
 A record is a header (u32 length, then u32 length + `name=value` fields) and data (u32 length, then bytes); a chunk holds
 more records. The index behind the data repeats the connections and counts the messages; it is used where it is there.
@@ -11,14 +11,15 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
-from fieldsid.logs.readers.bags.containers.damage import Bytes, forget, mapped, resumed
+from fieldsid.errors import LogError
+from fieldsid.logs.readers.bags.containers.damage import Bytes, Place, Records, forget, mapped
 from fieldsid.logs.readers.bags.containers.decompress import unpacked
-from fieldsid.logs.readers.bags.packets import LAST_NS, ROS1, Collector, Connection, TopicPackets, UnknownFormError
+from fieldsid.logs.readers.bags.packets import ROS1, Collector, Connection
 
 MAGIC = b"#ROSBAG V"
 FIRST_LINE = b"#ROSBAG V2.0\n"
@@ -46,27 +47,18 @@ Fields = Mapping[bytes, bytes]
 
 
 def scan(path: Path, collector: Collector) -> None:
-    """Read every record of a bag into `collector`; raises UnknownFormError for a version or an encryption it does not know."""
+    """Read every record of a bag into `collector`; raises LogError for a version or an encryption it does not know."""
     with mapped(path) as data:
         first = data.find(b"\n", 0, 32) + 1
         if data[:first] != FIRST_LINE:
-            raise UnknownFormError(
+            raise LogError(
                 f"`{path}` is a bag of another version",
                 found=repr(data[: max(first, 16)]),
                 hint="convert it with `rosbag migrate`",
             )
         records = _Records(collector)
         records.index(data, first)
-        records.run(data, first, len(data), _Place())
-
-
-@dataclass(frozen=True, slots=True)
-class _Place:
-    """Where the bytes stand that are being read: in the chunk at byte `chunk`, or in none (0)."""
-
-    chunk: int = 0
-    is_packed: bool = False
-    is_cut: bool = False
+        records.run(data, first, len(data), Place())
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,16 +70,14 @@ class _Shape:
     time: int
 
 
-class _Records:
+class _Records(Records):
     """The records of a file, and of the chunks inside it."""
 
+    cut_where = "inside a record"
+
     def __init__(self, collector: Collector) -> None:
-        self.collector = collector
-        self.topics: dict[int, str] = {}
-        self.by_number: dict[int, TopicPackets | None] = {}
+        super().__init__(collector)
         self.shape: _Shape | None = None
-        self.last: TopicPackets | None = None
-        self.near = (0, LAST_NS)
 
     def index(self, data: Bytes, pos: int) -> None:
         """Take connections and counts from the index, which a whole bag ends in."""
@@ -103,7 +93,7 @@ class _Records:
                 self._counts(data, at, stop)
             at = stop
 
-    def run(self, data: Bytes, pos: int, end: int, place: _Place) -> None:
+    def run(self, data: Bytes, pos: int, end: int, place: Place) -> None:
         """Read the records from `pos` to `end`, and on behind damage."""
         take_u32, take_stamp, by_number = _U32.unpack_from, _STAMP.unpack_from, self.by_number
         self.last = None
@@ -129,11 +119,11 @@ class _Records:
                     continue
             pos = self._behind_other(data, pos, end, place)
 
-    def _behind_other(self, data: Bytes, pos: int, end: int, place: _Place) -> int:
+    def _behind_other(self, data: Bytes, pos: int, end: int, place: Place) -> int:
         """Take a record that is laid out otherwise than the message before it; return where the next one starts."""
         stop = self._end_of_sound(data, pos, end)
         if stop is None:
-            return self._behind_damage(data, pos, end, place)
+            return self.behind_damage(data, pos, end, place)
         fields = _header(data, pos)
         op = fields[b"op"]
         if op == MESSAGE:
@@ -146,30 +136,10 @@ class _Records:
         if op == CONNECTION:
             self._connection(fields, data, pos, stop)
         elif op == BAG and fields.get(b"encryptor"):
-            raise UnknownFormError(
-                "the bag is encrypted", found=repr(fields[b"encryptor"]), hint="decrypt it with `rosbag decrypt`"
-            )
+            raise LogError("the bag is encrypted", found=repr(fields[b"encryptor"]), hint="decrypt it with `rosbag decrypt`")
         return stop
 
-    def _behind_damage(self, data: Bytes, pos: int, end: int, place: _Place) -> int:
-        """Return where records go on; leave out the message before damage, which may begin inside that one."""
-        self.near = self.collector.stamps_near(self.last)
-        go_on = resumed(_candidates(data, pos + 1, end), lambda at: self._end_of_near(data, at, end), end)
-        if go_on is None and (not place.chunk or place.is_cut) and self._is_cut(data, pos, end):
-            if not place.chunk:
-                self.collector.truncated("inside a record", end)
-            return end
-        if self.last is not None:
-            self.last.leave_out_last()
-            self.last = None
-        stop = end if go_on is None else go_on
-        if place.is_packed:
-            self.collector.damaged_at(f"{stop - pos} bytes of the compressed chunk", place.chunk)
-        else:
-            self.collector.damaged_at(f"{stop - pos} bytes", pos)
-        return stop
-
-    def _is_cut(self, data: Bytes, pos: int, end: int) -> bool:
+    def is_cut(self, data: Bytes, pos: int, end: int) -> bool:
         """Whether the last record is cut by the end of the file; what is left of a chunk is taken."""
         if pos + 4 > end:
             return True
@@ -201,11 +171,11 @@ class _Records:
             return None
         return stop
 
-    def _end_of_near(self, data: Bytes, pos: int, end: int) -> int | None:
-        """Return the end of the record at `pos` behind damage: a message there has a stamp near the last one."""
+    def end_behind_damage(self, data: Bytes, pos: int, end: int, place: Place) -> int | None:
+        """Return the end of the record at `pos`, or None where none can be; a message has a stamp near the last one."""
         stop = self._end_of_sound(data, pos, end)
         fields = {} if stop is None else _header(data, pos)
-        low, high = self.near
+        low, high = max(self.near[0], place.low), min(self.near[1], place.high)
         return None if fields.get(b"op") == MESSAGE and not low <= _stamp(fields) <= high else stop
 
     def _message(self, fields: Fields, data: Bytes, pos: int, stop: int) -> None:
@@ -249,49 +219,32 @@ class _Records:
         size = int.from_bytes(fields[b"size"], "little")
         self.collector.has_read(stop - pos)
         forget(data, pos)
-        place = _Place(pos, is_packed=compression != "none", is_cut=stop < whole)
-        got = stop - body
+        place = Place(pos, is_packed=compression != "none", is_cut=stop < whole)
         if place.is_packed:
             plain = unpacked(bytes(data[body:stop]), compression, size)
-            if plain is None or (not place.is_cut and len(plain) != size):
-                self.collector.damaged_at(f"a compressed chunk of {size} bytes", pos)
-                return
-            self.collector.unpacked.add(len(plain))
-            counts = self.collector.counts()
-            self.run(plain, 0, len(plain), place)
-            if not place.is_cut and not self._agrees_with_index(data, stop, counts):
-                self.collector.leave_out_from(counts)
-                self.collector.damaged_at(f"a compressed chunk of {size} bytes", pos)
-            got = len(plain)
+            is_whole = plain is not None and (place.is_cut or len(plain) == size)
+            got = self.packed_chunk(plain if is_whole else None, f"a compressed chunk of {size} bytes", place, data, stop)
         else:
             self.run(data, body, stop, place)
+            got = stop - body
         if place.is_cut:
             self.collector.cut_chunk(pos, got, size)
 
-    def _agrees_with_index(self, data: Bytes, pos: int, counts: Mapping[str, int]) -> bool:
-        """Whether the messages of a chunk have the stamps that the index records behind it state; true without any.
-
-        Damaged data may unpack without an error. The stamps are the numbers that differ in every record, so that damage
-        shows in them.
-        """
-        stated: dict[str, list[int]] = {}
+    def stated_stamps(self, data: Bytes, pos: int) -> Iterator[tuple[int, Iterable[int]]]:
+        """Yield the stamps in ns that the index records at `pos` state, by connection."""
         while (stop := self._end_of_sound(data, pos, len(data))) is not None and _header(data, pos)[b"op"] == INDEX:
             start = pos + 8 + _U32.unpack_from(data, pos)[0]
             entries = _ENTRY.iter_unpack(data[start : stop - (stop - start) % _ENTRY.size])
-            topic = self.topics.get(_number(_header(data, pos)), "")
-            stated.setdefault(topic, []).extend(sec * 1_000_000_000 + nanosec for sec, nanosec, _ in entries)
+            yield _number(_header(data, pos)), (sec * 1_000_000_000 + nanosec for sec, nanosec, _ in entries)
             pos = stop
-        found = self.collector.stamps_since(counts)
-        return all(sorted(found[topic]) == sorted(stamps) for topic, stamps in stated.items() if topic in found)
 
-
-def _candidates(data: Bytes, pos: int, end: int) -> Iterator[int]:
-    """Yield the places from which a header may start: its length fits, and an op is among its fields."""
-    for match in _OP.finditer(data, pos, end):
-        for start in range(max(pos, match.start() - BEFORE_OP), match.start() - 3):
-            (size,) = _U32.unpack_from(data, start)
-            if match.end() - start - 4 <= size <= LONGEST_HEADER:
-                yield start
+    def candidates(self, data: Bytes, pos: int, end: int) -> Iterator[int]:
+        """Yield the places from which a header may start: its length fits, and an op is among its fields."""
+        for match in _OP.finditer(data, pos, end):
+            for start in range(max(pos, match.start() - BEFORE_OP), match.start() - 3):
+                (size,) = _U32.unpack_from(data, start)
+                if match.end() - start - 4 <= size <= LONGEST_HEADER:
+                    yield start
 
 
 def _header(data: Bytes, pos: int) -> Fields:

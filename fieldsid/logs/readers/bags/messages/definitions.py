@@ -12,12 +12,10 @@ from typing import Any
 from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
 
 from fieldsid.errors import LogError
-from fieldsid.logs.readers.bags.messages.by_rosbags import ObjectDecoder
 from fieldsid.logs.readers.bags.messages.message_layout import Decoder, refuse_endless, types_in
-from fieldsid.logs.readers.bags.packets import CDR, Connection, UnknownFormError
+from fieldsid.logs.readers.bags.packets import CDR, Connection
 from fieldsid.logs.run import Note
 
-AnyDecoder = Decoder | ObjectDecoder
 Fields = dict[str, list[tuple[str, Any]]]
 _IDL_RULE = "=" * 80 + "\n"
 DEEPEST = 4
@@ -45,12 +43,11 @@ class DefinitionSearch:
         return [folder, folder.parent]
 
 
-def decoder_of(connection: Connection, payload: bytes, search: DefinitionSearch) -> tuple[AnyDecoder, Note | None]:
+def decoder_of(connection: Connection, payload: bytes, search: DefinitionSearch) -> tuple[Decoder, Note | None]:
     """Return the decoder whose definitions fit a message of the connection, and a note where they are not the bag's.
 
     The bag's own definitions count most, then the folder's that was asked for, then those of ROS 2 (Humble), then files
-    beside the bag. What cannot be laid out is left to rosbags. Raises LogError when none fits, none can be parsed, two
-    files beside the bag differ, or the folder holds none.
+    beside the bag. Raises LogError when none fits, none can be parsed, two files beside the bag differ, or the folder holds none.
     """
     first: LogError | None = None
     for origin, fields in _sources(connection, search):
@@ -86,20 +83,11 @@ def _sources(connection: Connection, search: DefinitionSearch) -> Iterator[tuple
             yield f"`{file}`", lambda r=root: {**_shipped(), **_beside(r, connection, search)}
 
 
-def _fitting(known: Fields, connection: Connection, payload: bytes) -> AnyDecoder:
+def _fitting(known: Fields, connection: Connection, payload: bytes) -> Decoder:
     """Return the decoder that can read a message by these definitions; raises the reason of the first that cannot."""
-    is_cdr = connection.serialization == CDR
     refuse_endless(known, connection.type_name)
-    decoder = Decoder(known, connection.type_name, cdr=is_cdr)
-    try:
-        decoder.layout(payload)
-    except UnknownFormError as unknown:
-        slower = ObjectDecoder(known, connection.type_name, cdr=is_cdr)
-        try:
-            slower.layout(payload)
-        except LogError as error:
-            raise LogError(unknown.what, found=f"{unknown.found}; rosbags: {error.found}", hint=unknown.hint) from error
-        return slower
+    decoder = Decoder(known, connection.type_name, cdr=connection.serialization == CDR)
+    decoder.layout(payload)
     return decoder
 
 

@@ -1,7 +1,7 @@
 """Where the fields of a serialized message lie, and many messages decoded at once.
 
 Over rosbags: chosen numbers 10 times as fast (tests/benchmarks/bag_reading.py), and a damaged message among others is left out.
-Types and encodings that are not known here are left to rosbags, see `by_rosbags.ObjectDecoder`.
+rosbags decodes no type and no encoding that is not known here.
 
 A message is walked once; whatever in it decides the layout (lengths of strings and sequences) is kept as a guard.
 All messages with the same size and the same guards share the layout, so their fields are columns of one block.
@@ -19,7 +19,6 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import LogError, MappingError
-from fieldsid.logs.readers.bags.packets import UnknownFormError
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
 
@@ -78,7 +77,7 @@ class Walker:
         self.layout = Layout()
         self.pos = self.start
         if cdr and raw[:2] not in {b"\x00\x00", b"\x00\x01"}:
-            raise UnknownFormError(
+            raise LogError(
                 "a message is in an encoding that is not plain CDR",
                 found=f"encapsulation {raw[:2].hex()}",
                 hint="re-record with the default RMW",
@@ -171,7 +170,7 @@ class Walker:
 
     def _dtype(self, base: str) -> np.dtype[Any]:
         if base not in DTYPES:
-            raise UnknownFormError(f"fields of type `{base}` are not read", found=base, hint="map another topic")
+            raise LogError(f"fields of type `{base}` are not read", found=base, hint="map another topic")
         return np.dtype(self.order + DTYPES[base])
 
 
@@ -277,7 +276,16 @@ class Decoder:
 
     def first_values(self, raw: bytes) -> dict[str, Any]:
         """Return every number of one message by path; rows of numbers up to eight elements."""
-        return first_values(self.layout(raw), raw)
+        layout = self.layout(raw)
+        found: dict[str, Any] = {}
+        for path, leaf in layout.leaves.items():
+            if leaf.count is None:
+                found[path] = np.frombuffer(raw, leaf.dtype, 1, leaf.offset)[0].item()
+                continue
+            names = _names_beside(layout, path)
+            for i, value in enumerate(np.frombuffer(raw, leaf.dtype, leaf.count, leaf.offset)[:8]):
+                found[f"{path}[{names[i] if i < len(names) else i}]"] = value.item()
+        return found
 
     def decode(self, payloads: Sequence[bytes], paths: Sequence[str]) -> Columns:
         """Return for each path the numbers of all messages, and which messages the definition fits."""
@@ -307,12 +315,10 @@ class Decoder:
                 block, rows = block[1:], rows[1:]
                 continue
             places = [numbers_at(layout, p) for p in paths]
-            same = np.zeros(rows.size, dtype=bool)
-            same[0] = True
-            if tried < ROWS_APART:
-                same = np.ones(rows.size, dtype=bool)
-                for begin, end in layout.guards:
-                    same &= (block[:, begin:end] == block[0, begin:end]).all(axis=1)
+            same = np.ones(rows.size, dtype=bool)
+            same[1:] = tried < ROWS_APART
+            for begin, end in layout.guards if tried < ROWS_APART else ():
+                same &= (block[:, begin:end] == block[0, begin:end]).all(axis=1)
             _take(block[same], rows[same], places, out)
             block, rows = (block[~same], rows[~same]) if tried < ROWS_APART else (block[1:], rows[1:])
             tried += 1
@@ -332,19 +338,6 @@ def _take(
             out[k][rows, j] = column
 
 
-def first_values(layout: Layout, raw: bytes) -> dict[str, Any]:
-    """Return every number of one message by path; rows of numbers up to eight elements."""
-    found: dict[str, Any] = {}
-    for path, leaf in layout.leaves.items():
-        if leaf.count is None:
-            found[path] = np.frombuffer(raw, leaf.dtype, 1, leaf.offset)[0].item()
-            continue
-        names = _names_beside(layout, path)
-        for i, value in enumerate(np.frombuffer(raw, leaf.dtype, leaf.count, leaf.offset)[:8]):
-            found[f"{path}[{names[i] if i < len(names) else i}]"] = value.item()
-    return found
-
-
 def _names_beside(layout: Layout, path: str) -> tuple[str, ...]:
     parent = path.rpartition(".")[0]
     return layout.texts.get(f"{parent}.name" if parent else "name", ())
@@ -356,8 +349,8 @@ def as_floats(values: npt.NDArray[Any]) -> FloatArray:
     return floats[:, 0] if floats.shape[1] == 1 else floats
 
 
-def _misfit(type_name: str, needed: int, found: int) -> UnknownFormError:
-    return UnknownFormError(
+def _misfit(type_name: str, needed: int, found: int) -> LogError:
+    return LogError(
         f"the definition of `{type_name}` does not fit its messages",
         found=f"a message of {found} bytes where the definition ends at {needed}",
         hint="give the definitions the vehicle was built with: `--msg-path DIR`",

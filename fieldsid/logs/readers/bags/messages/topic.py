@@ -13,8 +13,8 @@ from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ATTITUDE, Source, Stamp
 from fieldsid.logs.mapping.canonical_names import unit_of_field
 from fieldsid.logs.reader import Series
-from fieldsid.logs.readers.bags.messages.definitions import AnyDecoder, DefinitionSearch, decoder_of
-from fieldsid.logs.readers.bags.messages.message_layout import Layout, as_floats, numbers_at
+from fieldsid.logs.readers.bags.messages.definitions import DefinitionSearch, decoder_of
+from fieldsid.logs.readers.bags.messages.message_layout import Decoder, Layout, as_floats, numbers_at
 from fieldsid.logs.readers.bags.packets import Connection, TopicPackets
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
@@ -56,16 +56,10 @@ class TopicSeries:
     def series(self, signal: str, stamps: Stamps, origin: int) -> Series:
         """Return one signal's series, in seconds from `origin`."""
         path = self.paths[signal]
-        last = path.rpartition(".")[2]
-        stated = (
-            "Pa"
-            if self.connection.type_name == PRESSURE
-            else unit_of_field(self.connection.topic, path, signal)
-            if signal != ATTITUDE
-            else None
-        )
+        stated = None if signal == ATTITUDE else unit_of_field(self.connection.topic, path, signal)
+        unit = "Pa" if self.connection.type_name == PRESSURE else stated
         label = f"{self.connection.topic}.{path}" if path else self.connection.topic
-        return Series((stamps - origin) / 1e9, self.values[signal], label, stated, last == "z")
+        return Series((stamps - origin) / 1e9, self.values[signal], label, unit, path.rpartition(".")[2] == "z")
 
 
 class TopicDecoding:
@@ -75,7 +69,7 @@ class TopicDecoding:
         self.sources = sources
         self.search = search
         self.notes: list[Note] = []
-        self.decoder: AnyDecoder | None = None
+        self.decoder: Decoder | None = None
         self.paths: dict[str, str] = {}
         self.header: str | None = None
         self.blocks: list[list[npt.NDArray[Any]]] = []
@@ -92,7 +86,7 @@ class TopicDecoding:
             self.good.append(good)
         payloads.clear()
 
-    def _begin(self, connection: Connection, payloads: list[bytes]) -> AnyDecoder:
+    def _begin(self, connection: Connection, payloads: list[bytes]) -> Decoder:
         """Find the definition and the fields by the first message that a definition fits."""
         decoder, note, first = _first_that_fits(connection, payloads, self.search)
         layout = decoder.layout(first)
@@ -138,7 +132,7 @@ class TopicDecoding:
 
 def _first_that_fits(
     connection: Connection, payloads: list[bytes], search: DefinitionSearch
-) -> tuple[AnyDecoder, Note | None, bytes]:
+) -> tuple[Decoder, Note | None, bytes]:
     first: LogError | None = None
     for payload in payloads[:FIRST_TRIED]:
         try:
@@ -177,13 +171,6 @@ def field_of(connection: Connection, layout: Layout, signal: str, path: str) -> 
             hint="give the field that holds x, y, z, w",
             signal=signal,
         )
-    if len(places) == 4 and signal not in (ATTITUDE, "yaw_rad", "pitch_rad", "roll_rad"):
-        raise MappingError(
-            f"`{signal}` cannot come from a quaternion",
-            found=f"{connection.topic}.{path}",
-            hint=f"name one number: `{path}.x`",
-            signal=signal,
-        )
     return path
 
 
@@ -193,7 +180,7 @@ def quaternions_in(layout: Layout) -> list[str]:
     return [p for p in parents if all(f"{p}.{part}" in layout.leaves for part in "xyzw")]
 
 
-def header_of(decoder: AnyDecoder) -> str | None:
+def header_of(decoder: Decoder) -> str | None:
     """Return the path of a message's own stamp, or None."""
     for name, (_, what) in decoder.definitions[decoder.type_name]:
         if what == HEADER:

@@ -7,8 +7,9 @@ from importlib import import_module
 
 import pytest
 
+from fieldsid.logs.readers._unpacked import PIECE_BYTES
 from fieldsid.logs.readers.bags.containers import decompress
-from fieldsid.logs.readers.bags.containers.decompress import LARGEST, PIECE_BYTES, unpack_file, unpacked
+from fieldsid.logs.readers.bags.containers.decompress import LARGEST, unpack_file, unpacked
 
 PLAIN = bytes(5_000_000)
 

@@ -1,14 +1,66 @@
-"""Rows of a packed table as they come out: refused where they repeat one another, or a line has no end.
+"""How large a packed log may become: some bytes can claim, and give, any number of others.
 
-Such a file is small on the disk and would take any amount of memory.
+A log's own numbers pack a few times, constants beside them some hundred times; what goes beyond is no log, and is refused before
+it fills the memory, as soon as that is known. So are rows of a table that repeat one another, and a line that has no end.
 """
 
 from __future__ import annotations
 
+import zlib
 from pathlib import Path
 
 from fieldsid.errors import LogError
-from fieldsid.logs.readers._unpacked_size import UnpackedSize
+
+GZIP = b"\x1f\x8b"
+PIECE_BYTES = 1 << 20
+SMALL = 128 << 20
+"""Unpacked bytes that are read however they were packed."""
+MOST_TIMES = 300
+"""Times its own bytes that a larger log may unpack to: a table of three hundred columns, most of them constant, comes to that."""
+
+
+class UnpackedSize:
+    """Counts what a log of so many bytes unpacks to; raises LogError where it is more than a log can be."""
+
+    def __init__(self, path: Path, packed: int | None = None) -> None:
+        self.path = path
+        self.packed = path.stat().st_size if packed is None else packed
+        self.size = 0
+
+    @property
+    def left(self) -> int:
+        """Bytes that may still be unpacked."""
+        return max(SMALL, MOST_TIMES * self.packed) - self.size
+
+    def add(self, size: int) -> None:
+        """Count bytes that have been unpacked, or that the file says it will unpack to."""
+        self.size += size
+        if self.left < 0:
+            raise LogError(
+                f"`{self.path}` is no log: it unpacks to far more than a vehicle records",
+                found=f"at least {self.size} bytes from {self.packed}",
+                hint="write it again with the samples alone, or leave out what is constant",
+            )
+
+
+def inflated(path: Path) -> tuple[bytes, bool]:
+    """Return the bytes of a file, unpacked where it is gzip, and whether they end before its stream does.
+
+    Raises LogError where it unpacks to more than a log does.
+    """
+    raw = path.read_bytes()
+    if not raw.startswith(GZIP):
+        return raw, False
+    unpack, out, size = zlib.decompressobj(wbits=31), bytearray(), UnpackedSize(path)
+    try:
+        for start in range(0, len(raw), PIECE_BYTES):
+            piece = unpack.decompress(raw[start : start + PIECE_BYTES], size.left + 1)
+            size.add(len(piece))
+            out += piece
+    except zlib.error:
+        return bytes(out), True
+    return bytes(out), not unpack.eof
+
 
 LEAST_BYTES = 1.0
 """Packed bytes that a row must have: with a clock of its own and constants beside it one takes 2.1 to 2.6 at the best that gzip

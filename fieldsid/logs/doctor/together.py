@@ -1,0 +1,42 @@
+"""Signals where a run has all of them, and how they change over windows of some samples."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.logs.run import Run
+from fieldsid.numerics.arrays import FloatArray
+
+FEWEST = 50
+"""Samples, or windows, from which on signals are compared."""
+Number = TypeVar("Number", np.float64, np.complex128)
+
+
+def together(run: Run, *signals: str) -> tuple[FloatArray, ...] | None:
+    """Return the times (n,) at which a run has all of some signals, and them there; None where it lacks one, or has too few."""
+    if not all(run.has(s) for s in signals):
+        return None
+    seen = np.all([np.isfinite(run[s]) for s in signals], axis=0)
+    return (run.time[seen], *(run[s][seen] for s in signals)) if seen.sum() >= FEWEST else None
+
+
+def width_of(time: FloatArray, window_s: float) -> int:
+    """Return the samples of a window at times (n,)."""
+    step = float(np.nanmedian(np.diff(time))) if time.size > 1 else 0.0
+    return max(1, round(window_s / step)) if step > 0.0 else 1
+
+
+def over(values: npt.NDArray[Number], width: int) -> npt.NDArray[Number]:
+    """Return the changes (n - width,) of numbers over windows of so many samples."""
+    return values[width:] - values[:-width]
+
+
+def change(values: npt.NDArray[Number], width: int) -> npt.NDArray[Number]:
+    """Return the change of a column (n,) over a window about each sample, NaN at the ends."""
+    found = np.full_like(values, np.nan)
+    if values.size > width:
+        found[width // 2 :][: values.size - width] = over(values, width)
+    return found
