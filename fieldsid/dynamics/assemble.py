@@ -14,14 +14,15 @@ from operator import attrgetter
 import numpy as np
 
 from fieldsid.dynamics import integrate
+from fieldsid.dynamics.nonlinear_kernel import MAX_PIECES
 from fieldsid.models.effect import Effect, Motion, Terms, Values, over_intervals
 from fieldsid.models.fin_path import FinPath
 from fieldsid.models.hull import CROSS_FACTOR, DAMPING, DRIVES, FIN, MOMENT_END, MOMENT_START, STIFFNESS, Core
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
-MAX_RATE_STEP_PRODUCT, MAX_PIECES = 0.3, 200
-"""Largest product of step and fastest linear rate of one RK4 piece (relative error below 3e-5 of a step), and most pieces."""
+MAX_RATE_STEP_PRODUCT = 0.3
+"""Largest product of step and fastest linear rate of one RK4 piece (relative error below 3e-5 of a step)."""
 MOMENT = (MOMENT_START, MOMENT_END)
 NO_CORE, NO_TERMS = Core(), Terms()
 MAX_MOMENT_ITERATIONS = 30

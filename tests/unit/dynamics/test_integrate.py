@@ -83,6 +83,28 @@ def test_the_compiled_core_gives_the_numbers_of_its_python_source():
     np.testing.assert_allclose(fast, slow, rtol=1e-12, atol=1e-15)
 
 
+@pytest.mark.parametrize("what", ["a cross state", "none", "without bound"])
+def test_the_compiled_tangents_are_those_of_their_python_source(what):
+    """Over more steps than are taken at once, on an uneven clock; a motion without bound ends after the first of them."""
+    steps, rows, start = np.tile(clock("every")[0], 2), np.tile(drive(), (2, 1)), np.array([0.1, -0.05, 0.02 * (what != "none")])
+    c = np.array(Core(*C.values()) if what == "a cross state" else Core(quadratic=0.8 * (what == "none"), heading_sin=0.05))
+    rows[100:, 0] -= 60.0 * (what == "without bound")
+    columns, places, factors, _ = pushed()
+    columns, factors = np.tile(columns, 2), factors + np.eye(4, 6, k=2)
+    d_c, d_start, found = np.eye(4, COUNT), np.eye(4, 3), []
+    for run in (nonlinear_sensitivities, plain_of(nonlinear_sensitivities)):
+        out, sens = np.empty((2 * N - 1, 3)), np.empty((4, 2, 2 * N - 1))
+        with np.errstate(over="ignore", invalid="ignore"):
+            run(steps, rows, c, start, 3, columns, places, factors, d_c, d_start, out, sens)
+        found.append((out, sens))
+    gone = np.isnan(found[0][0][:, 1])
+    assert gone.any() == (what == "without bound")
+    assert (np.isnan(found[0][1]) == gone).all()
+    assert not gone[:101].any()
+    for fast, slow in zip(*found, strict=True):
+        np.testing.assert_allclose(fast, slow, rtol=1e-10, atol=1e-12)
+
+
 def test_a_motion_without_bound_is_nan_from_there_on():
     rows, out = np.zeros((N - 1, 6)), np.empty((N, 3))
     rows[:, 0], rows[:, 2:4] = -40.0, 1.0
