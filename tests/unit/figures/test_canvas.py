@@ -48,7 +48,9 @@ def test_the_suffix_is_the_kind_of_file_and_the_same_figure_the_same_bytes(tmp_p
 
 
 def test_capital_letters_are_a_suffix_too(tmp_path):
-    path = canvas.save(canvas.sheet(), tmp_path / "F.SVG")
+    sheet = canvas.sheet()
+    sheet.add_subplot()
+    path = canvas.save(sheet, tmp_path / "F.SVG")
     assert path.read_bytes().startswith(b"<?xml")
 
 
