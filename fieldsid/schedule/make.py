@@ -19,7 +19,7 @@ from fieldsid.records.named_inputs import sha256_of
 from fieldsid.schedule.linear_plant import FinLimits, not_counted, plants_at
 from fieldsid.schedule.plants import Plants, models_plants, plants_of
 from fieldsid.schedule.record import Answer, Schedule
-from fieldsid.schedule.rows import DESIGN_DRAWS, SEED, Asked, design_rows
+from fieldsid.schedule.rows import DESIGN_DRAWS, SEED, design_rows
 from fieldsid.schedule.wish import PROPORTIONAL, Wish, check_wish
 
 FIN = {Axis.YAW: "rudder", Axis.PITCH: "elevator"}
@@ -67,15 +67,14 @@ def design_schedule(
     source.require(knots)
     _refuse_offsets(source, knots, fin_limit, limits)
     plants, refused = plants_of(source, limits, runs, length), False
-    asked = Asked(fin_limit, wish, depth)
     try:
-        rows, answer = design_rows(plants, knots, asked)
+        rows, answer = design_rows(plants, knots, wish, fin_limit, depth=depth)
     except ModelError as error:
         if plants.belief is None or wish.kind in PROPORTIONAL:
             raise  # nothing but a rate holds what may be unstable
         # what pulses say of an unstable hull's sway may be further off than each speed's own model, which holds near its pulses
         plants, refused = models_plants(source, limits, runs, _took_no_gains(error)), True
-        rows, answer = design_rows(plants, knots, asked)
+        rows, answer = design_rows(plants, knots, wish, fin_limit, depth=depth)
     return Schedule(
         axis=source.axis,
         kind=wish.kind,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil, degrees
 
 from fieldsid.errors import UsageError
@@ -21,21 +21,14 @@ SEED = 41
 AS_THE_CONSTANT = "the best constant gain, from which it was sought"
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """What rows are designed for: the fin's limit (rad), the wish, and whether the depth loop is added."""
-
-    fin_limit: float
-    wish: Wish
-    depth: bool
-
-
-def design_rows(plants: Plants, knots: Sequence[float], asked: Asked) -> tuple[tuple[Row, ...], float]:
+def design_rows(
+    plants: Plants, knots: Sequence[float], wish: Wish, limit: float, *, depth: bool
+) -> tuple[tuple[Row, ...], float]:
     """Return a row for each speed, and the time (s) that all of them settle in, QUICKEST where each has its own.
 
-    Raises ModelError where no gains hold a loop and UsageError where they do, but none as quick as asked.
+    The fin is limited to +/-limit rad; `depth` adds the depth loop. Raises ModelError where no gains hold a
+    loop and UsageError where they do, but none as quick as asked.
     """
-    wish, limit = asked.wish, asked.fin_limit
     quick = parallel_map(lambda speed: quickest(plants.at(speed, limit, DESIGN_DRAWS, SEED), wish, limit), knots)
     answer = _answer(quick, wish)
     found = quick
@@ -46,7 +39,7 @@ def design_rows(plants: Plants, knots: Sequence[float], asked: Asked) -> tuple[t
         found = parallel_map(lambda sought: answering(sought, answer, f"settling {answer:.3g} s{as_slow}"), quick)
     found = _no_worse_than_one(found, [place_of(s.plant, wish, limit, answer) for s in found])
     supports = plants.source.supports
-    return tuple(parallel_map(lambda s: row_of(s, depth=asked.depth, supported=supports(s.plant.speed)), found)), answer
+    return tuple(parallel_map(lambda s: row_of(s, depth=depth, supported=supports(s.plant.speed)), found)), answer
 
 
 def place_of(plant: LinearPlant, wish: Wish, fin_limit: float, answer: float) -> Place:

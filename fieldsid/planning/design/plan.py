@@ -109,20 +109,17 @@ def make_plan(model: Model, request: Request, step: Callable[[], None] = lambda:
     that is unstable.
     """
     circles = checked_circles([model], request, request.window.length)
-    legs = _legs(model, request, step) + circles
-    check_minutes(legs, request)
+    return plan_of(model, request, _legs(model, request, step) + circles)
+
+
+def plan_of(model: Model, request: Request, legs: Sequence[Leg]) -> Plan:
+    """Return the plan of legs for a prior; raises UsageError where they take longer than there is time."""
+    _check_minutes(legs, request)
     name = str(model.info.get("name", "")) or model.method or "model"
     return Plan(
-        request.axis,
-        request.vehicle,
-        name,
-        request.envelope,
-        tuple(legs),
-        dict(request.want),
-        request.seed,
-        request.course,
+        request.axis, request.vehicle, name, request.envelope, tuple(legs), dict(request.want), request.seed, request.course,
         request.fins,
-    )
+    )  # fmt: skip
 
 
 def checked_circles(models: Sequence[Model], request: Request, shortest_s: float) -> list[Leg]:
@@ -135,11 +132,13 @@ def checked_circles(models: Sequence[Model], request: Request, shortest_s: float
     check_room(request.envelope, request.speeds, request.run_up_s, SHORTEST_WINDOW_S)
     for model in models:
         checked_prior(model, request.axis, request.speeds)
-    settings = [setting_at(models[0], request, speed) for speed in request.speeds]
     circles = circle_legs(setting_at(models[0], request, max(request.speeds)), request.speeds) if request.radius else []
-    bases = [operating_point(models[0], speed).base for speed in request.speeds]
-    turns = [turn_back_s(base.damping, base.authority, request.envelope.fin) for base in bases]
-    legs = [request.run_up_s + min(shortest_s, s.window.length) + turn for s, turn in zip(settings, turns, strict=True)]
+
+    def shortest(speed: float) -> float:
+        base, window = operating_point(models[0], speed).base, setting_at(models[0], request, speed).window
+        return request.run_up_s + min(shortest_s, window.length) + turn_back_s(base.damping, base.authority, request.envelope.fin)
+
+    legs = [shortest(speed) for speed in request.speeds]
     once = (sum(legs) + sum(leg.pass_s for leg in circles)) / 60.0
     if request.minutes is not None and once > request.minutes:
         fewer = f", or fly {max(1, int(len(legs) * request.minutes / once))} of the {len(legs)} speeds" if legs[1:] else ""
@@ -225,7 +224,7 @@ def _check_budget(request: Request) -> None:
         )
 
 
-def check_minutes(legs: list[Leg], request: Request) -> None:
+def _check_minutes(legs: Sequence[Leg], request: Request) -> None:
     """Raise UsageError when the legs take longer than the budget, with the accuracy goals that the budget allows."""
     total = sum(leg.duration_s for leg in legs) / 60.0
     if request.minutes is None or total <= request.minutes:
@@ -243,7 +242,7 @@ def check_minutes(legs: list[Leg], request: Request) -> None:
     )
 
 
-def _possible(legs: list[Leg], request: Request) -> dict[str, float]:
+def _possible(legs: Sequence[Leg], request: Request) -> dict[str, float]:
     """Return the errors that the budget buys, the extra passes shared out to the leg that lacks most."""
     budget = (request.minutes or 0.0) * 60.0 - sum(leg.duration_s for leg in legs if leg.purpose != "parameters")
     legs = [leg for leg in legs if leg.purpose == "parameters"]

@@ -267,17 +267,12 @@ def _tuned(arena: _RivalFlights, candidate: Excitation, pairs: Mapping[str, floa
     return candidate, pairs
 
 
-def shortest_of(window: Window) -> float:
-    """Return the seconds to which a window is cut at most."""
-    return window.lead + window.recover + 2.0
-
-
 def _shortened(window: Window, flights: Sequence[Response] | None) -> Window:
     """Return the window cut to the longest flight: a rule may be over before its time."""
     if not flights:
         return window
     longest = max(float(f.time[-1]) for f in flights)
-    return replace(window, length=max(min(window.length, longest), shortest_of(window)))
+    return replace(window, length=max(min(window.length, longest), window.shortest))
 
 
 def _odds(log: float) -> str:

@@ -11,16 +11,8 @@ from fieldsid.models.model import Model
 from fieldsid.planning.design.best_leg import Setting, enforce_chance_constraint, enforce_envelope, ensemble_at, leg_of
 from fieldsid.planning.design.leg import Leg
 from fieldsid.planning.design.objective import make_objective
-from fieldsid.planning.design.plan import Plan, Request, check_minutes, checked_circles, setting_at
-from fieldsid.planning.discriminate.discriminate import (
-    FAST_HZ,
-    Separation,
-    as_flown,
-    candidate_maneuvers,
-    separate,
-    shortest_of,
-    worth,
-)
+from fieldsid.planning.design.plan import Plan, Request, checked_circles, plan_of, setting_at
+from fieldsid.planning.discriminate.discriminate import FAST_HZ, Separation, as_flown, candidate_maneuvers, separate, worth
 from fieldsid.planning.flight.excitation import Excitation
 from fieldsid.runtime.parallel_map import parallel_map
 
@@ -38,17 +30,12 @@ def separating_plan(
     `step` is called as each leg is found; with `request.radius` circles follow. Raises UsageError when nothing stays inside
     the envelope or the legs take longer than there is time, ModelError for a rival that is unstable.
     """
-    circles = checked_circles(rivals, request, shortest_of(request.window))
+    circles = checked_circles(rivals, request, request.window.shortest)
     made = parallel_map(lambda speed: _leg_at(rivals, request, speed), request.speeds)
     for _ in made:
         step()
     legs, found = [*(leg for leg, _ in made), *circles], [separation for _, separation in made]
-    check_minutes(legs, request)
-    plan = Plan(
-        rivals[0].axis, request.vehicle, rivals[0].method, request.envelope, tuple(legs), {}, request.seed, request.course,
-        request.fins,
-    )  # fmt: skip
-    return plan, tuple(found)
+    return plan_of(rivals[0], request, legs), tuple(found)
 
 
 def _leg_at(rivals: Sequence[Model], request: Request, speed: float) -> tuple[Leg, Separation]:

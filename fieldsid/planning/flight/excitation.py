@@ -35,6 +35,11 @@ class Window:
         return self.length - self.lead - self.recover
 
     @property
+    def shortest(self) -> float:
+        """Seconds that a window with this lead and recovery takes at least."""
+        return self.lead + self.recover + 2.0
+
+    @property
     def time(self) -> FloatArray:
         """Sample times (n,) in s from the window's start."""
         return np.arange(round(self.length * self.rate_hz) + 1) / self.rate_hz
@@ -52,7 +57,7 @@ class Window:
                 found=f"--window {self.length:g}, at most {LONGEST_WINDOW_S:g} s",
                 hint="for example `--window 33`",
             )
-        if self.excitation < 2.0:
+        if self.length < self.shortest:
             raise UsageError(
                 f"a window of {self.length:g} s leaves {max(self.excitation, 0.0):g} s for the excitation",
                 found=f"{self.lead:g} s before it and {self.recover:g} s after it",
