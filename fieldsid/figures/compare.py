@@ -14,7 +14,7 @@ from fieldsid.models.model import Model
 from fieldsid.rounding import DEGREES, number
 
 MOST_BARS = 12
-TITLE_WIDTH = 44
+TITLE_WIDTH = 38
 
 
 def figure(found: Comparison, model: Model, name: str) -> Figure:

@@ -13,7 +13,7 @@ from fieldsid.rounding import DEGREES
 
 def draw(places: Sequence[Place], ax: Axes) -> None:
     """Draw one bar per condition worse than the rest, the longest, where the model fails most, at the top and in colour."""
-    canvas.dress(ax, x="share of the squared error beyond that of the time, %")
+    canvas.dress(ax, x="share of the squared error\nbeyond that of the time, %")
     ordered = sorted((p for p in places if p.beyond > 0.0), key=lambda p: p.beyond)
     lengths = [100.0 * p.beyond for p in ordered]
     colours = [canvas.SIMULATED if p is ordered[-1] else canvas.QUIET for p in ordered]
