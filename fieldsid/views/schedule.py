@@ -11,7 +11,7 @@ from fieldsid.figures.kinds import sketch
 from fieldsid.page import Block, Page, facts, listed
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import RADIANS, Angles, number
-from fieldsid.views._words import percent, table
+from fieldsid.views._words import table
 
 if TYPE_CHECKING:
     from fieldsid.schedule import Schedule
@@ -55,10 +55,10 @@ def blocks_of(schedule: Schedule, angles: Angles = RADIANS, lost: Iterable[str] 
             number(r.gains.kp),
             *(number(v, 3) for v in (r.gains.ki, r.gains.kd, angles.factor * r.feed_forward, angles.factor * r.fin_limit)),
             *((number(r.depth_gain, 3),) if schedule.depth else ()),
-            percent(r.fin_use).replace(" ", ""),
+            f"{r.fin_use:.0%}",
             f"{r.phase_margin_deg:.0f}",
             f"{r.settling:.1f}" if isfinite(r.settling) else "never",
-            percent(r.draws_held).replace(" ", ""),
+            f"{r.draws_held:.0%}",
             "yes" if r.supported else "no",
         )
         for r in schedule.rows
