@@ -40,7 +40,7 @@ class ParameterNow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveGains:
-    """Gains of the estimate, by the design of `schedule design`, with `--gains`."""
+    """Gains of now by the design of `schedule design`, with `--gains`."""
 
     time: Annotated[Number, Key("Time of the estimate they are of.", "time_s")]
     verdict: Annotated[
@@ -48,6 +48,9 @@ class LiveGains:
         Key("`keep` and `change` are of the gains loaded, `use` where none are; `refused` until the estimate has settled."),
     ]
     says: Annotated[str, Key("The gains with their errors beside those loaded, or why there are none.")]
+    method: Annotated[
+        str, Key("How the model that they are for was found: `live`, or once a maneuver has ended the method of `identify`.")
+    ] = "live"
     speed: Annotated[Number, Key("The speed they are for: that of the last 10 s.", "speed_m_s")] = nan
     row: Annotated[Mapping[str, Any] | None, Key("Gains, margins and answer, as a row of a schedule.")] = None
     std_errors: Annotated[Mapping[str, float] | None, Key("Standard errors of kp, ki, kd and of the feed-forward in rad.")] = None
@@ -110,12 +113,13 @@ class Look(Result):
     next: Annotated[str, Key("The command that comes next; empty where the source is no log.")]
 
 
-def live_gains(now: OnlineEstimate, found: GainsOfOne) -> LiveGains:
-    """Return the gains of an estimate as they are told."""
+def live_gains(now: OnlineEstimate, found: GainsOfOne, method: str = "live") -> LiveGains:
+    """Return gains at the time and speed of an estimate as they are told, and the method that found their model."""
     return LiveGains(
         time=now.time,
         verdict=found.verdict,
         says=found.says,
+        method=method,
         speed=now.speed_now,
         row=body_of(found.row),
         std_errors=found.std_errors,

@@ -5,12 +5,16 @@ from __future__ import annotations
 import io
 import json
 
+import numpy as np
 import pytest
 from cli import trial
 from rich.console import Console
 
 from fieldsid.cli.live.screen import screen
+from fieldsid.fitting.identify import identify
 from fieldsid.logs import load_run
+from fieldsid.models.axis import Axis
+from fieldsid.schedule.search.of_one_model import gains_of_one, usual
 
 
 def looks(answer):
@@ -167,6 +171,27 @@ def test_gains_and_a_diagnosis_are_said_beside_the_estimate(run_cli, tmp_path):
     for told in ("verdict", "effects", "left", "base", "final", "noise_floor", "next_maneuver"):
         assert last["diagnosed"][told] == after[told]
     assert after["short"] in last["diagnosed"]["says"]
+
+
+def test_gains_are_those_of_the_design_once_a_maneuver_has_ended(run_cli, tmp_path):
+    run = trial.flown(tmp_path)
+    last = looks(run_cli("live", run, "--axis", "yaw", "--speed", "0", "--json", "--every", "5", "--gains"))[-1]["gains"]
+    log = load_run(run)
+    (fit,) = identify([log], Axis.YAW)
+    row = gains_of_one(fit.model, last["speed_m_s"], usual(float(np.abs(log["rudder_rad"]).max()), by_rate=True)).row
+    assert last["method"] == fit.model.method
+    assert (last["row"]["kp"], last["row"]["kd"]) == pytest.approx((row.gains.kp, row.gains.kd), rel=1e-6)
+
+
+def test_gains_of_lines_on_standard_input_are_of_all_that_was_sent(run_cli, tmp_path, monkeypatch):
+    log = load_run(trial.flown(tmp_path))
+    names = ("rudder_rad", "yaw_rad", "yaw_rate_rad_s")
+    rows = zip(log.time, *(log[n] for n in names), strict=True)
+    lines = [json.dumps(dict(zip(("time_s", *names, "surge_m_s"), (*row, 1.4), strict=True))) for row in rows]
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO("\n".join(lines).encode())))
+    piped = looks(run_cli("live", "-", "--axis", "yaw", "--json", "--every", "5", "--gains"))[-1]["gains"]
+    assert piped["method"] == "output_error"
+    assert piped["time_s"] == pytest.approx(log.time[-1])
 
 
 @pytest.mark.parametrize(

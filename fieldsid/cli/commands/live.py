@@ -75,7 +75,6 @@ def command(
     _check_source(log, udp, follow=follow)
     feed = Feed(axis, log, speed if speed > 0.0 else inf, follow, udp, inf if idle is None else idle, mapping)
     goals, goals_from = _goals(axis, plan, want)
-    feed.keeps = diagnose
     beside = _beside(feed, (schedule, vehicle, depth) if gains or schedule else None, diagnose=diagnose)
     from fieldsid.online.progress import Watch
 
@@ -141,9 +140,10 @@ def _beside(feed: Feed, gains: tuple[Path | None, Path | None, bool] | None, *, 
         return None
     from fieldsid.cli.live.beside import Beside, wanted_at
 
+    feed.keeps = True
     waits = feed.is_log and not feed.follow and not isfinite(feed.factor)
     wanted = None if gains is None else wanted_at(feed.axis, *gains)
-    return Beside(feed.axis, feed.flown if diagnose else None, wanted, waits=waits)
+    return Beside(feed.axis, feed.flown, wanted, diagnoses=diagnose, waits=waits)
 
 
 def _begun(feed: Feed, state: Path | None, watch: Watch, bandwidth: float, forgetting: float) -> tuple[OnlineIdentifier, float]:

@@ -1,6 +1,8 @@
 """What a second process works out beside a live estimate: gains of now, and a diagnosis of what was flown when a maneuver ends.
 
-A log that is replayed without waiting waits for it instead: there nothing flies on.
+While the fin moves, gains are designed for the recursive estimate. When a maneuver has ended they are designed for the model that
+`identify` fits to what was flown since the last jump of authority: then they are those of `schedule design` afterwards. A log
+that is replayed without waiting waits for the second process: there nothing flies on.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import numpy as np
 
 from fieldsid.errors import DataError, FieldsidError, UsageError
 from fieldsid.face.arguments import fin_rate_of, own_effects, vehicle_of
+from fieldsid.fitting.identify import identify
 from fieldsid.logs.load import load_run
 from fieldsid.logs.run import Run
 from fieldsid.logs.segments import last_moved
@@ -29,41 +32,44 @@ from fieldsid.online.samples import Sample
 from fieldsid.records.keys import body_of
 from fieldsid.runtime.second_process import SecondProcess
 from fieldsid.schedule import FinLimits, load_schedule
-from fieldsid.schedule.search.of_one_model import Wanted, usual, wanted_of
+from fieldsid.schedule.search.of_one_model import Wanted, gains_of_one, usual, wanted_of
 
 STILL_S = 5.0
 """Time for which the fin has stayed near its trim when a maneuver has ended."""
 MOVED = 0.5
 """Standard errors by which a parameter moves before gains are designed again."""
-Flown = Callable[[float], "Run | Mapping[str, Any]"]
+Flown = Callable[[float, float], "Run | Mapping[str, Any]"]
+"""What was flown from one time to another, in s: a run, or columns of canonical names."""
 
 
 class Beside:
-    """Two processes: one designs gains, one diagnoses; `gains` and `diagnosed` are what they said last."""
+    """Two processes: one designs gains where any are wanted, one diagnoses; `gains` and `diagnosed` are what they said last."""
 
     def __init__(
-        self, axis: Axis, flown: Flown | None, wanted: Callable[[OnlineEstimate], Wanted] | None, *, waits: bool
+        self, axis: Axis, flown: Flown, wanted: Callable[[OnlineEstimate], Wanted] | None, *, diagnoses: bool, waits: bool
     ) -> None:
-        self._axis, self._flown, self._wanted, self._waits = axis, flown, wanted, waits
+        self._axis, self._flown, self._wanted, self._diagnoses, self._waits = axis, flown, wanted, diagnoses, waits
         self._designing, self._diagnosing = SecondProcess(), SecondProcess()
-        self._times, self._fins, self._judged = array("d"), array("d"), (nan, nan)
+        self._times, self._fins = array("d"), array("d")
+        self._fitted = self._diagnosed = (nan, nan)
         self._designed: OnlineEstimate | None = None
         self.gains: LiveGains | None = None
         self.diagnosed: LiveDiagnosis | None = None
 
     def hear(self, sample: Sample) -> None:
         """Take a sample's fin: it tells when a maneuver ends."""
-        if self._flown is not None and isfinite(sample.fin):
+        if isfinite(sample.fin):
             self._times.append(sample.time)
             self._fins.append(sample.fin)
 
     def look(self, now: OnlineEstimate, progress: Progress, *, ended: bool = False) -> None:
         """Take answers up and give what is due; `ended` waits for all of them."""
         self._take(wait=ended)  # what a process is at is of less than was flown by the end
-        if self._wanted is not None and not self._designing.is_busy and (ended or self._is_new(now)):
-            self._design(now, progress, self._wanted)
-        if self._flown is not None and not self._diagnosing.is_busy:
-            self._diagnose(now, self._flown, ended=ended)
+        if self._wanted is not None and not self._designing.is_busy:
+            self._design(now, progress, self._wanted(now), ended=ended)
+        if self._diagnoses and not self._diagnosing.is_busy and (end := self._end(now, self._diagnosed, ended=ended)):
+            self._diagnosed = end
+            self._diagnosing.give(diagnosed, self._flown(-inf, inf if ended else now.time), self._axis)
         self._take(wait=self._waits or ended)
 
     def close(self) -> None:
@@ -79,7 +85,11 @@ class Beside:
             is_refused = isinstance(diagnosed, FieldsidError)
             self.diagnosed = LiveDiagnosis(time=nan, **_refused(diagnosed)) if is_refused else diagnosed
 
-    def _design(self, now: OnlineEstimate, progress: Progress, wanted: Callable[[OnlineEstimate], Wanted]) -> None:
+    def _design(self, now: OnlineEstimate, progress: Progress, wanted: Wanted, *, ended: bool) -> None:
+        """Have gains designed where a maneuver has ended, or the estimate says something else than before."""
+        end = self._end(now, self._fitted, ended=ended)
+        if not (end or self._is_new(now)):
+            return
         try:
             refuse_unsettled(now, progress)
         except DataError as error:
@@ -87,8 +97,12 @@ class Beside:
             return
         if self.gains is not None and self.gains.verdict == "refused":
             self.gains = None  # what was said of an estimate that had not settled holds no more
-        self._designed = now
-        self._designing.give(designed, now, progress, wanted(now))
+        self._designed, since = now, -inf if now.jump is None else now.jump.time
+        if end:
+            self._fitted = end
+            self._designing.give(designed_of_fit, now, self._flown(since, inf if ended else now.time), wanted)
+        else:
+            self._designing.give(designed, now, progress, wanted)
 
     def _is_new(self, now: OnlineEstimate) -> bool:
         """Whether an estimate says something else than the one that gains were designed for."""
@@ -100,15 +114,12 @@ class Beside:
             for n, v in now.values.items()
         ) or bool(abs(now.speed_now - then.speed_now) > 0.05 * then.speed_now)
 
-    def _diagnose(self, now: OnlineEstimate, flown: Flown, *, ended: bool) -> None:
+    def _end(self, now: OnlineEstimate, last: tuple[float, float], *, ended: bool) -> tuple[float, float] | None:
+        """Return when the fin last moved and the time of now, where a maneuver has ended since the `last` of these."""
         moved = last_moved(np.array(self._times), np.array(self._fins))
-        judged, until = self._judged
         # in the end all of it is told of, as the command does
-        is_due = now.time != until if ended else moved != judged and now.time - moved >= STILL_S
-        if not isfinite(moved) or not is_due:
-            return
-        self._judged = moved, now.time
-        self._diagnosing.give(diagnosed, flown(inf if ended else now.time), self._axis)
+        is_due = now.time != last[1] if ended else moved != last[0] and now.time - moved >= STILL_S
+        return (moved, now.time) if isfinite(moved) and is_due else None
 
 
 def wanted_at(axis: Axis, schedule: Path | None, vehicle: Path | None, depth: bool) -> Callable[[OnlineEstimate], Wanted]:
@@ -140,22 +151,30 @@ def designed(now: OnlineEstimate, progress: Progress, wanted: Wanted) -> LiveGai
     return live_gains(now, gains_now(now, progress, wanted))
 
 
+def designed_of_fit(now: OnlineEstimate, flown: Run | Mapping[str, Any], wanted: Wanted) -> LiveGains:
+    """Return the gains of the model that `identify` fits to what was flown; raises what that and the design raise."""
+    (fit,) = identify([_read(flown)], now.axis)
+    return live_gains(now, gains_of_one(fit.model, now.speed_now, wanted), fit.model.method)
+
+
 def diagnosed(flown: Run | Mapping[str, Any], axis: Axis) -> LiveDiagnosis:
     """Return what `sysid diagnose` says of what was flown: a run, or columns of canonical names."""
     from fieldsid.cli.headlines.missing import first_line
     from fieldsid.diagnosis import diagnose
 
     own_effects()
-    run = flown if isinstance(flown, Run) else _read(flown)
+    run = _read(flown)
     found = body_of(diagnose([run], axis))
     kept = {key: found[key] for key in ("verdict", "effects", "left", "base", "final", "noise_floor", "next_maneuver")}
     return LiveDiagnosis(time=float(run.time[-1]), says=first_line(found), **kept)
 
 
-def _read(columns: Mapping[str, Any]) -> Run:
-    """Return the run of columns as it is read from a table."""
+def _read(flown: Run | Mapping[str, Any]) -> Run:
+    """Return what was flown as a run; columns as they are read from a table."""
+    if isinstance(flown, Run):
+        return flown
     with TemporaryDirectory() as folder:
         path = Path(folder) / "live.csv"
-        table = np.column_stack(list(columns.values()))
-        np.savetxt(path, table, fmt="%.12g", delimiter=",", header=",".join(columns), comments="")
+        table = np.column_stack(list(flown.values()))
+        np.savetxt(path, table, fmt="%.12g", delimiter=",", header=",".join(flown), comments="")
         return load_run(path)

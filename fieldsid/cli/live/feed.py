@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import shlex
 import sys
+from bisect import bisect_left
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from fieldsid.cli.options import AxisOption
+from fieldsid.logs.mapping.vocabulary import TIME
 
 if TYPE_CHECKING:
     from io import BufferedIOBase
@@ -56,14 +57,16 @@ class Feed:
         words = ["identify", str(self.log), "--axis", self.axis.value, "-o", "models/"] if usable else ["inspect", str(self.log)]
         return shlex.join(["sysid", *words])
 
-    def flown(self, until: float) -> Run | Mapping[str, Any]:
-        """Return what was flown up to a time in s: a run, or the columns of what was said."""
+    def flown(self, since: float, until: float) -> Run | Mapping[str, Any]:
+        """Return what was flown from one time to another, in s: a run, or the columns of what was said."""
         from fieldsid.cli.inputs import read_run
 
         if self.reader is not None:
-            return dict(self.reader.columns)
+            columns = self.reader.columns
+            first = bisect_left(columns[TIME], since)
+            return {name: column[first:] for name, column in columns.items()}
         run = self.run or read_run(Path(str(self.log)), mapping=self.mapping)
-        return run if until >= float(run.time[-1]) else run.between(-inf, until)
+        return run if since <= float(run.time[0]) and until >= float(run.time[-1]) else run.between(since, until)
 
     def samples(self, after: float) -> Iterator[Sample | None]:
         """Yield the samples after a time in s."""

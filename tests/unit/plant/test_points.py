@@ -51,6 +51,14 @@ def test_extra_columns_are_passed_over_and_errors_are_taken(tmp_path):
     assert points[1].std_errors == {"b2": 0.03}
 
 
+def test_models_are_the_same_source_in_whatever_order_they_are_given():
+    models = {"slow": yaw_model(1.0), "fast_a": yaw_model(2.0), "fast_b": yaw_model(2.0, b2=-1.2)}
+    there = source_of_models(list(models.values()), list(models))
+    back = source_of_models(list(models.values())[::-1], list(models)[::-1])
+    assert there.names == back.names == ("slow", "fast_a", "fast_b")
+    assert [m.values for m in there.models] == [m.values for m in back.models]
+
+
 def test_dash_reads_standard_input(monkeypatch):
     monkeypatch.setattr("sys.stdin", io.StringIO(TABLE))
     assert load_parameter_source([Path("-")]).speeds == pytest.approx([1.0, 1.6, 2.1])
@@ -277,8 +285,8 @@ def test_draws_have_the_models_covariance_and_the_first_is_the_model():
 def test_neighbouring_models_share_a_speed_between_them(tmp_path):
     paths = [save_model(yaw_model(u), tmp_path / f"m{i}.yaml") for i, u in enumerate((2.0, 1.0))]
     source = load_parameter_source(paths)
-    assert source.near(1.0) == [(1, 1.0)]
-    assert source.near(5.0) == [(0, 1.0)]
+    assert source.near(1.0) == [(0, 1.0)]
+    assert source.near(5.0) == [(1, 1.0)]
     shares = dict(source.near(np.sqrt(2.0)))
     assert shares == pytest.approx({0: 0.5, 1: 0.5})
     assert source.supports(1.5)
