@@ -57,9 +57,10 @@ GUSTY_ERROR_RATIO = 2.0
 """Error over the floor below which only dependence on the motion tells an effect from a disturbance: gusts come in bursts too."""
 MAX_VALIDATION_ERROR_RATIO = 2.0
 """Validation error over training error above which something besides a disturbance is missing: a disturbance is equal on both."""
-MIN_BASE_ERROR_SHARE = 0.01
+MIN_BASE_ERROR_SHARE = 0.02
 """Smallest noise that models are compared under, as a share of the base model's error. A filtered log shows almost no noise; then
-the smallest inconsistency of its sensors would outweigh everything the base model fails to follow."""
+the smallest inconsistency of its sensors would outweigh everything the base model fails to follow. In 112 cases of two banks the
+base model leaves at most 33 times the noise; in filtered logs of an aircraft and a ship model 87 to 1000 times."""
 MIN_COLOUR_RATIO = 0.5
 """Coloured over white sensor noise above which the reported floor includes the coloured part."""
 

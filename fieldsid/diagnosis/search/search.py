@@ -62,7 +62,7 @@ class Search:
 
     `given` is the model that has the known effects, where there is one: the base is fitted from its values too.
 
-    `floor` is the sensors' noise as far as it has been seen, `is_noiseless` whether the base's error is more than a hundred times
+    `floor` is the sensors' noise as far as it has been seen, `is_noiseless` whether the base's error is more than fifty times
     that in every measured channel.
     """
 
