@@ -27,8 +27,8 @@ from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.gram_least_squares import solve_normal_equations
 
-MIN_REPORTED_STD = 0.1
-"""Standard deviations of the prior from which on a moment is worth telling of."""
+MIN_REPORTED_STD = 1.0
+"""Standard deviations of the prior from which on a moment is told of: a smaller one is what is usual from run to run."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def with_own_moment(problem: Problem, x: FloatArray, std: float, floor: Noise) -
 
 
 def moment_note(record: Record, moment: float, std: float) -> Note | None:
-    """Return the note on a run that had a moment of its own, None where that is next to nothing."""
+    """Return the note on a run that had a moment of its own, None where it is no larger than is usual."""
     if not abs(moment) > MIN_REPORTED_STD * std:
         return None
     return Note(

@@ -46,7 +46,7 @@ def errors(shown):
 
 
 @pytest.mark.parametrize("axis", Axis)
-@pytest.mark.parametrize("moment", [6e-4, -4e-4])
+@pytest.mark.parametrize("moment", [6e-4, -7e-4])
 def test_a_moment_of_the_runs_own_is_found_and_said(axis, moment):
     record = logged(moment, axis=axis)
     shown = predict(a_model(axis=axis, trim_of_fin=axis is Axis.YAW), record)
@@ -57,6 +57,12 @@ def test_a_moment_of_the_runs_own_is_found_and_said(axis, moment):
     (note,) = [n for n in shown.notes if n.code == "own_moment"]
     assert f"{shown.moment:+.2g} rad/s^2" in note.message
     assert f"{STD:.2g} rad/s^2" in note.message
+
+
+def test_a_moment_that_is_usual_from_run_to_run_is_not_told_of():
+    shown = predict(a_model(), logged(2e-4))
+    assert 0.0 < abs(shown.moment) < STD
+    assert not [n for n in shown.notes if n.code == "own_moment"]
 
 
 def test_a_model_whose_runs_did_not_differ_leaves_the_trim_where_it_is():
