@@ -62,8 +62,3 @@ OutputFile = Annotated[Path | None, option("-o --output", "FILE", "File to write
 Force = Annotated[bool, flag("--force", "Replace files that exist.", WRITTEN)]
 JsonFlag = Annotated[bool, flag("--json", "Print one JSON object instead of text.", ANSWER)]
 Figures = Annotated[bool, flag("--figures/--no-figures", "Draw figures next to the files that are written.", WRITTEN)]
-
-
-def names_of(text: str | None) -> tuple[str, ...]:
-    """Return the names in a comma-separated list, without blanks."""
-    return tuple(n.strip() for n in (text or "").split(",") if n.strip())

@@ -48,9 +48,9 @@ def axis_excited(runs: Sequence[Run], written: str = '`axis="{axis}"`') -> Axis:
     return Axis(excited_axis(runs, written=written))
 
 
-def names_of(names: str | Iterable[str]) -> tuple[str, ...]:
-    """Return names given one by one, or as the command line takes them: `a,b` or `a+b`."""
-    parts = re.split(r"[,+\s]+", names) if isinstance(names, str) else names
+def names_of(names: str | Iterable[str] | None) -> tuple[str, ...]:
+    """Return names given one by one, or as the command line takes them, `a,b` or `a+b`; none where none are given."""
+    parts = re.split(r"[,+\s]+", names) if isinstance(names, str) else names or ()
     return tuple(n.strip() for n in parts if n.strip())
 
 

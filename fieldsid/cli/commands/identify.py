@@ -24,7 +24,6 @@ from fieldsid.cli.options import (
     ToS,
     VehicleFile,
     flag,
-    names_of,
     option,
 )
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_closed
@@ -77,7 +76,7 @@ def command(
     refuse_closed(output)
     skips, ready = Skips(), partial(get_ready, "fieldsid.fitting.identify")
     known = read_runs(runs, mapping=mapping, start=start, end=end, meanwhile=ready, refused=skips.skip)
-    from fieldsid.face.arguments import axis_excited, vehicle_of
+    from fieldsid.face.arguments import axis_excited, names_of, vehicle_of
     from fieldsid.fitting.identify import check_joint, identify
     from fieldsid.fitting.problem.estimator import Options
     from fieldsid.results.fits import Identified, fitted_model

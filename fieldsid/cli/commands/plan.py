@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from fieldsid.cli.console import emit, progress, say
-from fieldsid.cli.options import LIMITS, WRITTEN, Figures, Force, JsonFlag, OutputDir, VehicleFile, flag, names_of, option
+from fieldsid.cli.options import LIMITS, WRITTEN, Figures, Force, JsonFlag, OutputDir, VehicleFile, flag, option
 from fieldsid.cli.progress import compiling, refuse_closed, refuse_existing
 from fieldsid.cli.session import drawn_at
 from fieldsid.cli.voice import angles
@@ -97,6 +97,7 @@ def command(
     Example: sysid plan --axis yaw --speeds 1.0,1.4,1.8 --want a22=5%,b2=3% --area 200x60 -o plan
     """
     from fieldsid.cli.user_effects import check_effects
+    from fieldsid.face.arguments import names_of
     from fieldsid.planning.jit_warmup import SHARED_KERNELS, compile_planning
     from fieldsid.planning.request import EnvelopeLimits, PlanRequest, planned
     from fieldsid.results.plans import Planned
@@ -146,6 +147,7 @@ def command(
 def _check_write(write: str | None, output: Path | None) -> None:
     """Refuse formats before the search and not after it."""
     from fieldsid.errors import UsageError
+    from fieldsid.face.arguments import names_of
     from fieldsid.planning.output.command_files import check_formats
 
     check_formats(names_of(write))
