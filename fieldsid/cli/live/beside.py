@@ -65,10 +65,11 @@ class Beside:
     def look(self, now: OnlineEstimate, progress: Progress, *, ended: bool = False) -> None:
         """Take answers up and give what is due; `ended` waits for all of them."""
         self._take(wait=ended)  # what a process is at is of less than was flown by the end
+        moved = last_moved(np.array(self._times), np.array(self._fins))
         if self._wanted is not None and not self._designing.is_busy:
-            self._design(now, progress, self._wanted(now), ended=ended)
-        if self._diagnoses and not self._diagnosing.is_busy and (end := self._end(now, self._diagnosed, ended=ended)):
-            self._diagnosed = end
+            self._design(now, progress, self._wanted(now), moved, ended=ended)
+        if self._diagnoses and not self._diagnosing.is_busy and _has_ended(moved, now.time, self._diagnosed, ended=ended):
+            self._diagnosed = moved, now.time
             self._diagnosing.give(diagnosed, self._flown(-inf, inf if ended else now.time), self._axis)
         self._take(wait=self._waits or ended)
 
@@ -85,10 +86,10 @@ class Beside:
             is_refused = isinstance(diagnosed, FieldsidError)
             self.diagnosed = LiveDiagnosis(time=nan, **_refused(diagnosed)) if is_refused else diagnosed
 
-    def _design(self, now: OnlineEstimate, progress: Progress, wanted: Wanted, *, ended: bool) -> None:
+    def _design(self, now: OnlineEstimate, progress: Progress, wanted: Wanted, moved: float, *, ended: bool) -> None:
         """Have gains designed where a maneuver has ended, or the estimate says something else than before."""
-        end = self._end(now, self._fitted, ended=ended)
-        if not (end or self._is_new(now)):
+        of_fit = _has_ended(moved, now.time, self._fitted, ended=ended)
+        if not (of_fit or self._is_new(now)):
             return
         try:
             refuse_unsettled(now, progress)
@@ -98,8 +99,8 @@ class Beside:
         if self.gains is not None and self.gains.verdict == "refused":
             self.gains = None  # what was said of an estimate that had not settled holds no more
         self._designed, since = now, -inf if now.jump is None else now.jump.time
-        if end:
-            self._fitted = end
+        if of_fit:
+            self._fitted = moved, now.time
             self._designing.give(designed_of_fit, now, self._flown(since, inf if ended else now.time), wanted)
         else:
             self._designing.give(designed, now, progress, wanted)
@@ -114,12 +115,14 @@ class Beside:
             for n, v in now.values.items()
         ) or bool(abs(now.speed_now - then.speed_now) > 0.05 * then.speed_now)
 
-    def _end(self, now: OnlineEstimate, last: tuple[float, float], *, ended: bool) -> tuple[float, float] | None:
-        """Return when the fin last moved and the time of now, where a maneuver has ended since the `last` of these."""
-        moved = last_moved(np.array(self._times), np.array(self._fins))
-        # in the end all of it is told of, as the command does
-        is_due = now.time != last[1] if ended else moved != last[0] and now.time - moved >= STILL_S
-        return (moved, now.time) if isfinite(moved) and is_due else None
+
+def _has_ended(moved: float, now: float, last: tuple[float, float], *, ended: bool) -> bool:
+    """Whether a maneuver, in which the fin last moved at a time (s), has ended since the last one, of these times, was taken.
+
+    Where the source has ended all of it counts, as for the command.
+    """
+    is_due = now != last[1] if ended else moved != last[0] and now - moved >= STILL_S
+    return isfinite(moved) and is_due
 
 
 def wanted_at(axis: Axis, schedule: Path | None, vehicle: Path | None, depth: bool) -> Callable[[OnlineEstimate], Wanted]:
