@@ -111,7 +111,7 @@ def column_map(problem: Problem, run: int, slots: dict[str, int], width: int) ->
     if names.stiffness is not None:
         out[1, order.index(names.stiffness)] = 1.0
     out[2, order.index(group_name(names.authority, groups, groups.of_run[run]))] = unit.authority
-    out[3, order.index(names.trim)] = problem.scales(run)[0] ** 2 if groups.trim_of_fin else 1.0
+    out[3, order.index(names.trim)] = problem.scales[run][0] ** 2 if groups.trim_of_fin else 1.0
     return out
 
 

@@ -16,6 +16,7 @@ Source: Fossen 2011, sections 6.4.3 (cross-flow drag principle) and 7.1.
 from __future__ import annotations
 
 from math import cos, exp, log, sin, sqrt
+from operator import add
 from typing import NamedTuple
 
 from fieldsid.numerics.arrays import FloatArray
@@ -50,8 +51,8 @@ class Core(NamedTuple):
 
     def plus(self, other: Core) -> Core:
         """Return the sum of two sets of constants; the factors of FACTORS are taken from whichever sets them."""
-        pairs = zip(CONSTANTS, self, other, strict=True)
-        return Core(*((b if b != 1.0 else a) if name in FACTORS else a + b for name, a, b in pairs))
+        factors = {n: (b if (b := getattr(other, n)) != 1.0 else getattr(self, n)) for n in FACTORS}
+        return Core._make(map(add, self, other))._replace(**factors)
 
     def steady_cross_state(self, rate: float) -> float:
         """Return the cross state that a steady rate leads to at the run's own speed, zero where there is none.

@@ -136,7 +136,7 @@ def levenberg_marquardt(
     x[index] = np.clip(x[index], low, high)
     hill = _Objective(problem, noise, slots, dynamics_of(problem, x), prior, linear_white(problem, noise, slots))
     cost, normal, gradient = hill.linear(x)
-    done, refused, count = False, False, 0
+    done, fell, fell_before, count = False, True, True, 0
     # beside an edge of the fin the cost has a kink in an event's time: no step of all parameters leads along it
     events, hold = np.array([problem.layout.parameters[i].is_event for i in slots], dtype=bool), False
     every, dampings = np.full(len(slots), True), np.full(len(slots), damping)
@@ -157,10 +157,11 @@ def levenberg_marquardt(
             # no step was refused: where so little is left to gain it is there, and nobody need look
             x, cost, done = trial, cost - expected, True
             break
-        # a step is hardly ever refused where the last was not: its equations come with its cost
-        new, equations = hill.at(trial, whole=not refused and expected > tolerance * cost)
-        refused = not new < cost
-        if not refused:
+        # in a bent valley every second step is refused, elsewhere hardly any: the cost falls where it fell two steps before, and
+        # there the equations come with it
+        new, equations = hill.at(trial, whole=fell_before and expected > tolerance * cost)
+        fell, fell_before = new < cost, fell
+        if fell:
             done = cost - new <= tolerance * cost or expected <= tolerance * cost
             x, hold = trial, False
             dampings[stepped] = np.maximum(dampings[stepped] * (0.1 if new < cost - 0.5 * expected else 1.0), 1e-12)

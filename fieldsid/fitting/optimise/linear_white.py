@@ -70,7 +70,7 @@ class LinearWhite:
         """Return the derivatives (6, F) of a run's six numbers by the free parameters."""
         layout, names = self.problem.layout, NAMES[self.problem.layout.axis]
         out = np.zeros((len(LINEAR_PARAMETERS), len(self.free)))
-        share, ratio = self.problem.scales(run.index)
+        share, ratio = self.problem.scales[run.index]
         exponent = x[layout.names.index("damping_exponent")] if "damping_exponent" in layout.names else 1.0
         authority = self.problem.authority_of(run.index)
         by_name = {

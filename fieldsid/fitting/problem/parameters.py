@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Effect, with_one_cross_state
+from fieldsid.models.effect import Coefficient, Effect, with_one_cross_state
 from fieldsid.models.record import Record
 from fieldsid.models.speed_law import GROUP_WIDTH, TRIM_OF_FIN, SpeedLaw, with_speed
 from fieldsid.numerics.arrays import BoolArray, FloatArray
@@ -127,6 +127,8 @@ class ParameterLayout:
     """Upper bounds, (N,)."""
     run_nuisances: Mapping[int, tuple[int, ...]] = field(init=False, compare=False)
     """The positions of each run's nuisances."""
+    owners: Mapping[str, tuple[Effect, Coefficient]] = field(init=False, compare=False)
+    """The effect and the coefficient of each of the effects' parameters, by its name."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "every", tuple(s.name for s in self.parameters))
@@ -137,6 +139,7 @@ class ParameterLayout:
         for i, slot in enumerate(self.parameters[self.shared :], self.shared):
             own.setdefault(slot.run, []).append(i)
         object.__setattr__(self, "run_nuisances", MappingProxyType({run: tuple(places) for run, places in own.items()}))
+        object.__setattr__(self, "owners", MappingProxyType({c.name: (e, c) for e in self.effects for c in e.coefficients}))
 
     def nuisances_of(self, run: int) -> tuple[int, ...]:
         """Return the positions of a run's nuisances."""

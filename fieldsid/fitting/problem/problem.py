@@ -11,11 +11,12 @@ import numpy as np
 
 from fieldsid.dynamics.assemble import Base, KernelInputs, assemble, combined_core, integrate_record, measured, with_moments
 from fieldsid.fitting.problem.kernel_input_cache import KernelInputCache
-from fieldsid.fitting.problem.parameters import START_NAMES, ParameterLayout, group_name, layout_of
+from fieldsid.fitting.problem.parameters import START_NAMES, ParameterLayout, SpeedGroups, group_name, layout_of
 from fieldsid.fitting.problem.sensitivities import Sensitivities
 from fieldsid.models.axis import NAMES
 from fieldsid.models.effect import Effect, Motion, Values
 from fieldsid.models.fin_path import FinPath
+from fieldsid.models.hull import Core
 from fieldsid.models.record import Record, first_part
 from fieldsid.models.speed_law import over_reference
 from fieldsid.numerics.arrays import FloatArray
@@ -60,6 +61,16 @@ class Problem:
     layout: ParameterLayout
     evaluations: EvaluationCounter = field(default_factory=EvaluationCounter, compare=False, repr=False)
     cache: KernelInputCache = field(default_factory=KernelInputCache, init=False, compare=False, repr=False)
+    counted: tuple[Record, ...] = field(init=False, compare=False, repr=False)
+    """The records at the speeds that the runs count as, which what changes within them is over."""
+    scales: tuple[tuple[float, float], ...] = field(init=False, compare=False, repr=False)
+    """Of each run the speed over the reference speed, and over the one that its authority parameter belongs to."""
+
+    def __post_init__(self) -> None:
+        g = self.layout.groups
+        counted = tuple(r.at_speed(speed) for r, speed in zip(self.records, g.run_speeds, strict=True))
+        object.__setattr__(self, "counted", counted)
+        object.__setattr__(self, "scales", tuple(_scales(g, run) for run in range(len(self.records))))
 
     def first(self, samples: int) -> Problem:
         """Return the problem on the first samples of every run; itself where none is longer."""
@@ -77,7 +88,7 @@ class Problem:
 
     def _base(self, v: Values, run: int) -> Base:
         names, layout = NAMES[self.layout.axis], self.layout
-        share, ratio = self.scales(run)
+        share, ratio = self.scales[run]
         authority = v[self.authority_of(run)] * ratio**2
         return Base(
             v[names.damping] * share ** v.get("damping_exponent", layout.groups.exponent),
@@ -93,19 +104,7 @@ class Problem:
     def trim_factor(self, x: FloatArray, run: int) -> float:
         """Return a run's trim moment over the trim parameter."""
         v = dict(zip(self.layout.names, x[: self.layout.shared].tolist(), strict=True))
-        return self._trim_factor(v, v[self.authority_of(run)] * self.scales(run)[1] ** 2)
-
-    def _counted(self, run: int) -> Record:
-        """Return a run's record at the speed that the run counts as, which what changes within it is over."""
-        return self.records[run].at_speed(self.layout.groups.run_speeds[run])
-
-    def scales(self, run: int) -> tuple[float, float]:
-        """Return speed over reference speed, and speed over the one that the run's authority parameter belongs to."""
-        g = self.layout.groups
-        speed = g.flown(run)
-        if not isfinite(speed) or not isfinite(g.speeds[g.reference]):
-            return 1.0, 1.0
-        return speed / g.speeds[g.reference], g.over_group(run)
+        return self._trim_factor(v, v[self.authority_of(run)] * self.scales[run][1] ** 2)
 
     def values_of(self, x: FloatArray, run: int) -> dict[str, float]:
         """Return the effects' coefficients as a run sees them."""
@@ -117,29 +116,25 @@ class Problem:
 
     def state_of(self, x: FloatArray, run: int) -> tuple[float, float, float]:
         """Return a run's initial state: angle, rate, and the cross state that the rate before the run has led to."""
-        angle, rate, cross = self._start_of(self.values_of(x, run), run)
+        values = self.values_of(x, run)
+        angle, rate, cross = _start_of(values, combined_core(self.layout.effects, values, self.scales[run][0]))
         return float(angle), float(rate), float(cross)
-
-    def _start_of(self, values: Values, run: int) -> FloatArray:
-        before = values.get("rate_before")
-        core = None if before is None else combined_core(self.layout.effects, values, self.scales(run)[0])
-        return np.array(
-            [values["angle0"], values["rate0"], 0.0 if core is None or before is None else core.steady_cross_state(before)]
-        )
 
     def _arrays(self, record: Record, base: Base, values: Values, run: int) -> KernelInputs:
         """Return the kernel inputs of a run: those of the last call where nothing but the run's initial state has changed."""
         key = (base, *(v for name, v in values.items() if name not in START_NAMES))
-        make = partial(assemble, record, self.layout.effects, base, values, self.scales(run)[0])
+        make = partial(assemble, record, self.layout.effects, base, values, self.scales[run][0])
         return self.cache.get(run, key, make) if len(record) <= MAX_CACHED_SAMPLES else make()
 
     def simulate(self, x: FloatArray, run: int) -> tuple[Motion, Base]:
         """Return one run's free run as the sensors would show it."""
         self.evaluations.add()
-        record, effects = self._counted(run), self.layout.effects
+        record, effects = self.counted[run], self.layout.effects
         values = self.values_of(x, run)
-        base, start = self._base(values, run), self._start_of(values, run)
-        arrays = with_moments(record, self._arrays(record, base, values, run), effects, values, start)
+        base = self._base(values, run)
+        arrays = self._arrays(record, base, values, run)
+        start = _start_of(values, arrays.core)
+        arrays = with_moments(record, arrays, effects, values, start)
         out = integrate_record(record, arrays, start)
         return measured(Motion(out[:, 0], out[:, 1]), record, effects, values), base
 
@@ -172,13 +167,15 @@ class Problem:
         return slots, pushes.integrate_chunked(slots, length)
 
     def _sensitivities(self, x: FloatArray, run: int, free: Sequence[int] | None) -> tuple[tuple[int, ...], Sensitivities]:
-        record, layout = self._counted(run), self.layout
+        record, layout = self.counted[run], self.layout
         values = self.values_of(x, run)
-        base, start = self._base(values, run), self._start_of(values, run)
+        base = self._base(values, run)
         wanted = range(len(x)) if free is None else set(free)
         slots = tuple(i for i in (*self._shared_of(run), *layout.nuisances_of(run)) if i in wanted)
-        arrays = with_moments(record, self._arrays(record, base, values, run), layout.effects, values, start)
-        return slots, Sensitivities(record, layout, self.scales(run), self.authority_of(run), base, values, start, arrays)
+        arrays = self._arrays(record, base, values, run)
+        start = _start_of(values, arrays.core)
+        arrays = with_moments(record, arrays, layout.effects, values, start)
+        return slots, Sensitivities(record, layout, self.scales[run], self.authority_of(run), base, values, start, arrays)
 
     def authority_of(self, run: int) -> str:
         """Return the name of a run's authority parameter."""
@@ -198,6 +195,17 @@ class Problem:
     def start(self) -> FloatArray:
         """Return the start vector of the layout."""
         return np.array([s.start for s in self.layout.parameters])
+
+
+def _scales(groups: SpeedGroups, run: int) -> tuple[float, float]:
+    speed, reference = groups.flown(run), groups.speeds[groups.reference]
+    known = isfinite(speed) and isfinite(reference)
+    return (speed / reference, groups.over_group(run)) if known else (1.0, 1.0)
+
+
+def _start_of(values: Values, core: Core) -> FloatArray:
+    """Return the initial state (3,): angle, rate, and the cross state that the rate before the run has led to."""
+    return np.array([values["angle0"], values["rate0"], core.steady_cross_state(values.get("rate_before", 0.0))])
 
 
 def _difference(record: Record, motion: Motion, out: FloatArray) -> FloatArray:

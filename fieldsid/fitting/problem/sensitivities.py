@@ -114,39 +114,37 @@ class Sensitivities:
         count = len(slots)
         drives: list[DriveDerivatives] = []
         d_c, d_start = np.zeros((count, len(CONSTANTS))), np.zeros((count, 3))
-        hidden = "rate_before" in self.values
         for j, slot in enumerate(slots):
             name = self.layout.every[slot]
             if name in START_NAMES:
                 part = START_NAMES.index(name)
-                d_start[j, part] = 1.0 if part < CROSS else self._steady_cross_derivative(self.arrays.constants[CROSS_RATE])
+                d_start[j, part] = 1.0 if part < CROSS else self.arrays.constants[CROSS_RATE] * self._steady_cross_slope()
                 drives.append({})
                 continue
             push, constants = self._input_jacobian(name)
             drives.append(push)
             if constants is not None:
                 d_c[j] = constants
-            if hidden:
-                d_start[j, CROSS] = self._initial_state_derivative(d_c[j])
+        if "rate_before" in self.values:
+            d_start[:, CROSS] += self._initial_state_derivatives(d_c)
         return drives, d_c, d_start
 
     def _core(self, values: Values) -> Core:
         return combined_core(self.layout.effects, values, self.scales[0])
 
-    def _initial_state_derivative(self, d_c: FloatArray) -> float:
-        """Return the derivative of the initial cross state by the kernel's constants (17,), the rate before the run fixed."""
-        x, before, c = self.start[CROSS], self.values.get("rate_before", 0.0), self.arrays.constants
-        square = (
-            d_c[CROSS_QUADRATIC] + d_c[STRIP_FORCE] * c[STRIP_FLOW] ** 2 + 2.0 * c[STRIP_FORCE] * c[STRIP_FLOW] * d_c[STRIP_FLOW]
-        )
-        return self._steady_cross_derivative(d_c[CROSS_RATE] * before + d_c[CROSS_DAMPING] * x + square * x * abs(x))
+    def _initial_state_derivatives(self, d_c: FloatArray) -> FloatArray:
+        """Return the derivatives (P,) of the initial cross state by the constants (P, 17), the rate before the run fixed."""
+        x, before, c = self.start[CROSS], self.values["rate_before"], self.arrays.constants
+        by_flow = 2.0 * c[STRIP_FORCE] * c[STRIP_FLOW] * d_c[:, STRIP_FLOW]
+        square = d_c[:, CROSS_QUADRATIC] + d_c[:, STRIP_FORCE] * c[STRIP_FLOW] ** 2 + by_flow
+        push = d_c[:, CROSS_RATE] * before + d_c[:, CROSS_DAMPING] * x + square * x * abs(x)
+        return np.asarray(push * self._steady_cross_slope())
 
-    def _steady_cross_derivative(self, push: float) -> float:
+    def _steady_cross_slope(self) -> float:
         """Return the derivative of the initial cross state by a small input of its equation."""
         c = self.arrays.constants
         damping, square = c[CROSS_DAMPING], c[CROSS_QUADRATIC] + c[STRIP_FORCE] * c[STRIP_FLOW] ** 2
-        stiff = damping + 2.0 * square * abs(self.start[CROSS])
-        return -float(push) / float(stiff) if damping > 0.0 else 0.0
+        return -1.0 / float(damping + 2.0 * square * abs(self.start[CROSS])) if damping > 0.0 else 0.0
 
     def _integrate_with_sensitivities(
         self,
@@ -243,7 +241,7 @@ class Sensitivities:
 
     def _of_effect(self, name: str) -> tuple[DriveDerivatives, FloatArray | None]:
         """Return an effect's own slope where it has one, else the central difference of the kernel inputs."""
-        owner, coefficient = next((e, c) for e in self.layout.effects for c in e.coefficients if c.name == name)
+        owner, coefficient = self.layout.owners[name]
         if owner.measure is not None:
             return {}, None
         if owner.slope is not None:

@@ -81,7 +81,7 @@ def test_the_start_of_a_hidden_state_moves_with_its_coefficients_and_the_speed_l
     for name, value in {"cross_rate": -0.4, "damping_exponent": 0.8, "rate_before": 0.15}.items():
         x[[s.name == name for s in problem.layout.parameters]] = value
     for run in range(2):
-        assert problem.state_of(x, run)[2] == pytest.approx(0.15 * 0.4 / 0.8 * problem.scales(run)[0] ** 0.8)
+        assert problem.state_of(x, run)[2] == pytest.approx(0.15 * 0.4 / 0.8 * problem.scales[run][0] ** 0.8)
         compare_with_slopes(problem, x, run, 2e-5)
 
 
@@ -95,7 +95,7 @@ def test_the_start_of_a_hidden_state_moves_with_the_coefficients_of_its_forms(va
         x[[s.name == name for s in problem.layout.parameters]] = value
     for run in range(2):
         values = problem.values_of(x, run)
-        state, core = problem.state_of(x, run)[2], sway.core(values, problem.scales(run)[0])
+        state, core = problem.state_of(x, run)[2], sway.core(values, problem.scales[run][0])
         square = core.cross_quadratic + core.strip_force * core.strip_flow**2
         held = core.cross_damping * state + square * state * abs(state)
         assert held == pytest.approx(-core.cross_rate * values["rate_before"])
