@@ -36,7 +36,6 @@ STAGES = {
     "whole_hull": [(f"{SEARCH}.search", "whole_hull", lambda base, *_of: base)],
     "variants": [(f"{SEARCH}.search", "try_variants", lambda *_of: None), (f"{MOVES}.grow", "try_variants", lambda *_of: None)],
     "laws": [(f"{MOVES}.grow", "under_other_law", lambda *_of: None)],
-    "output_error": [(f"{MOVES}.grow", "prefer_output_error", lambda h, *_of: h)],
     "unseen_screen": [(f"{MOVES}.grow", "moves_of_all_runs", lambda *_of: [])],
     "refit": [(f"{SEARCH}.search", "refit_from_parts", lambda *_of: False)],
     "drop": [(f"{SEARCH}.search", "drop_each", lambda *_of: False)],

@@ -170,11 +170,6 @@ def exchange_penalty(ml_fit: LikelihoodFit) -> float:
     return total
 
 
-def likelihood_at(problem: Problem, x: FloatArray, ml_fit: LikelihoodFit) -> float:
-    """Return the log likelihood of other parameters of a model, under the likeliest noise of its kind for these parameters."""
-    return _noise_at(problem, x, ml_fit.noise, ml_fit.floor, ml_fit.noise_kind)[1]
-
-
 def measured_count(records: Sequence[Record]) -> int:
     """Return the number of measured values."""
     return int(sum(r.angle_ok.sum() + r.rate_ok.sum() for r in records))

@@ -17,20 +17,15 @@ from functools import cached_property
 import numpy as np
 
 from fieldsid.diagnosis.evidence.likelihood_fit import (
-    MIN_LIKELIHOOD_GAIN,
     FittedProblem,
     LikelihoodFit,
     exchange_penalty,
-    fit_maximum_likelihood,
-    fit_output_error,
     largest_own_moment,
-    likelihood_at,
     measured_count,
 )
 from fieldsid.diagnosis.evidence.predictive_density import ValidationRun, log_predictive_density, parameter_jacobian
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, EVIDENCE_TEMPERATURE
-from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
 from fieldsid.fitting.predict.own_moment import FreeRun, free_run
 from fieldsid.fitting.predict.predict import frozen_problem, refit_nuisances, with_command_timing
 from fieldsid.fitting.predict.speed_correction import correct_speed, speed_sensitivity
@@ -56,7 +51,8 @@ class ScoredModel:
     `own_moment` (rad/s^2) is the standard deviation of the moment that each run, of training and validation, has of its own, the
     mean of its disturbance in it.
     `settled_residuals` [(2, n)] are those of the validation runs at the parameters that all runs leave together.
-    `output_error_fit` is the fit by output error, where its free run predicts the validation runs better.
+    `output_error_fit` is a fit by output error that is reported in its place: of a base model whose free run is nearer to the
+    validation runs so, and of every model of a log without noise.
     """
 
     likelihood_fit: LikelihoodFit
@@ -269,35 +265,13 @@ def free_run_residual(problem: Problem, x: FloatArray, run: int = 0) -> FloatArr
     return np.stack([np.where(ok, v - (np.median(v[ok]) if ok.any() else 0.0), 0.0) for v, ok in zip(r.both, r.ok, strict=True)])
 
 
-def prefer_output_error(
-    h: ScoredModel, floor: Noise, parent: ScoredModel | None = None, known: Sequence[FittedProblem] = ()
-) -> ScoredModel:
-    """Return the model with its output-error fit, where that predicts the validation runs better.
+def with_free_run(h: ScoredModel, fitted: FittedProblem, floor: Noise) -> ScoredModel:
+    """Return a base model with an output-error fit to be reported, where its free run is nearer to the validation runs.
 
-    Generalised least squares is efficient for a model that is right, and may have the worse free run for one that is not. The
-    output-error fit must not raise the cost under the parent's noise: a gyro scale that improves the rate alone raises the cost
-    of the heading. `known` are output-error fits found before. Where the output-error fit has the higher likelihood too, the
-    first one had ended at a local minimum, and maximum likelihood is started again from there.
+    Generalised least squares is efficient for a model that is right, and may have the worse free run for one that is not.
     """
-    fitted, names = h.likelihood_fit.fitted, h.likelihood_fit.fitted.problem.layout.names
-    free = [fit_output_error(fitted.problem, fitted.x, fitted.weights), *(t for t in known if t.problem.layout.names == names)]
-    other = replace(h, output_error_fit=min(free, key=lambda t: t.weights.angle * t.weights.rate))
-    if other.selection_errors.over(floor) >= h.selection_errors.over(floor) or (
-        parent is not None and _contradicts(other, parent)
-    ):
-        return h
-    flown, ml_fit = other.reported_fit, h.likelihood_fit
-    if likelihood_at(flown.problem, flown.x, ml_fit) < ml_fit.log_likelihood + MIN_LIKELIHOOD_GAIN:
-        return other
-    again = fit_maximum_likelihood(flown.problem, flown.x, ml_fit.noise, ml_fit.floor, ml_fit.noise_kind)
-    h = score_model(again, h.validation)
-    other = replace(h, output_error_fit=flown)
+    other = replace(h, output_error_fit=fitted)
     return other if other.selection_errors.over(floor) < h.selection_errors.over(floor) else h
-
-
-def _contradicts(h: ScoredModel, parent: ScoredModel) -> bool:
-    costs = (cost_of(t.problem, t.x, parent.likelihood_fit.noise) for t in (h.reported_fit, parent.reported_fit))
-    return bool(next(costs) > next(costs))
 
 
 def validation_runs(flown: ValidationFits, validation: Sequence[Record]) -> tuple[FreeRun, ...]:

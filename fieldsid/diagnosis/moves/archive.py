@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, FittedProblem
+from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 
 Names = frozenset[str]
@@ -18,8 +18,7 @@ class Archive(MutableMapping[Names, ScoredModel]):
     """The model that stands for each set of effects, in the variants, under the law and at the optimum of the most evidence.
 
     `known` are the effects of the base. `expanded` are the sets that effects were added to, `thinned` and `varied` the log
-    evidence at which each was fitted without each of its effects and in other variants of some of them, `free_runs` the
-    output-error fits of each set.
+    evidence at which each was fitted without each of its effects and in other variants of some of them.
     """
 
     known: Names
@@ -27,7 +26,6 @@ class Archive(MutableMapping[Names, ScoredModel]):
     expanded: set[Names] = field(default_factory=set)
     thinned: dict[Names, float] = field(default_factory=dict)
     varied: dict[tuple[Names, Names], float] = field(default_factory=dict)
-    free_runs: dict[Names, list[FittedProblem]] = field(default_factory=dict)
 
     def __getitem__(self, names: Names) -> ScoredModel:
         """Return the model that stands for some effects; raises KeyError where none was tried."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from fieldsid.diagnosis.evidence.acceptance import excess_share
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit, fit_maximum_likelihood
-from fieldsid.diagnosis.evidence.scored_model import ScoredModel, bic_penalty, prefer_output_error, score_model
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel, bic_penalty, score_model
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.thresholds import RIVAL_LOG_ODDS
 from fieldsid.fitting.initial.effect_screen import carry_parameters
@@ -68,7 +68,3 @@ class Grounds:
         """Return the share of one model's squared error above the noise, on fitted and unseen runs, that another explains."""
         was, left = ((one.selection_errors, one.train) for one in (before, h))
         return excess_share(was, left, self.floor)
-
-    def flown(self, h: ScoredModel) -> ScoredModel:
-        """Return a model with its output-error fit where that predicts the validation runs better, its errors computed."""
-        return prefer_output_error(h, self.floor).evaluate_errors()

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -19,12 +17,11 @@ from fieldsid.diagnosis.evidence.acceptance import (
 )
 from fieldsid.diagnosis.evidence.likelihood_fit import (
     MIN_LIKELIHOOD_GAIN,
-    FittedProblem,
     LikelihoodFit,
     fit_output_error,
     prefer_smaller_equivalent,
 )
-from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel, score_model, with_free_run
 from fieldsid.diagnosis.moves.add_effect import (
     FOREMOST_EFFECTS,
     MAX_EFFECTS_AT_BASE,
@@ -51,7 +48,7 @@ from fieldsid.diagnosis.thresholds import (
 from fieldsid.models.effect import Effect
 
 LEADING_CHILDREN = 3
-"""Best children whose left-out moves are evaluated too, and which may take their output-error fit."""
+"""Best children whose left-out moves are evaluated too, and which are fitted again where their parent has a better optimum."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +82,7 @@ class Growth:
             self.evaluate(by_effects(moves_of_all_runs(self.parent, untried, self.grounds.parallel)), every=True)
         leading = {n for h in tried.children(self.key)[:LEADING_CHILDREN] for n in h.names if n not in self.key}
         self.evaluate(by_effects([move for move in later if move.screened.effect.name in leading]), every=True)
-        if self._prefer_output_error(refit=True):
-            self._prefer_output_error(refit=False)
+        self._refit_parent()
         if is_root and self._is_lost(tried.children(self.key)):
             rest = [e for e in self.effects if e.variants and self.key | {e.name} not in tried]
             self.evaluate(by_effects(screen_addition(Addition(self.parent, rest), self.grounds.parallel)))
@@ -113,76 +109,56 @@ class Growth:
         """
         rival = max((h.log_likelihood for h in self.tried.children(self.key)), default=-np.inf)
 
-        def evaluate_all(group: Sequence[SearchMove]) -> tuple[ScoredModel | None, list[FittedProblem], list[int]]:
-            found, free, later = self.tried.get(group[0].names), list[FittedProblem](), list[int]()
+        def evaluate_all(group: Sequence[SearchMove]) -> tuple[ScoredModel | None, list[int]]:
+            found, later = self.tried.get(group[0].names), list[int]()
             fits = [] if found is None else [found.likelihood_fit]
             for i, move in enumerate(group):
                 if not every and fits and is_redundant_start(move, max(fits, key=lambda f: f.log_likelihood)):
                     later.append(i)
                     continue
-                fits.append(self._fitted(move, free, rival))
+                fits.append(self._fitted(move, rival))
                 found = self.grounds.better(found, fits[-1])
-            return found and found.evaluate_errors(), free, later
+            return found and found.evaluate_errors(), later
 
         left = []
-        for group, (found, free, later) in zip(groups, self.grounds.parallel.map(evaluate_all, groups), strict=True):
+        for group, (found, later) in zip(groups, self.grounds.parallel.map(evaluate_all, groups), strict=True):
             if found is not None:
                 self.tried[group[0].names] = found
-            self.tried.free_runs.setdefault(group[0].names, []).extend(free)
             left += [group[i] for i in later]
         return left
 
-    def _fitted(self, move: SearchMove, free: list[FittedProblem], rival: float) -> LikelihoodFit:
+    def _fitted(self, move: SearchMove, rival: float) -> LikelihoodFit:
         """Fit the model of a move by maximum likelihood, and from the equivalent solution with the same response at one speed.
 
-        A move screened by output error is first fitted by output error; that fit is appended to `free`.
+        A move screened by output error is first fitted by output error.
         """
         screened, of_parent = move.screened, move.parent.likelihood_fit
         self.grounds.report("+".join((*move.parent.names, screened.effect.name)))
         start = screened.start
         if move.by_output_error:
-            free.append(fit_output_error(screened.problem, start, of_parent.fitted.weights))
-            start = free[-1].x
+            start = fit_output_error(screened.problem, start, of_parent.fitted.weights).x
         ml_fit = self.grounds.fit(screened.problem, start, of_parent.noise, rival=rival)
         return prefer_smaller_equivalent(ml_fit, screened.effect)
 
-    def _prefer_output_error(self, *, refit: bool) -> bool:
-        """Replace the leading children's fits by their output-error fits where these predict the unseen runs better.
-
-        Only children with more evidence than their parent are considered. With `refit` the parent is also fitted again from its
-        best child; True is returned where that improved the parent, and the children then keep the fits they had.
-        """
-        parent, leading = self.tried[self.key], self.tried.children(self.key)[:LEADING_CHILDREN]
-
-        def flown(child: ScoredModel) -> ScoredModel:
-            free = self.tried.free_runs.get(frozenset(child.names), ())
-            return prefer_output_error(child, self.grounds.floor, parent, free).evaluate_errors()
-
-        jobs: list[Callable[[], Any]] = [partial(self.grounds.fit_from, parent, child) for child in leading[:1] if refit]
-        again = len(jobs)
-        jobs += [partial(flown, child) for child in leading if child.log_evidence > parent.log_evidence]
-        done = self.grounds.parallel.map(lambda job: job(), jobs)
-        if again and self._takes_refit(done[0]):
-            return True
-        self.tried.update({frozenset(child.names): child for child in done[again:]})
-        return False
-
-    def _takes_refit(self, again: LikelihoodFit) -> bool:
-        """Keep the parent fitted again from its best child's parameters where that has more evidence; return whether it has.
+    def _refit_parent(self) -> None:
+        """Keep the parent fitted again from its best child's parameters where that has more evidence, and its children with it.
 
         The cost may have several local minima. The leading children are then fitted again from the new parameters.
         """
-        parent = self.tried[self.key]
-        if again.log_likelihood <= parent.likelihood_fit.log_likelihood + MIN_LIKELIHOOD_GAIN:
-            return False
-        better = prefer_output_error(score_model(again, self.grounds.validation), self.grounds.floor)
+        parent, leading = self.tried[self.key], self.tried.children(self.key)[:LEADING_CHILDREN]
+        if not leading:
+            return
+        again = self.grounds.fit_from(parent, leading[0])
+        if again.log_likelihood <= parent.log_likelihood + MIN_LIKELIHOOD_GAIN:
+            return
+        better = score_model(again, self.grounds.validation)
+        if parent.output_error_fit is not None:
+            better = with_free_run(better, parent.output_error_fit, self.grounds.floor)
         if better.log_evidence <= parent.log_evidence:
-            return False
+            return
         self.tried[self.key] = better
-        children = self.tried.children(self.key)[:LEADING_CHILDREN]
-        fits = self.grounds.parallel.map(lambda child: self.grounds.fit_from(child, better), children)
-        self.tried.update({frozenset(h.names): self.grounds.better(h, fit) for h, fit in zip(children, fits, strict=True)})
-        return True
+        fits = self.grounds.parallel.map(lambda child: self.grounds.fit_from(child, better), leading)
+        self.tried.update({frozenset(h.names): self.grounds.better(h, fit) for h, fit in zip(leading, fits, strict=True)})
 
     def _leading(self) -> list[Names]:
         """Return the children worth refining: the best few, and the one with most evidence on the training runs.

@@ -13,8 +13,7 @@ from fieldsid.diagnosis.moves.grounds import Grounds
 def refit_from_parts(models: Sequence[ScoredModel], tried: Archive, grounds: Grounds) -> bool:
     """Fit each model again that is less likely than a part of it, from that part's numbers; return whether one was better so.
 
-    The part was found since, beside other effects or in another order; the descent to the model has missed its optimum. Better
-    is what has more evidence once it is flown: the output-error fit that may stand for it is again less likely than the part.
+    The part was found since, beside other effects or in another order; the descent to the model has missed its optimum.
     """
     missed = list[tuple[ScoredModel, ScoredModel]]()
     for h in models:
@@ -25,8 +24,7 @@ def refit_from_parts(models: Sequence[ScoredModel], tried: Archive, grounds: Gro
     def again(pair: tuple[ScoredModel, ScoredModel]) -> ScoredModel:
         h, part = pair
         found = grounds.better(h, grounds.fit_from(h, part))
-        flown = h if found is h else grounds.flown(found)
-        return flown if flown.log_evidence > h.log_evidence + MIN_LIKELIHOOD_GAIN else h
+        return found.evaluate_errors() if found.log_evidence > h.log_evidence + MIN_LIKELIHOOD_GAIN else h
 
     found = grounds.parallel.map(again, missed)
     tried.update({frozenset(h.names): h for h in found})

@@ -80,12 +80,7 @@ def error_product(fitted: FittedProblem, axis: Axis) -> float:
 
 def under_other_law(names: Sequence[Names], tried: Archive, grounds: Grounds) -> None:
     """Fit models under another speed law, and keep that where it has more evidence."""
-
-    def other(key: Names) -> ScoredModel | None:
-        found = other_law(tried[key], grounds)
-        return None if found is None else grounds.flown(found)
-
-    others = grounds.parallel.map(other, names)
+    others = grounds.parallel.map(lambda key: other_law(tried[key], grounds), names)
     tried.update({key: found for key, found in zip(names, others, strict=True) if found is not None})
 
 

@@ -57,7 +57,7 @@ def try_variants(asked: Sequence[VariantRequest], tried: Archive, grounds: Groun
     while left:
         best = zip(left, _best_variants([asked[i] for i in left], grounds), strict=True)
         likely = [(i, variant) for i, variant in best if variant is not None and gains_evidence(asked[i].model, variant)]
-        formed = grounds.parallel.map(lambda of: grounds.flown(of[1]), likely)
+        formed = grounds.parallel.map(lambda of: of[1].evaluate_errors(), likely)
         taken = {i: variant for (i, _), variant in zip(likely, formed, strict=True) if keeps_error(asked[i].model, variant)}
         for i, variant in taken.items():
             asked[i] = replace(asked[i], model=variant)

@@ -33,5 +33,4 @@ def refitted_from(given: Model, h: ScoredModel, grounds: Grounds) -> ScoredModel
     for i, name in enumerate(problem.layout.names):
         x[i] = values.get(name, x[i])
     start = fit_output_error(problem, x, fitted.weights)
-    found = grounds.better(h, grounds.fit(problem, start.x, h.likelihood_fit.noise))
-    return h if found is h else grounds.flown(found)
+    return grounds.better(h, grounds.fit(problem, start.x, h.likelihood_fit.noise)).evaluate_errors()

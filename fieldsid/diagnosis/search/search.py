@@ -14,8 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -27,8 +25,9 @@ from fieldsid.diagnosis.evidence.acceptance import (
     leaves_error,
     worst_error,
 )
+from fieldsid.diagnosis.evidence.likelihood_fit import fit_output_error
 from fieldsid.diagnosis.evidence.noise_kind import fit_base, sensor_noise
-from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel, score_model, with_free_run
 from fieldsid.diagnosis.moves.archive import Archive, Names
 from fieldsid.diagnosis.moves.drop_effect import drop_each
 from fieldsid.diagnosis.moves.grounds import Grounds
@@ -159,17 +158,15 @@ class Search:
     def _next_to_expand(self) -> ScoredModel | None:
         """Return the next model to expand; None where all are expanded or at the noise, or the budget is used up.
 
-        The order is: the model with the highest log evidence; models of accepted effects whose error is clearly lower, since such
-        a model may have less evidence only because it lacks a small effect; and, while an error is left, the first model without
-        each of its effects, whose expansions exchange that effect for another.
+        The order is: the model with the highest log evidence; then models of accepted effects whose error is clearly lower, since
+        such a model may have less evidence only because it lacks a small effect.
         """
         if not self.may_go_on():
             return None
         best = self.tried.most_evident()
         least = MAX_ERROR_RATIO * best.selection_errors.mean
         front = [h for h in self.tried.ranked() if h.selection_errors.mean < least and self.admissible(h)]
-        less = [w for _, w in self.tried.without_each(best)] if leaves_error(best, self.floor) else []
-        return next((h for h in (best, *front, *less) if self._is_expandable(h)), None)
+        return next((h for h in (best, *front) if self._is_expandable(h)), None)
 
     def _is_expandable(self, h: ScoredModel) -> bool:
         """Whether a model has not been expanded, does not diverge, and leaves an error above the noise floor.
@@ -203,20 +200,15 @@ class Search:
             ml_fit = fit_base(fitted, self.floor, self.resolution_floor, self.parallel)
             self.noise_kind = ml_fit.noise_kind
             h = score_model(ml_fit, self.validation).evaluate_errors()
-            # both branches below need these errors: computed here, they are not computed in each of two processes
-            _ = h.unseen_errors
-            ways: tuple[Callable[[], Any], ...] = (partial(prefer_output_error, h, self.floor), partial(self._under_other_law, h))
-            own, other = self.parallel.map(lambda way: way(), ways)
-            self.tried[self.root] = own if other is None or not keeps_error(own, other) else other
+            own, other = with_free_run(h, fitted, self.floor), other_speed_law(h, self.grounds)
+            if other is not None:
+                at = other.likelihood_fit.fitted
+                other = with_free_run(other, fit_output_error(at.problem, at.x, at.weights), self.floor)
+            self.tried[self.root] = own if other is None or not keeps_error(own, other) else other.evaluate_errors()
             try_variants([VariantRequest(self.tried[self.root])], self.tried, self.grounds)
             if self.given is not None:
                 self.tried[self.root] = refitted_from(self.given, self.tried[self.root], self.grounds)
         return self.tried[self.root]
-
-    def _under_other_law(self, h: ScoredModel) -> ScoredModel | None:
-        """Return a model under the other speed law where that has more evidence, None elsewhere."""
-        other = other_speed_law(h, self.grounds)
-        return None if other is None else self.grounds.flown(other)
 
     # ----- the grounds that models are compared on
 

@@ -3,7 +3,7 @@
 Every real hull has a cross state (sway or heave), a servo lag, drag that grows with the square of the rate, and loses speed in a
 turn. Steps from the bare model go astray among the four, because each effect alone fits a part of the others. So all four are
 added one after another, whatever each gains alone, each from its few most promising scan points at the fit before it. The whole
-hull is then tried with other variants, and the effects that the data do not show are dropped again.
+hull is then fitted from its free run too and tried with other variants, and what the data do not show of it is dropped again.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
+from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit, fit_output_error
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.moves.add_effect import likelihood_linearisation
 from fieldsid.diagnosis.moves.archive import Archive
@@ -35,8 +35,15 @@ def whole_hull(base: ScoredModel, effects: Sequence[Effect], tried: Archive, gro
         if fits:
             key = frozenset((*h.names, effect.name))
             h = tried[key] = grounds.better(tried.get(key), max(fits, key=lambda fit: fit.log_likelihood))
+    h = tried[frozenset(h.names)] = grounds.better(h, _fit_from_the_free_run(h, grounds))
     try_variants([VariantRequest(h)], tried, grounds)
     return tried[frozenset(h.names)]
+
+
+def _fit_from_the_free_run(h: ScoredModel, grounds: Grounds) -> LikelihoodFit:
+    """Return the fit of a model from its output-error fit, which no disturbance can lead to an optimum where it does the work."""
+    fitted = h.likelihood_fit.fitted
+    return grounds.fit(fitted.problem, fit_output_error(fitted.problem, fitted.x, fitted.weights).x, h.likelihood_fit.noise)
 
 
 def _fits_with(h: ScoredModel, effect: Effect, grounds: Grounds) -> list[LikelihoodFit]:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
-from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, likelihood_at
+from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN
 from fieldsid.diagnosis.evidence.scored_model import score_model
 from fieldsid.diagnosis.moves.add_effect import Addition, mechanisms, screen_addition
 from fieldsid.diagnosis.moves.archive import Archive
@@ -25,6 +25,7 @@ from fieldsid.diagnosis.search.whole_hull import HULLS_OWN, whole_hull
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, EVIDENCE_TEMPERATURE
 from fieldsid.effects import all_effects
 from fieldsid.fitting.initial.effect_screen import carry_parameters
+from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.models.record import record_of
@@ -147,7 +148,8 @@ def test_a_model_that_is_less_likely_than_a_part_of_it_is_fitted_again_from_ther
     # an end at which nothing lags, as if its optimum had been missed
     far = carry_parameters(problem.layout, bias.likelihood_fit.fitted.vector, otherwise={"lag": 0.0})
     missed = replace(lag.likelihood_fit, fitted=replace(lag.likelihood_fit.fitted, problem=problem, x=far))
-    missed = replace(missed, log_likelihood=likelihood_at(problem, far, lag.likelihood_fit))
+    at_the_bias = bias.likelihood_fit
+    missed = replace(missed, noise=at_the_bias.noise, log_likelihood=at_the_bias.log_likelihood)
     made.tried[both] = score_model(missed, made.validation)
     assert made.tried[both].log_likelihood < lag.log_likelihood - 10.0
     assert {part.names for part in made.tried.parts(made.tried[both])} == {("servo_lag",), ("gyro_bias",)}
@@ -215,7 +217,7 @@ def test_a_hull_that_its_sway_alone_holds_straight_is_left_without_it_from_the_b
     x[[problem.layout.names.index(name) for name in held]] = list(held.values())
     at = replace(base.likelihood_fit, fitted=replace(base.likelihood_fit.fitted, problem=problem, x=x))
     without = problem.with_effects([lag])
-    assert not np.isfinite(likelihood_at(without, carry_parameters(without.layout, at.fitted.vector), at))
+    assert not np.isfinite(cost_of(without, carry_parameters(without.layout, at.fitted.vector), at.noise))
     assert drop_each(replace(base, likelihood_fit=at), made.tried, made.grounds)
     left = made.tried[LAG]
     assert left.log_likelihood > base.log_likelihood + 100.0
