@@ -107,19 +107,31 @@ def test_the_longer_allowance_goes_by_the_error_that_is_shown_and_that_the_verdi
     assert (made.may_go_on(), made.leaves_unexplained()) == (goes_on, says)
 
 
+def with_effects(monkeypatch, *names):
+    """Leave a diagnosis some of the catalogue's effects."""
+    module = import_module("fieldsid.diagnosis.diagnose")
+    monkeypatch.setattr(module, "applicable_effects", lambda _all, _records: (tuple(EFFECTS[n] for n in names), {}))
+
+
 @pytest.mark.parametrize("thorough", [False, True])
 def test_a_diagnosis_says_that_not_all_was_tried(monkeypatch, thorough):
     allow_nothing(monkeypatch)
-    without_lag = [e for name, e in EFFECTS.items() if name in ("quadratic_damping", "stall")]
-    monkeypatch.setattr(
-        import_module("fieldsid.diagnosis.diagnose"), "applicable_effects", lambda _all, _records: (tuple(without_lag), {})
-    )
+    with_effects(monkeypatch, "quadratic_damping", "stall")
     found = diagnose(RUNS, Axis.YAW, [UNSEEN], thorough=thorough)
     assert [n.code for n in found.notes].count("search_ended") == (not thorough)
 
 
+def test_a_cause_that_the_catalogue_lacks_is_not_given_a_name(monkeypatch):
+    with_effects(monkeypatch, "quadratic_damping", "stall", "gyro_scale")
+    found = diagnose(RUNS, Axis.YAW, [UNSEEN])
+    assert (found.verdict, found.effects) == ("unexplained", ())
+    assert "no effect of the catalogue" in found.says
+
+
 @pytest.mark.forks
 def test_a_copy_changes_neither_the_count_nor_the_answer(monkeypatch):
+    """With the whole catalogue: tests/recovery/test_diagnosis.py."""
+    with_effects(monkeypatch, "servo_lag", "delay", "quadratic_damping")
     answers, counts = [], []
     for alone in (False, True):
         if alone:

@@ -60,7 +60,7 @@ def frames(found):
 
 
 @pytest.mark.parametrize("beside", EVIDENCE)
-@pytest.mark.parametrize("place", ["none", "east first", "north first"])
+@pytest.mark.parametrize("place", ["none", "east first", pytest.param("north first", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("heading", ["of_north", "of_east"])
 def test_each_kind_of_evidence_tells_each_pair_of_frames(tmp_path, beside, place, heading):
     columns = columns_of()
