@@ -130,7 +130,7 @@ def test_an_effect_of_another_shape_is_followed_down_to_the_floor(seed: int, ind
             ],
         ),
         pytest.param(132, 84, "ar1", id="many ends", marks=pytest.mark.slow),
-        pytest.param(136, 100, None, id="play behind a slow fin"),
+        pytest.param(136, 100, None, id="play behind a slow fin", marks=pytest.mark.slow),
         pytest.param(138, 102, None, id="another trim for one than for both", marks=pytest.mark.slow),
     ],
 )
