@@ -78,6 +78,11 @@ def a_search(*, thorough: bool) -> Search:
     return made
 
 
+@pytest.fixture(scope="module")
+def searched() -> Search:
+    return a_search(thorough=False)
+
+
 def test_a_search_without_allowance_ends_with_what_the_base_leads_to(monkeypatch):
     allow_nothing(monkeypatch)
     short, thorough = a_search(thorough=False), a_search(thorough=True)
@@ -97,14 +102,13 @@ def test_a_search_without_allowance_ends_with_what_the_base_leads_to(monkeypatch
     ],
 )
 def test_the_longer_allowance_goes_by_the_error_that_is_shown_and_that_the_verdict_counts(
-    monkeypatch, visible, left, share, goes_on, says
+    monkeypatch, searched, visible, left, share, goes_on, says
 ):
-    made = a_search(thorough=False)
-    made.budget.most = 0.0
+    monkeypatch.setattr(searched, "budget", replace(searched.budget, most=0.0, is_exhausted=False))
     monkeypatch.setattr(Search, "leaves_visible_error", lambda _self: visible)
     monkeypatch.setattr(search, "compared_error", lambda *_of: left)
     monkeypatch.setattr(search, "compared_share", lambda *_of: share)
-    assert (made.may_go_on(), made.leaves_unexplained()) == (goes_on, says)
+    assert (searched.may_go_on(), searched.leaves_unexplained()) == (goes_on, says)
 
 
 def with_effects(monkeypatch, *names):
