@@ -39,8 +39,9 @@ def _stamp_of_kernels() -> str:
 # Nothing imported above loads numba, which reads this once.
 os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".pytest_cache" / "numba" / _stamp_of_kernels()))
 
-# The same examples on every machine, and no verdict that depends on how busy it is.
-settings.register_profile("steady", derandomize=True, deadline=None)
+# The same examples on every machine, and no verdict that depends on how busy it is; more of them: --hypothesis-profile=many
+settings.register_profile("steady", derandomize=True, deadline=None, max_examples=30)
+settings.register_profile("many", deadline=None, max_examples=1000)
 settings.load_profile("steady")
 
 MOST_WORKERS = 4

@@ -6,6 +6,8 @@ Of both a rudder turns a vehicle of first order in yaw, r' = -a r + b delta: `tr
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from binary_logs import write_alog, write_dbd, write_mat
 
@@ -108,7 +110,12 @@ def write_text_dataflash(path, time, signals):
 
 
 def flight(step=STEP, length_s=LENGTH_S, seed=3):
-    """Time, and rudder, yaw, yaw rate, x, y and speed on it (n,), SI and NED."""
+    """Time, and rudder, yaw, yaw rate, x, y and speed on it (n,), SI and NED, of one's own."""
+    return {name: values.copy() for name, values in _flown(step, length_s, seed).items()}
+
+
+@cache
+def _flown(step, length_s, seed):
     fine, rng = 0.01, np.random.default_rng(seed)
     count = round(length_s / fine)
     holds = np.repeat(rng.choice([-0.25, -0.12, 0.0, 0.12, 0.25], count // 300 + 1), 300)[:count]

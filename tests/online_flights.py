@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from scipy.linalg import expm
 
@@ -9,6 +11,7 @@ TRUTH = {"yaw": {"a22": 1.2, "b2": -0.8, "C0": 0.02}, "pitch": {"c22": 1.1, "c23
 STEP_S = 0.05
 
 
+@cache
 def flown(axis="yaw", count=1200, seed=1, colour=0.0, noise=(0.004, 0.006), factor=1.0, damped=1.0, faster=1.0):
     """Time, fin, angle and rate (n,) under a fin that jumps at random; noise of AR(1) colour on both sensors.
 

@@ -69,7 +69,7 @@ def test_an_option_that_cannot_be_meant_is_told_before_a_bad_log(run_cli, tmp_pa
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs a pipe with a name")
-@pytest.mark.parametrize("name", ["compare", "extend", "history"])
+@pytest.mark.parametrize("name", ["extend", *(pytest.param(n, marks=pytest.mark.slow) for n in ("compare", "history"))])
 def test_a_log_that_never_comes_is_not_waited_for(models, tmp_path, name):
     os.mkfifo(tmp_path / "slow.csv")
     rest = {"compare": ("slow.csv",), "extend": ("slow.csv", "--add", "delay"), "history": ()}[name]

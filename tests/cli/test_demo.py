@@ -51,8 +51,6 @@ def test_briefly_each_command_is_a_line_and_verbosely_all_that_it_says(run_cli, 
     verbose = run_cli("demo", "-o", tmp_path / "b", "--verbose")
     assert f"\n3. From log to run\n$ sysid import {tmp_path}/b/trial/*.csv" in verbose.out
     assert "=> Each log is now a run" in verbose.out
-    body = run_cli("demo", "-o", tmp_path / "c", "--json").json
-    assert body["steps"][-1]["means"] in " ".join(verbose.out.split())
 
 
 def results_of(tour, command):

@@ -92,7 +92,14 @@ def test_a_run_cannot_be_learned_from_and_judge(run_cli, logs):
     assert "is given twice" in answer.err
 
 
-@pytest.mark.parametrize("share", [0.0, 1e-4, 0.02], ids=["constant", "the servo's own step", "a third of a degree"])
+@pytest.mark.parametrize(
+    "share",
+    [
+        pytest.param(0.0, id="constant", marks=pytest.mark.slow),
+        pytest.param(1e-4, id="the servo's own step", marks=pytest.mark.slow),
+        pytest.param(0.02, id="a third of a degree"),
+    ],
+)
 @pytest.mark.parametrize("place", ["learned from", "to judge by"])
 def test_a_run_whose_fin_hardly_moves_is_refused_at_once_and_named(run_cli, logs, tmp_path, share, place):
     run = hidden_lag.runs()[0][0]

@@ -27,7 +27,13 @@ def test_without_a_topic_it_shows_the_contents(run_cli):
     assert [topic for topic in top if topic not in answer.out] == []
 
 
-@pytest.mark.parametrize("topic", sorted(all_pages()))
+def of_a_kind(topic):
+    """Whether a page is another of a folder, of which the normal suite shows the first."""
+    folder = topic.partition("/")[0]
+    return "/" in topic and topic != min(t for t in all_pages() if t.startswith(f"{folder}/"))
+
+
+@pytest.mark.parametrize("topic", [pytest.param(t, marks=pytest.mark.slow if of_a_kind(t) else ()) for t in sorted(all_pages())])
 def test_every_page_is_shown(run_cli, topic):
     answer = run_cli("guide", topic)
     assert (answer.code, answer.err) == (0, "")

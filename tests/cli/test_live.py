@@ -6,6 +6,7 @@ import io
 import json
 
 import numpy as np
+import plan_legs
 import pytest
 from cli import trial
 from rich.console import Console
@@ -14,6 +15,7 @@ from fieldsid.cli.live.screen import screen
 from fieldsid.fitting.identify import identify
 from fieldsid.logs import load_run
 from fieldsid.models.axis import Axis
+from fieldsid.planning.output.plan_file import save_plan
 from fieldsid.schedule.search.of_one_model import gains_of_one, usual
 
 
@@ -104,11 +106,10 @@ def test_what_cannot_be_read_is_counted_where_nothing_follows_it(run_cli, monkey
 
 
 def test_the_goal_is_what_a_plan_promised(run_cli, tmp_path):
-    plan = run_cli("plan", "--axis", "yaw", "--speeds", "1.4", "--window", "22", "--no-figures", "-o", tmp_path, "--json").json
-    file = next(tmp_path.glob("*.yaml"))
+    file, leg = tmp_path / "plan.yaml", plan_legs.leg()
+    save_plan(plan_legs.plan(leg), file)
     last = looks(run_cli("live", trial.flown(tmp_path), "--axis", "yaw", "--speed", "0", "--plan", file, "--json"))[-1]
-    promised = plan["legs"][0]["expected"]["a22"]["std_error_high"]
-    assert last["parameters"]["a22"]["goal_std_error"] == pytest.approx(promised)
+    assert last["parameters"]["a22"]["goal_std_error"] == pytest.approx(leg.expected["a22"].std_error_high)
     assert file.name in last["goals_from"]
     wrong = run_cli("live", trial.flown(tmp_path, name="b"), "--axis", "pitch", "--plan", file)
     assert wrong.code == 2
@@ -161,7 +162,7 @@ def test_a_narrow_terminal_shows_every_name_and_goal(width, has_band):
 
 def test_gains_and_a_diagnosis_are_said_beside_the_estimate(run_cli, tmp_path):
     run = trial.flown(tmp_path, spec="square_pulses")
-    said = ("live", run, "--axis", "yaw", "--speed", "0", "--json", "--every", "5", "--gains", "--diagnose")
+    said = ("live", run, "--axis", "yaw", "--speed", "0", "--json", "--every", "15", "--gains", "--diagnose")
     found = looks(run_cli(*said, "--want", "a22=30%,b2=30%"))
     assert found[0]["gains"]["verdict"] == "refused"
     last = found[-1]

@@ -119,7 +119,9 @@ def test_a_result_says_its_verdict_then_what_it_rests_on_then_what_comes_next(sa
     assert lines[3] == ""
 
 
-@pytest.mark.parametrize("line", QUIET_LINES)
+@pytest.mark.parametrize(
+    "line", [pytest.param(q, marks=pytest.mark.slow) if q.startswith("diagnose") else q for q in QUIET_LINES]
+)
 def test_a_quiet_command_says_the_first_lines_of_its_result_and_nothing_else(said, line):
     code, out, err = run(f"{line} --quiet")
     assert (code, err) == (0, "")

@@ -19,13 +19,6 @@ from fieldsid.templates import template_path
 QUICK = ("plan", "--speeds", "1.4", "--window", "22")
 
 
-@pytest.fixture(scope="module")
-def written(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("plan")
-    assert main([*QUICK, "--area", "200x60", "--want", "a22=10%", "-o", str(folder / "p")]) == 0
-    return folder / "p"
-
-
 def said(*more):
     """What a plan that is made says on standard output."""
     out = StringIO()
@@ -35,13 +28,26 @@ def said(*more):
 
 
 @pytest.fixture(scope="module")
+def limited(tmp_path_factory):
+    """A plan inside many limits: its folder, and what is said of it in one line."""
+    folder = tmp_path_factory.mktemp("plan") / "p"
+    limits = ("--area", "200x60", "--max-roll", "20deg", "--depth-band", "2:6")
+    return folder, " ".join(said(*limits, "--want", "a22=10%", "-o", str(folder)).split())
+
+
+@pytest.fixture(scope="module")
+def written(limited):
+    return limited[0]
+
+
+@pytest.fixture(scope="module")
 def printed():
     return said()
 
 
 @pytest.fixture(scope="module")
 def as_json():
-    return json.loads(said("--json", "--seed", "5"))
+    return json.loads(said("--json"))
 
 
 def test_a_plan_is_printed_with_errors_minutes_metres_and_risk(printed):
@@ -51,8 +57,12 @@ def test_a_plan_is_printed_with_errors_minutes_metres_and_risk(printed):
     assert "-o " in printed
 
 
+def rows_of(printed):
+    return {line.split()[1]: line for line in printed.splitlines() if line.startswith("1.40")}
+
+
 def test_the_error_of_a_trim_that_may_be_zero_is_no_share_of_it(printed, written):
-    rows = {line.split()[1]: line for line in printed.splitlines() if line.startswith("1.40")}
+    rows = rows_of(printed)
     assert rows["a22"].count(" %") == rows["b2"].count(" %") == 2
     assert "%" not in rows["C0"]
     assert rows["C0"].count("+/-") == 3
@@ -140,12 +150,16 @@ def test_what_a_maneuver_does_not_show_is_no_number(run_cli):
     assert "heading NOT LIMITED" in out
 
 
-def test_every_limit_is_printed_and_what_has_none_is_named(run_cli):
-    out = " ".join(run_cli(*QUICK, "--max-roll", "20deg", "--depth-band", "2:6", "--area", "200x60").out.split())
+def test_every_limit_is_printed_and_what_has_none_is_named(limited):
+    _, out = limited
     for words in ("fin 14.9 deg (0.26 rad)", "fin rate NOT LIMITED", "heading 60 deg (1.05 rad)", "track NOT LIMITED",
                   "pitch NOT LIMITED", "roll 20 deg (0.349 rad)", "depth 2 to 6 m", "area 200 m along, 30 m to either side",
                   "only to be watched in flight: depth"):  # fmt: skip
         assert words in out, words
+
+
+@pytest.mark.slow
+def test_the_limits_of_circles_are_their_own(run_cli):
     circles = " ".join(run_cli(*QUICK, "--radius").out.split())
     assert "turning_circle at 1.4 m/s: heading 1440 deg (25.1 rad)" in circles
 
@@ -173,7 +187,7 @@ def test_every_limit_is_printed_and_what_has_none_is_named(run_cli):
         (("--max-heading", "400deg"), "at most `--max-heading 360deg`, or write `--max-heading none` to let circles in"),
         (("--radius", "--max-heading", "90deg"), "--max-heading"),
         (("--radius", "--open-loop"), "--open-loop"),
-        (("--radius", "--max-track", "5"), "--max-track"),
+        pytest.param(("--radius", "--max-track", "5"), "--max-track", marks=pytest.mark.slow),
         (("--model", "a.yaml", "--prior", "torpedo"), "give one"),
         (("--separate", "delay,servo_lag", "--want", "a22=5%"), "--want"),
         (("--separate", "delay,servo_lag", "--minutes", "0.5"), "--minutes"),
@@ -210,15 +224,14 @@ def test_the_vehicles_own_limits_and_signs_are_kept(run_cli, tmp_path):
     assert run_cli("plan", "--speeds", "3", "--vehicle", vehicle).code == 2
 
 
-def test_a_model_of_the_other_axis_is_refused_in_every_mode_and_its_own_axis_is_taken(run_cli, tmp_path):
-    pitch = template_path("plan/priors/torpedo_pitch.yaml")
+PITCH = template_path("plan/priors/torpedo_pitch.yaml")
+
+
+def test_a_model_of_the_other_axis_is_refused_in_every_mode(run_cli):
     for more in ((), ("--separate", "delay,servo_lag")):
-        answer = run_cli(*QUICK, "--model", pitch, "--axis", "yaw", *more)
+        answer = run_cli(*QUICK, "--model", PITCH, "--axis", "yaw", *more)
         assert answer.code == 2
         assert "pitch" in answer.err
-    body = run_cli(*QUICK, "--model", pitch, "--json").json
-    assert body["axis"] == "pitch"
-    assert body["envelope"]["pitch"] == pytest.approx(np.radians(30.0))
 
 
 def test_an_unstable_prior_is_refused(run_cli, tmp_path):
@@ -229,11 +242,20 @@ def test_an_unstable_prior_is_refused(run_cli, tmp_path):
     assert "unstable" in answer.err
 
 
-def test_the_same_seed_gives_the_same_plan(as_json):
-    assert json.loads(said("--json", "--seed", "5")) == as_json
+def test_a_plan_is_the_same_as_text_and_as_json(printed, as_json):
+    rows = rows_of(printed)
+    for name, e in as_json["legs"][0]["expected"].items():
+        assert error_in_words(e["value"], e["std_error"], e["relative"]) in rows[name]
 
 
-def test_without_rules_every_leg_can_be_replayed_from_its_table(run_cli):
-    body = run_cli("plan", "--axis", "pitch", "--speeds", "1.6", "--window", "22", "--open-loop", "--json").json
+@pytest.mark.slow
+def test_the_same_seed_gives_the_same_plan_to_the_last_digit():
+    assert said("--json", "--seed", "5") == said("--json", "--seed", "5")
+
+
+def test_on_the_axis_of_its_model_and_without_rules_every_leg_can_be_replayed_from_its_table(run_cli):
+    body = run_cli(*QUICK, "--model", PITCH, "--open-loop", "--json").json
+    assert body["axis"] == "pitch"
+    assert body["envelope"]["pitch"] == pytest.approx(np.radians(30.0))
     assert body["legs"][0]["maneuver"] not in {"zigzag", "turning_circle"}
     assert "expected_fin_rad" not in body["legs"][0]

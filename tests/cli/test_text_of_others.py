@@ -68,7 +68,12 @@ def test_the_name_of_a_file_is_shown_whatever_is_said_of_it(run_cli, tmp_path, m
     monkeypatch.chdir(tmp_path)
     log = save_run(load_run(trial.flown(tmp_path)), tmp_path / f"{name}.csv")
     shown = name.encode("unicode_escape").decode()
-    for line in (["inspect", log], ["identify", log, "--axis", "yaw", "-o", "m"], ["import", f"gone{name}", "-o", "o"], [name]):
+    for line in (
+        ["inspect", log],
+        ["identify", log, "--axis", "yaw", "-o", "m", "--no-figures"],
+        ["import", f"gone{name}", "-o", "o"],
+        [name],
+    ):
         answer = run_cli(*line)
         assert answer.code in {0, 1, 2}
         said = answer.out + answer.err

@@ -11,6 +11,7 @@ from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
+import plan_legs
 import pytest
 import yaml
 from cli import trial
@@ -21,6 +22,7 @@ from fieldsid.cli.trial.filled import FILLS
 from fieldsid.cli.trial.parsed import parse
 from fieldsid.logs import load_run, save_run
 from fieldsid.models.axis import Axis
+from fieldsid.planning.output.plan_file import save_plan
 from fieldsid.trial_folder.journal import Entry, Stamp, append
 from fieldsid.trial_folder.state import state_of
 
@@ -376,7 +378,7 @@ def test_turn_radius_takes_the_circles_that_were_flown_and_counts_each_once(run_
 
 
 def test_live_takes_the_newest_run_and_what_the_plan_of_its_axis_promised(run_cli, folder):
-    assert run_cli("plan", "--axis", "yaw", "--speeds", "1.4", "--window", "22", "--no-figures", "-o", "plan").code == 0
+    save_plan(plan_legs.plan(plan_legs.leg()), folder / "plan" / "plan.yaml", force=True)
     answer = run_cli("live", "--axis", "yaw", "--speed", "0")
     assert answer.code == 0, answer.err
     assert "taken from the trial folder: --plan plan/plan.yaml runs/pulses_1.4.parquet" in answer.err

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from fieldsid.logs import save_run
+from fieldsid.logs.run import Run
 from fieldsid.maneuvers import Limits, parse_spec
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise, save_model
@@ -33,9 +35,16 @@ def flown(
     folder: Path, axis: Axis = Axis.YAW, *, spec: str = "square_pulses", speed: float = 1.4, seed: int = 3, name: str = "run7",
     hidden: tuple[str, dict[str, float]] | None = None,
 ) -> Path:  # fmt: skip
-    model = vehicle(axis) if hidden is None else vehicle(axis, hidden[0], **hidden[1])
-    run = with_noise(dry_run(model, *parse_spec(spec), speed=speed, limits=Limits(0.35)), model, seed)
+    effect, values = hidden or (None, {})
+    run = _run_of(axis, spec, speed, seed, effect, tuple(values.items()))
     return save_run(replace(run, name=name), folder / f"{name}.parquet")
+
+
+@cache
+def _run_of(axis: Axis, spec: str, speed: float, seed: int, effect: str | None, values: tuple[tuple[str, float], ...]) -> Run:
+    """Return what the vehicle flies and its sensors see: many tests begin with the same."""
+    model = vehicle(axis) if effect is None else vehicle(axis, effect, **dict(values))
+    return with_noise(dry_run(model, *parse_spec(spec), speed=speed, limits=Limits(0.35)), model, seed)
 
 
 def model_file(folder: Path, axis: Axis = Axis.YAW, *, force: bool = False) -> Path:

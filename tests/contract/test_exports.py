@@ -278,7 +278,7 @@ def accepted(draw):
         return load_schedule(save_schedule(made, Path(folder) / "gains.yaml"))
 
 
-@settings(max_examples=20)  # a YAML file each
+@settings(max_examples=8)  # a YAML file each
 @pytest.mark.parametrize("name", TARGETS)
 @given(schedule=accepted())
 def test_an_export_holds_exactly_its_own_keys_whatever_a_schedule_says(name, schedule):

@@ -13,6 +13,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,12 @@ Signals = dict[str, np.ndarray]
 
 
 def good_log(seed: int) -> Signals:
-    """Return time and signals (n,), SI and NED, of a flight of pulses in yaw and pitch with noise."""
+    """Return time and signals (n,), SI and NED, of a flight of pulses in yaw and pitch with noise, to be spoilt."""
+    return {name: values.copy() for name, values in _flown(seed).items()}
+
+
+@cache
+def _flown(seed: int) -> Signals:
     random = np.random.default_rng(seed)
     rate, speed = float(random.choice([5.0, 10.0, 20.0])), float(random.uniform(1.0, 2.5))
     fine, length = 0.01, float(random.uniform(80.0, 160.0))

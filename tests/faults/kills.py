@@ -15,7 +15,9 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 
 if __name__ == "__main__":
@@ -24,6 +26,7 @@ if __name__ == "__main__":
 import numpy as np
 from cli import trial
 
+from fieldsid.cli import app
 from fieldsid.logs import load_run, save_run
 from fieldsid.models.model import load_model
 from fieldsid.plant.laws.axis_laws import load_laws
@@ -65,7 +68,9 @@ def prepared(folder: Path) -> Path:
     trial.model_file(folder).rename(folder / "model.yaml")
     rows = ["1.0,0.8,-0.6,0.01", "1.4,1.12,-1.17,0.02", "1.8,1.44,-1.94,0.03"]
     (folder / "points.csv").write_text("speed_m_s,a22,b2,C0\n" + "\n".join(rows) + "\n")
-    done(folder, ("schedule", "design", "points.csv", "--fin-limit", "0.26", "-o", "gains.yaml"))
+    with chdir(folder), redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+        if app.main(["schedule", "design", "points.csv", "--fin-limit", "0.26", "-o", "gains.yaml"]):
+            raise RuntimeError("no schedule is made")
     (folder / "config.yaml").write_text("# mine\nheading: {}\nother: 1\n")
     return folder
 

@@ -53,7 +53,12 @@ def test_of_a_ship_whose_turns_bend_more_than_any_law_the_sign_at_rest_is_left_o
 
 
 @pytest.mark.parametrize(
-    "effects", [("servo_lag",), ("wave",), ("servo_lag", "sway_coupling", "quadratic_damping")], ids="+".join
+    "effects",
+    [
+        pytest.param(("servo_lag",), id="servo_lag"),
+        pytest.param(("wave",), id="wave", marks=pytest.mark.slow),
+        pytest.param(("servo_lag", "sway_coupling", "quadratic_damping"), id="three", marks=pytest.mark.slow),
+    ],
 )
 def test_a_fit_with_effects_is_never_worse_than_the_plain_one(shared_data, effects):
     run = load_run(shared_data / "lauv" / "rudder_v1.50.csv.gz")

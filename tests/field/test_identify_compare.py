@@ -1,11 +1,11 @@
-"""The commands on third-party logs: numbers that independent fits give, at every speed, and where the model fails."""
+"""The commands on third-party logs: numbers that independent fits give, at several speeds, and where the model fails."""
 
 from __future__ import annotations
 
 import pytest
 
 pytestmark = pytest.mark.field
-SPEEDS = ("1.00", "1.25", "1.50", "1.70", "1.90")
+SPEEDS = ("1.00", "1.50", "1.90")
 
 
 def test_yaw_at_one_speed_agrees_with_an_independent_fit(run_cli, shared_data):
@@ -17,7 +17,7 @@ def test_yaw_at_one_speed_agrees_with_an_independent_fit(run_cli, shared_data):
     assert fit["rate_fit_percent"] == pytest.approx(92.0, abs=1.0)
 
 
-def test_yaw_authority_grows_with_speed_at_all_five(run_cli, shared_data):
+def test_yaw_authority_grows_with_speed(run_cli, shared_data):
     runs = [shared_data / f"lauv/rudder_v{v}.csv.gz" for v in SPEEDS]
     fits = run_cli("identify", *runs, "--axis", "yaw", "--json").json["fits"]
     authority = [f["parameters"]["b2"]["value"] for f in fits]
@@ -25,7 +25,7 @@ def test_yaw_authority_grows_with_speed_at_all_five(run_cli, shared_data):
     assert all(f["rate_fit_percent"] > 88 for f in fits)
 
 
-def test_pitch_at_all_five_speeds_agrees_with_independent_fits(run_cli, shared_data):
+def test_pitch_at_three_speeds_agrees_with_independent_fits(run_cli, shared_data):
     runs = [shared_data / f"lauv/elevator_v{v}.csv.gz" for v in SPEEDS]
     fits = run_cli("identify", *runs, "--axis", "pitch", "--json").json["fits"]
     damping = [f["parameters"]["c22"]["value"] for f in fits]

@@ -40,7 +40,9 @@ def test_the_tanks_columns_are_known_by_their_numbers_the_rudder_beside_a_roll_t
         assert wanted.keys() - found.keys() <= {"sway_m_s"}
 
 
-@pytest.mark.parametrize("flight", ["zigzag_v1.00", "zigzag_v1.90", "rudder_v1.50"])
+@pytest.mark.parametrize(
+    "flight", ["zigzag_v1.90", *(pytest.param(f, marks=pytest.mark.slow) for f in ("zigzag_v1.00", "rudder_v1.50"))]
+)
 def test_a_vehicles_noisy_columns_without_names_are_told_apart(shared_data, tmp_path, flight):
     table = pd.read_csv(shared_data / "lauv" / f"{flight}.csv.gz")
     table.to_csv(tmp_path / "log.dat", header=False, index=False, sep=" ")
@@ -107,7 +109,7 @@ def test_pulse_runs_are_cut_from_before_the_pulses_to_the_recovery(shared_data):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", ["rudder_v1.50", "uturn_v1.90"])
+@pytest.mark.parametrize("name", [pytest.param("rudder_v1.50", marks=pytest.mark.slow), "uturn_v1.90"])
 def test_a_vehicle_log_through_ros_and_back_is_the_same_log(shared_data, tmp_path, kind, name):
     log = shared_data / "lauv" / f"{name}.csv.gz"
     table = pd.read_csv(log)

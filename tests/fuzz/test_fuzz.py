@@ -12,7 +12,7 @@ from fuzz.mutate import spoil_bytes
 from fieldsid.logs.reader import PACKAGE
 from fieldsid.registry import members
 
-FEW, OF_SLOW = 4, 1
+FEW, OF_SLOW = 3, 1
 
 
 # dbdreader leaves a file open where it does not like what it finds

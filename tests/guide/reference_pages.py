@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,8 @@ from fieldsid.logs.mapping.mapping_file import KEYS
 from fieldsid.models.axis import NAMES, Axis
 
 PACKAGE = Path(__file__).resolve().parents[2] / "fieldsid"
+CONSTANT = re.compile(r'^(\w+) = "([^"\n]*)"(?:  #.*)?$', re.MULTILINE)
+"""A name of a file and the text that it stands for."""
 COLUMNS = 76
 MAPPING = """# A mapping, key by key
 
@@ -78,14 +81,9 @@ def codes() -> str:
 
 
 def _all_said() -> Iterator[Said]:
-    trees = {path: ast.parse(path.read_text()) for path in sorted(PACKAGE.rglob("*.py"))}
-    constants = {
-        node.targets[0].id: node.value.value
-        for tree in trees.values()
-        for node in tree.body
-        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name) and isinstance(node.value, ast.Constant)
-    }
-    for tree in trees.values():
+    texts = [path.read_text() for path in sorted(PACKAGE.rglob("*.py"))]
+    constants = {name: code for text in texts for name, code in CONSTANT.findall(text)}
+    for tree in (ast.parse(text) for text in texts if "Note(" in text):
         for function in [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)]:
             for call in ast.walk(function):
                 if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "Note" and call.args:
@@ -94,12 +92,12 @@ def _all_said() -> Iterator[Said]:
                         yield Said(code, _message(call, function), about)
 
 
-def _codes(node: ast.expr, constants: dict[str, object]) -> list[str]:
+def _codes(node: ast.expr, constants: dict[str, str]) -> list[str]:
     match node:
         case ast.Constant(value=str(code)):
             return [code]
         case ast.Name(id=name):
-            return [code] if isinstance(code := constants.get(name), str) else []
+            return [constants[name]] if name in constants else []
         case ast.IfExp(body=one, orelse=other):
             return [*_codes(one, constants), *_codes(other, constants)]
     return []

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -59,11 +60,19 @@ HELPER = {
 
 @dataclass(frozen=True)
 class Telltale:
-    """A vehicle with an effect, the maneuver it flew, its motion without noise, and the textbook's model fitted to its log."""
+    """A vehicle with an effect, and the maneuver it flies."""
 
     model: Model
     maneuver: str
-    shown: motion.MotionView
+
+    @cached_property
+    def shown(self) -> motion.MotionView:
+        """Its motion without noise, and that of the textbook's model fitted to its log."""
+        run = _flown(self.model, self.maneuver)
+        log = with_noise(run, self.model, SEED)
+        fit = identify([log], self.model.axis, method="output_error", whole=True)[0].predictions[0]
+        record = record_of(run, self.model.axis)
+        return motion.MotionView(record, fit.angle, fit.rate, fit.fin, NOISE.angle, NOISE.rate)
 
     @property
     def strength(self) -> dict[str, float]:
@@ -73,11 +82,7 @@ class Telltale:
 
 def telltale_of(name: str) -> Telltale:
     """Return the telltale of an effect."""
-    model, maneuver = _vehicle(name)
-    run = _flown(model, maneuver)
-    fit = identify([with_noise(run, model, SEED)], model.axis, method="output_error", whole=True)[0].predictions[0]
-    record = record_of(run, model.axis)
-    return Telltale(model, maneuver, motion.MotionView(record, fit.angle, fit.rate, fit.fin, NOISE.angle, NOISE.rate))
+    return Telltale(*_vehicle(name))
 
 
 def _vehicle(name: str) -> tuple[Model, str]:

@@ -27,7 +27,8 @@ WITHIN = 5e-3
 """Share of the truth within which a22 comes back."""
 NOISE = 3e-4
 PHASES = np.arange(0.05, 1.0, 0.1)
-RATES = (5, *(pytest.param(rate, marks=pytest.mark.slow) for rate in (10, 20, 50)))
+FEW = PHASES[::3]
+SLOW = [pytest.param(rate, PHASES, marks=pytest.mark.slow) for rate in (5, 10, 20, 50)]
 TOPICS = {"yaw_rad": "h", "yaw_rate_rad_s": "r", "rudder_rad": "c"}
 
 
@@ -50,11 +51,15 @@ def damping_of(run, method="output_error"):
     return fit([record_of(run, Axis.YAW)], Axis.YAW, method=method).model.values["a22"]
 
 
-@pytest.fixture(scope="module", params=RATES)
-def runs(request):
-    return [joined(*flown(request.param, phase)) for phase in PHASES]
+@pytest.fixture(scope="module")
+def runs(rate, phases):
+    return [joined(*flown(rate, phase)) for phase in phases]
 
 
+AT_EACH_PHASE = pytest.mark.parametrize(("rate", "phases"), [(5, FEW), *SLOW], scope="module")
+
+
+@AT_EACH_PHASE
 @pytest.mark.parametrize("method", ["output_error", "pem", "svf_ls", "svf_rls", "srivc"])
 def test_the_damping_does_not_depend_on_the_phase(runs, method):
     found = np.array([damping_of(run, method) for run in runs])
@@ -68,15 +73,13 @@ def online(samples):
     return known.estimate()
 
 
+@AT_EACH_PHASE
 def test_the_damping_does_not_depend_on_the_phase_sample_by_sample(runs):
     found = [online((s.time, s.fin, s.angle, s.rate, s.fin_line) for s in samples_of(run, Axis.YAW)) for run in runs]
     np.testing.assert_allclose([e.values["a22"] for e in found], DAMPING, rtol=WITHIN)
 
 
-@pytest.mark.parametrize(
-    ("rate", "phases"),
-    [(5, PHASES), (20, PHASES[::3]), *(pytest.param(rate, PHASES, marks=pytest.mark.slow) for rate in (10, 20, 50))],
-)
+@pytest.mark.parametrize(("rate", "phases"), [(5, FEW), (20, FEW[1:2]), *SLOW])
 def test_nor_where_commands_and_measurements_come_as_messages_of_their_own(rate, phases):
     for phase in phases:
         commands, time, motion = flown(rate, phase)
@@ -87,7 +90,10 @@ def test_nor_where_commands_and_measurements_come_as_messages_of_their_own(rate,
         assert now.counts["missing"] <= 1.1 * rate + 1  # before the second command
 
 
-@pytest.mark.parametrize(("rate", "phase"), [(5, 0.05), (5, 0.55), (10, 0.15), (20, 0.45), (50, 0.95)])
+@pytest.mark.parametrize(
+    ("rate", "phase"),
+    [(5, 0.55), (20, 0.45), *(pytest.param(*of, marks=pytest.mark.slow) for of in ((5, 0.05), (10, 0.15), (50, 0.95)))],
+)
 def test_no_clock_is_off_and_nothing_is_delayed_where_nothing_is(rate, phase):
     found = diagnose([joined(*flown(rate, phase))], axis="yaw")
     assert (found.verdict, found.effects) == ("sufficient", ())

@@ -64,7 +64,8 @@ def errors(row, case: str, method: str, seeds: range) -> np.ndarray:
 @pytest.mark.parametrize("method", ["auto", pytest.param("pem", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("case", CASES)
 def test_few_seeds_stay_within_their_intervals(case, method):
-    z = np.concatenate([scores(row, case, method, range(12)).ravel() for row in ROWS])
+    few = range(6 if case == "disturbed" else 12)  # six of its fits take as long as all of the others
+    z = np.concatenate([scores(row, case, method, few).ravel() for row in ROWS])
     assert 0.84 <= np.mean(np.abs(z) < 1.96) <= 1.0
     assert 0.7 < np.std(z) < 1.35
 

@@ -53,7 +53,8 @@ def diagnosed(case: Case) -> Diagnosis:
     return diagnose(runs_of(case.training, "train"), Axis(case.axis), runs_of(case.validation, "unseen"))
 
 
-@pytest.mark.parametrize("first", [10, *(pytest.param(first, marks=pytest.mark.slow) for first in (0, 20, 30))])
+@pytest.mark.slow  # the normal suite asks it of the case of tests/recovery/test_verdict_properties.py
+@pytest.mark.parametrize("first", [10, 0, 20, 30])
 def test_a_single_hidden_effect_is_among_the_first_three_and_its_error_falls(first: int) -> None:
     case = visible_case("single", first)
     found = diagnosed(case)
@@ -94,6 +95,7 @@ def test_an_effect_that_the_others_have_made_idle_is_left_out() -> None:
     assert work.core_of(longer) == frozenset(found.names)
 
 
+@pytest.mark.slow  # the normal suite has a catalogue without the cause in tests/unit/diagnosis/search/test_budget.py
 def test_a_cause_that_no_catalogue_has_is_not_given_a_name() -> None:
     found = diagnosed(visible_case("uncatalogued", 0))
     assert found.verdict == "unexplained"
@@ -128,7 +130,7 @@ def test_an_effect_of_another_shape_is_followed_down_to_the_floor(seed: int, ind
             ],
         ),
         pytest.param(132, 84, "ar1", id="many ends", marks=pytest.mark.slow),
-        pytest.param(136, 100, None, id="play behind a slow fin"),
+        pytest.param(136, 100, None, id="play behind a slow fin", marks=pytest.mark.slow),
         pytest.param(138, 102, None, id="another trim for one than for both", marks=pytest.mark.slow),
     ],
 )

@@ -12,6 +12,7 @@ import pytest
 from truth.vehicle_kinds import HIDDEN, KINDS, TRAINING, Kind, logs_of, physics_of
 
 from fieldsid.diagnosis import diagnose
+from fieldsid.fitting.fit import Fit
 from fieldsid.fitting.identify import identify
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
@@ -33,6 +34,14 @@ def runs(kind: str, effect: str) -> tuple[tuple[Run, ...], tuple[Run, ...]]:
     return tuple(every[n] for n in TRAINING), tuple(r for n, r in every.items() if n not in TRAINING)
 
 
+@cache
+def fitted(kind: str, effect: str) -> Fit:
+    """Return the fit to the runs to learn from, of what is hidden alone."""
+    effects = [effect] if effect else []
+    (found,) = identify(runs(kind, effect)[0], Axis.YAW, effects=effects, joint=True, method="output_error")
+    return found
+
+
 def expected(kind: Kind, effect: str) -> dict[str, float]:
     """Return the true numbers in the catalogue's words."""
     truth = physics_of(kind, effect)
@@ -46,7 +55,7 @@ def expected(kind: Kind, effect: str) -> dict[str, float]:
 
 @pytest.mark.parametrize(("kind", "effect"), CASES)
 def test_the_numbers_of_every_kind_come_back_and_none_is_on_a_bound(kind, effect):
-    (found,) = identify(runs(kind, effect)[0], Axis.YAW, effects=[effect] if effect else [], joint=True, method="output_error")
+    found = fitted(kind, effect)
     for name, value in expected(BY_NAME[kind], effect).items():
         assert found.model.values[name] == pytest.approx(value, rel=0.05), name
     assert not [n for n in found.notes if n.code in ("on_bound", "unstable")]
@@ -56,10 +65,8 @@ def test_the_numbers_of_every_kind_come_back_and_none_is_on_a_bound(kind, effect
 def test_what_is_found_does_not_hang_on_the_unit_of_time(effect):
     seen, kinds = {}, [kind for kind in KINDS if (kind.name, effect) in CASES]
     for kind in kinds:
-        (found,) = identify(
-            runs(kind.name, effect)[0], Axis.YAW, effects=[effect] if effect else [], joint=True, method="output_error"
-        )
-        seen[kind.name] = {n: found.model.values[n] * kind.time_constant ** POWERS[n] for n in expected(kind, effect)}
+        values = fitted(kind.name, effect).model.values
+        seen[kind.name] = {n: values[n] * kind.time_constant ** POWERS[n] for n in expected(kind, effect)}
     for kind in kinds:
         assert seen[kind.name] == pytest.approx(seen["remus"], rel=0.02), kind.name
 

@@ -134,7 +134,7 @@ def in_own_process(test):
         if os.environ.get(OWN_PROCESS):
             return test(tmp_path)
         pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
-        words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"{__file__}::{test.__name__}"]
+        words = [sys.executable, "-m", "pytest", "-q", "-m", "", "-p", "no:cacheprovider", f"{__file__}::{test.__name__}"]
         done = subprocess.run(words, env=os.environ | {OWN_PROCESS: "1"}, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
         return None
@@ -143,9 +143,26 @@ def in_own_process(test):
 
 
 @in_own_process
+def test_a_cluster_answers_for_every_log_and_one_that_is_not_there_is_said(tmp_path):
+    distributed = pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
+    from fieldsid.batch import dask_cluster
+
+    (tmp_path / "bad.csv").write_text("no,log\n1,2\n")
+    tasks = [Task(str(log), SETTINGS) for log in (trial.flown(tmp_path), tmp_path / "bad.csv")]
+    with distributed.LocalCluster(n_workers=1, processes=False, dashboard_address=None, silence_logs=50) as cluster:
+        rows = dict(dask_cluster.run_on_cluster(tasks, cluster.scheduler_address))
+    assert [rows[task][0]["status"] for task in tasks] == ["done", "skipped"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(dask_cluster, "CONNECT_S", 1)
+        with pytest.raises(UsageError, match="no Dask scheduler"):
+            next(dask_cluster.run_on_cluster([], "tcp://127.0.0.1:9"))
+
+
+@pytest.mark.slow  # two processes that begin, and one anew
+@in_own_process
 def test_a_cluster_that_loses_a_worker_still_answers_for_every_log(tmp_path):
     distributed = pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
-    from fieldsid.batch.dask_cluster import run_on_cluster
+    from fieldsid.batch import dask_cluster
 
     logs = [trial.flown(tmp_path, seed=i, name=f"run{i}") for i in range(6)]
     (tmp_path / "bad.csv").write_text("no,log\n1,2\n")
@@ -154,21 +171,10 @@ def test_a_cluster_that_loses_a_worker_still_answers_for_every_log(tmp_path):
         rows, killed = {}, False
         with distributed.Client(cluster) as client:
             pids = client.run(os.getpid)
-        for task, of_it in run_on_cluster(tasks, cluster.scheduler_address):
+        for task, of_it in dask_cluster.run_on_cluster(tasks, cluster.scheduler_address):
             rows[task] = of_it
             if not killed and len(rows) == 3:
                 os.kill(next(iter(pids.values())), 9)
                 killed = True
     assert set(rows) == set(tasks)
-    assert [r[0]["status"] for t, r in rows.items() if not t.log.endswith("bad.csv")] == ["done"] * 6
-
-
-@in_own_process
-def test_an_address_without_a_scheduler_is_said(tmp_path):
-    pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
-    from fieldsid.batch import dask_cluster
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(dask_cluster, "CONNECT_S", 1)
-        with pytest.raises(UsageError, match="no Dask scheduler"):
-            next(dask_cluster.run_on_cluster([], "tcp://127.0.0.1:9"))
+    assert [r[0]["status"] for t, r in rows.items() if not t.log.endswith("bad.csv")] == ["done"] * len(logs)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -22,12 +23,18 @@ YAW = {"a22": 1.1, "b2": -1.2, "C0": 0.02}
 PITCH = {"c22": 1.4, "c23": 0.4, "d2": 1.3, "Cb": 0.02}
 
 
-def runs_of(axis, values, seed, speeds=(1.0, 1.4), effects=()):
+@cache
+def flown(axis, values, effects, speed):
+    """A vehicle and its motion without noise: many states have the same."""
     law = SpeedLaw(1.4, trim_of_fin=axis is Axis.YAW)
-    model = Model(axis, effects, values, {}, (), np.zeros((0, 0)), law, Noise(0.005, 0.004))
-    maneuver, given = parse_spec("square_pulses")
-    flown = [dry_run(model, maneuver, given, speed=u, limits=Limits(0.35)) for u in speeds]
-    return [replace(with_noise(r, model, seed + i), name=f"p{u}") for i, (r, u) in enumerate(zip(flown, speeds, strict=True))]
+    model = Model(axis, effects, dict(values), {}, (), np.zeros((0, 0)), law, Noise(0.005, 0.004))
+    return model, dry_run(model, *parse_spec("square_pulses"), speed=speed, limits=Limits(0.35))
+
+
+def runs_of(axis, values, seed, speeds=(1.0, 1.4), effects=()):
+    flights = [flown(axis, tuple(values.items()), effects, speed) for speed in speeds]
+    noisy = [with_noise(run, model, seed + i) for i, (model, run) in enumerate(flights)]
+    return [replace(run, name=f"p{u}") for run, u in zip(noisy, speeds, strict=True)]
 
 
 def state(axis, values, seed, *, joint=True, effects=(), **more):

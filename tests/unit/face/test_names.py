@@ -127,6 +127,15 @@ fs.turn_radius(3.0)
 """
 
 
+def test_a_function_is_called_by_its_own_names_and_says_what_it_gives():
+    """What mypy makes of that takes it minutes at first, and is asked by name."""
+    assert str(signature(fieldsid.identify).return_annotation) == "Several[Fit]"
+    assert str(signature(fieldsid.turn_radius).parameters["models"].annotation) == "Models"
+    with pytest.raises(TypeError, match="unexpected keyword argument 'joit'"):
+        signature(fieldsid.identify).bind("a.csv", "yaw", joit=True)
+
+
+@pytest.mark.slow
 def test_a_typed_user_sees_signatures_and_mistakes(tmp_path):
     user = tmp_path / "user.py"
     user.write_text(USER)

@@ -265,7 +265,11 @@ def test_the_tables_of_turns_and_gains_are_the_rows_that_json_prints(held):
     assert list(schedule.to_frame().index) == list(schedule.speeds)
 
 
-@pytest.mark.parametrize("kind", DRAWN)
+DRAWN_BY_COMMANDS = ("Change", "Comparison", "Laws", "Schedule", "TurnPrediction", "Verification")
+"""Kinds whose figures the tests of their commands draw in the normal suite."""
+
+
+@pytest.mark.parametrize("kind", [pytest.param(k, marks=pytest.mark.slow if k in DRAWN_BY_COMMANDS else ()) for k in DRAWN])
 def test_every_figure_of_a_record_has_axes_and_is_a_picture_in_a_notebook(held, kind):
     parts = view_of(type(held[kind])).figures(held[kind])
     assert parts

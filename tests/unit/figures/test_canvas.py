@@ -27,20 +27,24 @@ def draw(ax):
     canvas.legend_above(ax)
 sheet = canvas.sheet(8.0, 5.0)
 draw(sheet.add_subplot())
-canvas.save(sheet, Path(sys.argv[1]))
+for suffix in sys.argv[2:]:
+    canvas.save(sheet, Path(sys.argv[1]) / f"f{suffix}")
 """
 
 
-def drawn(path: Path, seed: str) -> bytes:
-    """Return what another process, whose hashes are its own, writes."""
-    environment = {"PYTHONHASHSEED": seed, "PYTHONPATH": str(Path(canvas.__file__).parents[2])}
-    subprocess.run([sys.executable, "-c", DRAWN, path], check=True, env=environment)
-    return path.read_bytes()
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Return the folders of what two processes write, each with hashes of its own."""
+    folders = tmp_path_factory.mktemp("one"), tmp_path_factory.mktemp("other")
+    for seed, folder in enumerate(folders, 1):
+        environment = {"PYTHONHASHSEED": str(seed), "PYTHONPATH": str(Path(canvas.__file__).parents[2])}
+        subprocess.run([sys.executable, "-c", DRAWN, folder, *FIRST], check=True, env=environment)
+    return folders
 
 
 @pytest.mark.parametrize("suffix", FIRST)
-def test_the_suffix_is_the_kind_of_file_and_the_same_figure_the_same_bytes(tmp_path, suffix):
-    one, other = (drawn(tmp_path / f"f{seed}{suffix}", seed) for seed in ("1", "2"))
+def test_the_suffix_is_the_kind_of_file_and_the_same_figure_the_same_bytes(drawn, suffix):
+    one, other = ((folder / f"f{suffix}").read_bytes() for folder in drawn)
     assert one.startswith(FIRST[suffix])
     assert one == other
     assert b"CreationDate" not in one

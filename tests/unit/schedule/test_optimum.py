@@ -36,7 +36,7 @@ def source_at(values):
     return source_of_models([Model(Axis.YAW, effects, own, {}, tuple(own), covariance, law, Noise(0.005, 0.005), trained)], ["m"])
 
 
-@pytest.mark.parametrize("hull", HULLS)
+@pytest.mark.parametrize("hull", [pytest.param(h, marks=() if h == "quick fin" else pytest.mark.slow) for h in HULLS])
 def test_no_step_of_the_gains_is_larger_than_the_plants_own(hull):
     speeds = np.geomspace(1.2, 1.2 * 1.02**6, 7)
     rows = design_schedule(source_at(HULLS[hull]), 0.26, speeds=list(speeds), wish=Wish("pd")).rows

@@ -29,9 +29,9 @@ def counted():
 
 
 def _verified(kind):
-    runs = []
+    runs, logs = [], logs_of(kind, "quadratic_damping")
     for name in TRAINING:
-        columns = dict(logs_of(kind, "quadratic_damping")[name])
+        columns = dict(logs[name])
         runs.append(Run(name, columns.pop("time_s"), columns))
     (fit,) = identify(runs, Axis.YAW, effects=("quadratic_damping",), joint=True, method="output_error")
     source, steps = source_of_models([fit.model], [kind.name]), []

@@ -78,6 +78,11 @@ def a_search(*, thorough: bool) -> Search:
     return made
 
 
+@pytest.fixture(scope="module")
+def searched() -> Search:
+    return a_search(thorough=False)
+
+
 def test_a_search_without_allowance_ends_with_what_the_base_leads_to(monkeypatch):
     allow_nothing(monkeypatch)
     short, thorough = a_search(thorough=False), a_search(thorough=True)
@@ -97,29 +102,40 @@ def test_a_search_without_allowance_ends_with_what_the_base_leads_to(monkeypatch
     ],
 )
 def test_the_longer_allowance_goes_by_the_error_that_is_shown_and_that_the_verdict_counts(
-    monkeypatch, visible, left, share, goes_on, says
+    monkeypatch, searched, visible, left, share, goes_on, says
 ):
-    made = a_search(thorough=False)
-    made.budget.most = 0.0
+    monkeypatch.setattr(searched, "budget", replace(searched.budget, most=0.0, is_exhausted=False))
     monkeypatch.setattr(Search, "leaves_visible_error", lambda _self: visible)
     monkeypatch.setattr(search, "compared_error", lambda *_of: left)
     monkeypatch.setattr(search, "compared_share", lambda *_of: share)
-    assert (made.may_go_on(), made.leaves_unexplained()) == (goes_on, says)
+    assert (searched.may_go_on(), searched.leaves_unexplained()) == (goes_on, says)
+
+
+def with_effects(monkeypatch, *names):
+    """Leave a diagnosis some of the catalogue's effects."""
+    module = import_module("fieldsid.diagnosis.diagnose")
+    monkeypatch.setattr(module, "applicable_effects", lambda _all, _records: (tuple(EFFECTS[n] for n in names), {}))
 
 
 @pytest.mark.parametrize("thorough", [False, True])
 def test_a_diagnosis_says_that_not_all_was_tried(monkeypatch, thorough):
     allow_nothing(monkeypatch)
-    without_lag = [e for name, e in EFFECTS.items() if name in ("quadratic_damping", "stall")]
-    monkeypatch.setattr(
-        import_module("fieldsid.diagnosis.diagnose"), "applicable_effects", lambda _all, _records: (tuple(without_lag), {})
-    )
+    with_effects(monkeypatch, "quadratic_damping", "stall")
     found = diagnose(RUNS, Axis.YAW, [UNSEEN], thorough=thorough)
     assert [n.code for n in found.notes].count("search_ended") == (not thorough)
 
 
+def test_a_cause_that_the_catalogue_lacks_is_not_given_a_name(monkeypatch):
+    with_effects(monkeypatch, "quadratic_damping", "stall", "gyro_scale")
+    found = diagnose(RUNS, Axis.YAW, [UNSEEN])
+    assert (found.verdict, found.effects) == ("unexplained", ())
+    assert "no effect of the catalogue" in found.says
+
+
 @pytest.mark.forks
 def test_a_copy_changes_neither_the_count_nor_the_answer(monkeypatch):
+    """With the whole catalogue: tests/recovery/test_diagnosis.py."""
+    with_effects(monkeypatch, "servo_lag", "delay", "quadratic_damping")
     answers, counts = [], []
     for alone in (False, True):
         if alone:

@@ -97,7 +97,9 @@ def test_no_start_is_said_twice_while_the_fin_rests_and_only_what_is_free_moves(
     assert len(starts) == len({tuple(s) for s in starts}) > 2
 
 
-@pytest.mark.parametrize("wrong", [(0.24, 0.3), (0.24, 0.595), (0.5, 0.54)])
+@pytest.mark.parametrize(
+    "wrong", [(0.24, 0.3), *(pytest.param(at, marks=pytest.mark.slow) for at in ((0.24, 0.595), (0.5, 0.54)))]
+)
 def test_another_minimum_of_the_cost_leads_to_the_true_one(problem, wrong):
     x = at_times(problem, found_minimum(problem)[0].x, wrong)
     starts = starts_at_other_times(problem, x, NOISE, 6)

@@ -35,9 +35,15 @@ def believed(runs, models=(), length=None):
     return believe(runs, models, length, 1)
 
 
-@pytest.mark.parametrize(
-    ("number", "sway"), [(6, True), *(pytest.param(*of, marks=pytest.mark.slow) for of in ((0, True), (3, False)))]
-)
+@pytest.fixture(scope="module")
+def of_pulses():
+    """The hull whose pulses without sway are fitted in the normal suite, and what they make believe."""
+    hull, runs = runs_of(9, "pulses", sway=False)
+    return hull, believed(runs)
+
+
+@pytest.mark.slow  # the normal suite has a hull of six degrees of freedom in tests/recovery/test_radius.py
+@pytest.mark.parametrize(("number", "sway"), [(6, True), (0, True), (3, False)])
 def test_zigzags_tell_the_circle_of_both_sides(number, sway):
     hull, runs = runs_of(number, "pulses+zigzag", sway=sway)
     belief = believed(runs)
@@ -49,14 +55,22 @@ def test_zigzags_tell_the_circle_of_both_sides(number, sway):
             assert turn.interval95[1] - turn.interval95[0] < 0.35 * truth
 
 
-@pytest.mark.parametrize("number", [9, *(pytest.param(n, marks=pytest.mark.slow) for n in (7, 11, 13))])
-def test_bands_of_pulses_without_sway_hold_the_circle(number):
-    hull, runs = runs_of(number, "pulses", sway=False)
-    belief = believed(runs)
+def has_the_circle(hull, belief):
     for side in (-1.0, 1.0):
         turn, truth = belief.turn(hull.speeds[2], hull.rudder_limit, side), true_turn(hull, hull.speeds[2], side)[0]
         assert turn.interval95[0] <= truth <= turn.interval95[1]
         assert turn.interval95[1] - turn.interval95[0] < 0.8 * truth
+
+
+def test_bands_of_pulses_without_sway_hold_the_circle(of_pulses):
+    has_the_circle(*of_pulses)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [7, 11, 13])
+def test_bands_of_other_hulls_hold_the_circle(number):
+    hull, runs = runs_of(number, "pulses", sway=False)
+    has_the_circle(hull, believed(runs))
 
 
 @pytest.mark.slow
@@ -89,9 +103,8 @@ def test_few_effective_draws_and_a_fit_like_no_vehicle_are_not_identified(monkey
     assert "no vehicle" in " ".join(far.because)
 
 
-def test_draws_worth_less_widen_the_band(monkeypatch):
-    hull, runs = runs_of(0, "pulses")
-    belief = believed(runs)
+def test_draws_worth_less_widen_the_band(monkeypatch, of_pulses):
+    hull, belief = of_pulses
 
     def width(worth):
         monkeypatch.setattr("fieldsid.turning.maneuvering.belief.effective_draws", lambda _: worth)
@@ -126,7 +139,7 @@ def test_a_rudder_of_the_other_sign_turns_the_same():
 
 def test_the_length_that_is_given_is_kept():
     hull, runs = runs_of(0, "pulses")
-    length = float(np.exp(believed(runs, length=hull.of.length).fitted.vector[0]))
+    length = float(np.exp(believed(runs[:2], length=hull.of.length).fitted.vector[0]))
     assert length == pytest.approx(hull.of.length, rel=0.15)
 
 
@@ -164,7 +177,7 @@ def test_quantiles_are_those_of_the_weights():
 
 def test_a_fit_that_is_not_finite_ends_in_a_reason():
     _, runs = runs_of(0, "pulses")
-    broken = [replace(r, signals={**r.signals, "surge_m_s": np.where(r.time < 5.0, 1e200, r["surge_m_s"])}) for r in runs]
+    broken = [replace(r, signals={**r.signals, "surge_m_s": np.where(r.time < 5.0, 1e200, r["surge_m_s"])}) for r in runs[:1]]
     with pytest.raises(ModelError, match="cannot be fitted"), np.errstate(all="ignore"):
         believed(broken)
 

@@ -119,7 +119,7 @@ def same_flight(run, rate):
     np.testing.assert_allclose(run["rudder_rad"], f["rudder"], atol=1e-4)
 
 
-@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("rate", [10, pytest.param(5, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", TABLES)
 def test_a_time_in_parts_or_that_starts_again_is_whole(tmp_path, kind, rate):
     path = tmp_path / "log.csv"

@@ -60,7 +60,7 @@ def frames(found):
 
 
 @pytest.mark.parametrize("beside", EVIDENCE)
-@pytest.mark.parametrize("place", ["none", "east first", "north first"])
+@pytest.mark.parametrize("place", ["none", "east first", pytest.param("north first", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("heading", ["of_north", "of_east"])
 def test_each_kind_of_evidence_tells_each_pair_of_frames(tmp_path, beside, place, heading):
     columns = columns_of()
@@ -98,7 +98,7 @@ def test_names_that_say_which_way_they_count_leave_nothing_open(tmp_path, names)
     assert not frames(found)
 
 
-@pytest.mark.parametrize("seed", range(20, 32))
+@pytest.mark.parametrize("seed", [*range(20, 24), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(24, 32))])
 def test_a_heading_from_north_is_never_turned(tmp_path, seed):
     columns = columns_of(seed, current=0.4)
     for beside in EVIDENCE.values():
