@@ -195,9 +195,9 @@ def scaled(values: FloatArray, factor: float) -> FloatArray:
     return values if factor == 1.0 else values * factor
 
 
-def depth_of_pressure(pressure_pa: FloatArray, *, density: float, surface_pa: float, gravity: float = GRAVITY) -> FloatArray:
+def depth_of_pressure(pressure_pa: FloatArray, *, density: float, surface_pa: float) -> FloatArray:
     """Return depth in m, positive down, of an absolute pressure (n,) in Pa: (p - p_surface) / (rho g)."""
-    return np.asarray((pressure_pa - surface_pa) / (density * gravity))
+    return np.asarray((pressure_pa - surface_pa) / (density * GRAVITY))
 
 
 def unit_of_ratio(ratio: float, units: Mapping[str, float]) -> str | None:

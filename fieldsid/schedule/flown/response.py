@@ -31,8 +31,6 @@ LIMIT_CYCLE_SHARE = 2.0 * SETTLING_BAND
 
 HELD_S, LEAST_SPEED_M_S = 1.0, 0.05
 """A curvature counts where it is held this long, as that of the runs does; speeds below this one are taken as it."""
-MOST_ERROR = 3.0
-"""Steps of error at which a response counts as lost: what diverges is not later than that."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -60,15 +58,6 @@ def settling(time: FloatArray, values: FloatArray, size: float, band: float = SE
     off = np.abs(values - size) > band * abs(size)
     last = time.size - 1 - np.argmax(off[::-1], axis=0)
     return np.asarray(np.where(off.any(axis=0), np.where(last >= time.size - 1, np.inf, time[last]), 0.0))
-
-
-def lateness(time: FloatArray, values: FloatArray, size: float) -> FloatArray:
-    """Return sqrt(int t |error|/size dt) of steps (t, n) of `size`, (n,) s: the time constant of a first-order answer.
-
-    Unlike the time to settle it does not jump where an overshoot leaves the corridor. An error counts up to three steps.
-    """
-    off, step = np.minimum(np.abs(values / size - 1.0), MOST_ERROR), float(time[1] - time[0])
-    return np.asarray(np.sqrt(np.maximum(time @ np.nan_to_num(off, nan=MOST_ERROR), step) * step))
 
 
 def swing(values: FloatArray, size: float) -> FloatArray:
