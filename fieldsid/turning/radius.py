@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldsid.errors import ModelError, UsageError
+from fieldsid.logs.doctor.fin_findings import FIN_ZERO
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.several.sifting import Refused
 from fieldsid.models.axis import NAMES, Axis
@@ -18,14 +19,7 @@ from fieldsid.turning.believed_rows import believed_rows, doubts_of_draws
 from fieldsid.turning.flown_circles import against_rudder, circles_of, compared_with, turned_against, with_measurement
 from fieldsid.turning.maneuvering.belief import SEED, Belief, believe, not_fitted
 from fieldsid.turning.model_error import DataCoverage, data_coverage, model_error, model_error_draws
-from fieldsid.turning.paper_formulas import (
-    FIN_ZERO_TOLERANCE,
-    counted_offset,
-    refuse_short_fin,
-    refuse_unstable,
-    u_turn,
-    usable_fin,
-)
+from fieldsid.turning.paper_formulas import refuse_short_fin, refuse_unstable, u_turn
 from fieldsid.turning.prediction import SIDES, TurnPrediction, TurnRow, settling_flight
 from fieldsid.turning.steady.blended_turns import BlendedTurns, blended_turns
 from fieldsid.turning.steady.speed_loss import SurgeModel, fit_surge
@@ -45,7 +39,7 @@ def turn_radius(
     measured: Sequence[Run] = (),
     method: str = "auto",
     draws: int = RADIUS_DRAWS,
-    fin_zero: float = FIN_ZERO_TOLERANCE,
+    fin_zero: float = FIN_ZERO,
     unfit: Refused[Run] | None = None,
     length: float | None = None,
 ) -> TurnPrediction:
@@ -221,7 +215,7 @@ def _row(
     simulated = method == "simulated"
     value = _median(radius * spread) if simulated else float(radius[0])
     interval = _interval(radius * spread, value)
-    because = (*coverage.missing, *_doubts(radius, interval, value))
+    because = (*coverage.missing, *doubts_of_draws(value, interval, float(np.mean(~np.isfinite(radius)))))
     return TurnRow(
         speed=float(speed),
         side=side,
@@ -243,12 +237,6 @@ def _row(
     )
 
 
-def _doubts(radius: FloatArray, interval: tuple[float, float], value: float) -> tuple[str, ...]:
-    """Return what the draws themselves say against taking a turn as identified."""
-    unsettled = float(np.mean(~np.isfinite(radius)))
-    return doubts_of_draws(value, interval, unsettled)
-
-
 def _median(draws: FloatArray) -> float:
     """Return the median of the draws that have a settled turn."""
     return float(np.median(draws[np.isfinite(draws)]))
@@ -264,12 +252,10 @@ def _interval(draws: FloatArray, value: float) -> tuple[float, float]:
 
 def _usable(rudder: float, offset: FloatArray, sign: float, fin_zero: float, rng: np.random.Generator) -> FloatArray:
     """Return draws of the usable fin; an offset that is not counted still widens the band to both sides."""
-    nominal = float(offset[0])
-    if counted_offset(nominal, fin_zero) != 0.0:
+    if abs(offset[0]) > fin_zero:
         fin = rudder + sign * offset
-        fin[0] = usable_fin(rudder, nominal, sign, 1.0)
     else:
-        fin = rudder + rng.uniform(-1.0, 1.0, offset.size) * abs(nominal)
+        fin = rudder + rng.uniform(-1.0, 1.0, offset.size) * abs(offset[0])
         fin[0] = rudder
     return np.maximum(fin, 0.05 * rudder)
 
