@@ -8,7 +8,7 @@ externally studentised residuals (Cook & Weisberg 1982, chapter 2) against Bonfe
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -221,8 +221,3 @@ def _notes(name: str, affine: Regression, power: Regression) -> tuple[Note, ...]
     if affine.r2 > 0.95 and power.dof > 0:
         notes.append(Note("r2_proves_little", f"R^2 = {affine.r2:.3f} proves little: read the exponent", {"r2": affine.r2}))
     return tuple(notes)
-
-
-def without_candidates(law: ParameterLaw, line: Regression) -> ParameterLaw:
-    """Return the law replaced by a given line (a user's own), nothing else changed."""
-    return replace(law, candidates=(line,), chosen=line.kind, exponent=None, points=())
