@@ -15,6 +15,7 @@ from fieldsid.schedule.flown.hull_kernel import close_hull_loop
 from fieldsid.schedule.flown.pace import STEP_S
 from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.record import Row
+from fieldsid.turning.steady.transient import LEAST_SURGE_M_S
 
 HULL_STEPS = 2.0
 """Steps of a plant in one of a flight in surge, sway and yaw: half of it moves the settling by less than a hundredth."""
@@ -29,8 +30,8 @@ LIMIT_CYCLE_SHARE = 2.0 * SETTLING_BAND
 """Peak to peak over the step: what swings through the whole corridor of settling after 45 s does not settle."""
 
 
-HELD_S, LEAST_SPEED_M_S = 1.0, 0.05
-"""A curvature counts where it is held this long, as that of the runs does; speeds below this one are taken as it."""
+HELD_S = 1.0
+"""A curvature counts where it is held this long, as that of the runs does."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -72,7 +73,7 @@ def tightest(steps: Steps) -> float:
     """Return the largest curvature (1/m) that the first case holds for HELD_S."""
     width = max(1, round(HELD_S / float(steps.time[1] - steps.time[0])))
     turned = np.abs(steps.angle[width:, 0] - steps.angle[:-width, 0]) / HELD_S
-    return float(np.max(turned / np.maximum(steps.speed[width:, 0], LEAST_SPEED_M_S)))
+    return float(np.max(turned / np.maximum(steps.speed[width:, 0], LEAST_SURGE_M_S)))
 
 
 def about_rest(values: FloatArray, size: float) -> FloatArray:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from fieldsid.dynamics.assemble import fin_path
 from fieldsid.dynamics.free_run import effects_of
+from fieldsid.logs.doctor.pair_findings import SLOWEST
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
@@ -26,7 +27,6 @@ LEAST_TURN_RAD_S = 0.005
 UNKNOWN_BIAS_RAD_S = 0.002
 """What a gyro may be off by, where no heading shows it."""
 LEAST_BIAS_SD_RAD_S = 1e-5
-LEAST_SPEED_M_S = 0.1
 DISCREPANCY = 0.03
 """Share of the motion that the equations themselves are off by."""
 DISCREPANCY_LENGTH_M = 2.0
@@ -165,7 +165,7 @@ def usable_runs(runs: Sequence[Run], models: Sequence[Model]) -> tuple[FlownRun,
     for run in runs:
         near = models[0] if models else None
         if models and knows_speed(run):
-            near = nearest_model(models, max(float(np.nanmedian(run["surge_m_s"])), LEAST_SPEED_M_S))
+            near = nearest_model(models, max(float(np.nanmedian(run["surge_m_s"])), SLOWEST))
         flown = flown_run(run, near, of_rpm)
         if flown is not None:
             found.append(flown)
