@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-SHOWN = 8
+SHOWN = 12
 
 
 def few_of(names: Sequence[str]) -> str:
