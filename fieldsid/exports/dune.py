@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from functools import partial
 
 from fieldsid.exports._target import Target, from_template
-from fieldsid.schedule.record import Schedule
-
-
-def render(schedule: Schedule, node: str, template: Path | None) -> str:
-    """Return the section `node`."""
-    return from_template("dune.ini", schedule, node, template)
-
 
 EXPORT = Target(
-    name="dune", says="DUNE ini section, a list per column", suffix=".ini", render=render, node="Control.AUV.GainSchedule",
+    name="dune",
+    says="DUNE ini section, a list per column",
+    suffix=".ini",
+    render=partial(from_template, "dune.ini"),
+    node="Control.AUV.GainSchedule",
     template="dune.ini",
-)  # fmt: skip
+)

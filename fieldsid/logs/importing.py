@@ -96,7 +96,7 @@ def runs_under_way(load: Callable[[tuple[float, float], float], Run], max_gap_s:
     if not notes:
         has_gaps = any(_is_long(run, s, max_gap_s) for s in MAIN if run.has(s))
         return [load(WHOLE, max_gap_s) if has_gaps else run]
-    return [replace(r, notes=(*r.notes, *notes)) for r in (load(s.part, max_gap_s) for s in stretches)]
+    return [replace(r, notes=(*r.notes, *notes)) for r in (load(part, max_gap_s) for part in stretches)]
 
 
 @dataclass(frozen=True, slots=True)

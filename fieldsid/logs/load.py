@@ -14,6 +14,7 @@ from fieldsid.errors import FieldsidError, MappingError
 from fieldsid.logs.channels import ATTITUDE, AXES, ChannelMap, Source, TableForm, is_enough
 from fieldsid.logs.convert.assemble import WHOLE, assemble
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
+from fieldsid.logs.few_of import few_of
 from fieldsid.logs.mapping.canonical_names import canonical
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.reader import JOINED, Inventory, Reader, ReadOptions, reader_of
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
 MAPPING_FILE = "mapping.yaml"
 WANTED = frozenset({"yaw_rad", "yaw_rate_rad_s", "surge_m_s"})
 """Signals that are looked for under other names too, where a log's own names give what an axis needs without them."""
-NEAR_SHOWN = 4
-"""Columns of which a message says what they may be."""
 
 
 def load_run(
@@ -179,7 +178,7 @@ def _unmapped(
     from fieldsid.logs.readers._tables_of_run import tables_beside
 
     names = [c.name for c in found.channels]
-    shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+    shown = few_of(names)
     hint = f"write a mapping: `{to_map(path, options.joined)}`"
     hint += f"; in doubt: {', '.join(f'{signal} ({why})' for signal, why in doubts.items())}" if doubts else ""
     if found.by_topic:
@@ -213,7 +212,7 @@ def _near_names(found: Inventory) -> tuple[str, Collection[str]]:
     body = draft_of(found).body
     lines = ({TIME: body["time"]} if "time" in body else {}) | body["signals"]
     pairs = [f"`{place_of(item)}` may be `{signal}`" for signal, item in lines.items() if canonical(place_of(item)) is None]
-    return ", ".join(pairs[:NEAR_SHOWN]), lines
+    return few_of(pairs), lines
 
 
 def _from_stdin(mapping: ChannelMap | Path | None, **more: Any) -> Run:

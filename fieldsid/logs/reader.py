@@ -16,6 +16,7 @@ import numpy.typing as npt
 from fieldsid.display import Brief
 from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs.channels import ChannelMap, Source, TableForm
+from fieldsid.logs.few_of import few_of
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN, not_a_log
 from fieldsid.numerics.arrays import FloatArray
@@ -244,8 +245,7 @@ def neighbours(path: Path) -> str:
     if not folder.is_dir() or not os.access(folder, os.R_OK):
         return f"no folder `{folder}` either"
     names = sorted(p.name for p in folder.iterdir() if not p.name.startswith("."))
-    shown = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
-    return f"`{folder}` holds {shown or 'nothing'}"
+    return f"`{folder}` holds {few_of(names) or 'nothing'}"
 
 
 def _way_in(path: Path, error: OSError) -> str:

@@ -68,6 +68,10 @@ COLUMNS: Mapping[str, str] = MappingProxyType({**SIGNALS, **dict.fromkeys(sorted
 """All names of a run's signals and their units."""
 GOALS = frozenset({"yaw_goal_rad", "pitch_goal_rad"})
 """The angles that an autopilot was told to hold."""
+COMMANDS = frozenset({"rudder_rad", "elevator_rad", *MOTORS}) | GOALS
+"""Signals that stand until the next one."""
+MEASURED = frozenset(SIGNALS) - COMMANDS
+"""What sensors measured."""
 
 
 def signal_of(name: str) -> str:

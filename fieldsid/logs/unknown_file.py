@@ -10,6 +10,7 @@ from shlex import quote
 from types import MappingProxyType
 
 from fieldsid.errors import LogError
+from fieldsid.logs.few_of import few_of
 from fieldsid.records.named_inputs import inputs_of
 
 COPY_AGAIN = "where the vehicle's own file is larger, copy it again"
@@ -145,6 +146,6 @@ def _logs_of(path: Path) -> str:
 def _of_folder(path: Path, suffixes: Sequence[str], give: str) -> LogError:
     names = sorted(p.name for p in path.iterdir())
     known = Counter(s for name in names for s in suffixes if name.endswith(s)).most_common(1)
-    shown = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
+    shown = few_of(names)
     hint = f"give the logs in it: `{quote(str(path))}/*{known[0][0]}`" if known else give
     return LogError(f"`{path}` is a folder, and no bag", found=f"it holds {shown or 'nothing'}", hint=hint)

@@ -8,11 +8,13 @@ from typing import cast
 
 from fieldsid.angles import parse_angle
 from fieldsid.errors import UsageError
-from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters
-from fieldsid.maneuvers._flight import Autopilot, Flight, Limits, Plant, Schedule, fly, steer, within
+from fieldsid.maneuvers._contract import AMPLITUDE_HIGH, Maneuver, Parameter, Parameters
+from fieldsid.maneuvers._flight import RATE_HZ, Autopilot, Flight, Limits, Plant, Schedule, fly, steer, within
 from fieldsid.registry import members, pick
 
 __all__ = [
+    "AMPLITUDE_HIGH",
+    "RATE_HZ",
     "Autopilot",
     "Flight",
     "Limits",

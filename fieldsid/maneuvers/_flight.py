@@ -13,6 +13,9 @@ from fieldsid.numerics.arrays import BoolArray, FloatArray
 from fieldsid.numerics.jit import inner, jit
 from fieldsid.records.keys import Key
 
+RATE_HZ = 20.0
+"""Commands a second, unless another rate is asked for."""
+
 
 class Plant(Protocol):
     """What a maneuver is flown on: `size` vehicles side by side that start at rest about their trim."""
@@ -108,7 +111,7 @@ class Flight:
 class Schedule:
     """Seconds before the excitation and after it, and the sampling rate of the commands."""
 
-    rate_hz: float = 20.0
+    rate_hz: float = RATE_HZ
     run_up: float = 2.0
     recover: float = 10.0
 

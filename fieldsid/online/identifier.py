@@ -39,8 +39,6 @@ NOISE_WINDOW, NOISE_EVERY = 1024, 256
 """Samples that the sensors' noise is learnt from, and samples between two looks."""
 WAIT_FOR_RATE_S = 1.0
 """Time after which a vehicle that has sent no rate has none."""
-PRESENT_S = 10.0
-"""Time over which the present speed is a mean."""
 STATE = 5
 """Version of the saved state."""
 _UPPER = np.triu_indices(4)
@@ -266,7 +264,7 @@ class OnlineIdentifier:
 
     def _speed_now(self) -> float:
         """Return the mean surge (m/s) of the last seconds, that of all where none came in them."""
-        recent = self._window[self._window[:, 0] > self.time - PRESENT_S, 4]
+        recent = self._window[self._window[:, 0] > self.time - LOOK_BACK_S, 4]
         recent = recent[np.isfinite(recent)]
         return float(recent.mean()) if recent.size else self._speed_sum / self._speeds if self._speeds else nan
 

@@ -80,10 +80,10 @@ class Progress:
         return all(p.is_settled for p in self.parameters if isfinite(p.goal))
 
 
-def default_goals(axis: Axis, relative: float = DEFAULT_ACCURACY) -> dict[str, Goal]:
+def default_goals(axis: Axis) -> dict[str, Goal]:
     """Return a relative goal for damping, stiffness and authority; a trim may be zero and has none."""
     names = NAMES[axis]
-    return {n: Goal(relative=relative) for n in names.base if n != names.trim}
+    return {n: Goal(relative=DEFAULT_ACCURACY) for n in names.base if n != names.trim}
 
 
 class RecentExcitation:

@@ -26,7 +26,7 @@ from fieldsid.fitting.regression.recursive_ls import (
     step,
 )
 from fieldsid.fitting.regression.svf_equation import MAX_BRIDGED_GAP_S
-from fieldsid.logs.convert.clock import Track, line_over_steps
+from fieldsid.logs.convert.clock import SLOWER, Track, line_over_steps
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.online.row_colour import RowColour
 from fieldsid.online.spike_gate import SpikeGate
@@ -35,8 +35,6 @@ CLOCK_RESTART_S = 1.0
 """A stamp so far before the last is a clock that started again; one less far is a sample that came late, and is left out."""
 HELD = 2
 """Samples that wait until it can be told whether they are spikes."""
-USUAL = 1.5
-"""Steps to the last sample from which on samples are missing; what comes without a measurement inside less is the fin's alone."""
 MOST_MOVES = 64
 """Moves of the fin that a bridged gap may hold; with more it counts as a long one."""
 
@@ -163,7 +161,7 @@ class SampleFilter:
         Inside a usual step by the moves' own line, on straight lines of the signals where samples are missing.
         """
         memory, moves = self.memory, self._moves
-        if memory[SAMPLES] and moves and line is None and time - memory[TIME] <= USUAL * memory[H]:
+        if memory[SAMPLES] and moves and line is None and time - memory[TIME] <= SLOWER * memory[H]:
             line = self._line_of_moves(time, fin, is_held=is_held)
             self.counts["missing"] -= len(moves)
         elif memory[SAMPLES] and moves:

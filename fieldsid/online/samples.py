@@ -42,22 +42,15 @@ class Sample(NamedTuple):
     fin_line: tuple[float, float] | None = None
 
 
-def fin_column(run: Run, axis: Axis) -> str:
-    """Return the fin of a run's axis, the measured one where there is one; raises DataError where none is there, or no angle."""
-    names = NAMES[axis]
-    column = names.fin_measured if run.has(names.fin_measured) else names.fin
-    if not run.has(column):
-        raise no_fin(run, axis.value, column)
-    refuse_no_angle(run, column)
-    return column
-
-
 def samples_of(run: Run, axis: Axis, after: float = -np.inf) -> Iterator[Sample]:
     """Yield the samples of a run after a time in s.
 
     Raises DataError where the log has no fin, or neither angle nor rate, or both and a finding says that they contradict.
     """
-    names, column = NAMES[axis], fin_column(run, axis)
+    names = NAMES[axis]
+    column = names.fin_measured if run.has(names.fin_measured) else names.fin
+    if not run.has(column):
+        raise no_fin(run, axis.value, column)
     if not run.has(names.angle) and not run.has(names.rate):
         found = ", ".join(s for s in run.signals if run.has(s))
         raise DataError(f"run {run.name!r} has neither `{names.angle}` nor `{names.rate}`", found=found, hint="map one of them")

@@ -11,17 +11,18 @@ import numpy as np
 from fieldsid import angles
 from fieldsid.dynamics.free_run import effects_of
 from fieldsid.errors import UsageError
+from fieldsid.maneuvers import RATE_HZ
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
 from fieldsid.planning.belief.prior_file import load_believed
 from fieldsid.planning.belief.prior_model import checked_prior, named_prior
 from fieldsid.planning.design.best_leg import RUN_UP_S
 from fieldsid.planning.design.plan import WINDOW, Plan, Request, make_plan
-from fieldsid.planning.discriminate.discriminate import Separation
+from fieldsid.planning.discriminate.discriminate import LONGEST_WINDOW_S, Separation
 from fieldsid.planning.discriminate.rivals import rivals_from, rivals_named
-from fieldsid.planning.discriminate.separating_plan import LONGEST_WINDOW_S, separating_plan
+from fieldsid.planning.discriminate.separating_plan import separating_plan
 from fieldsid.planning.flight.excitation import Window
-from fieldsid.planning.safety.envelope import LARGEST_FIN, Envelope
+from fieldsid.planning.safety.envelope import ACCEPTED_SHARE, LARGEST_FIN, Envelope
 from fieldsid.planning.specify.accuracy_goals import parse_accuracy_goals
 from fieldsid.planning.specify.quantities import parse_area, parse_band, parse_speeds
 from fieldsid.vehicle import Vehicle, find_vehicle, load_vehicle
@@ -44,7 +45,7 @@ class EnvelopeLimits:
     roll: str | None = None
     fin: str | None = None
     fin_rate: str | None = None
-    share: float = 0.05
+    share: float = ACCEPTED_SHARE
 
 
 UNLIMITED = EnvelopeLimits()
@@ -64,7 +65,7 @@ class PlanRequest:
     limiting: EnvelopeLimits = UNLIMITED
     window: float | None = None
     run_up: float = RUN_UP_S
-    rate: float = 20.0
+    rate: float = RATE_HZ
     radius: bool = False
     separate: tuple[str, ...] = ()
     diagnosis: Path | None = None

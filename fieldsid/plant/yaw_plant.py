@@ -187,9 +187,8 @@ def fin_after_step(plant: YawPlant, side: float, command: float) -> tuple[FloatA
 
 def own_moment(parts: Sequence[Effect], values: Mapping[str, float], rate: FloatArray, record: Record) -> FloatArray:
     """Return the moment (k,) rad/s^2 at steady rates (k,) of effects the core does not know, a circle's mean of each."""
-    own = [e for e in parts if e.moment is not None]
     out = np.zeros(rate.size)
-    for effect in own:
+    for effect in parts:
         if effect.moment is None:
             continue
         for i, r in enumerate(rate):

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.plant.laws.regression import CONFIDENCE_LEVEL
 from fieldsid.schedule.controller import Gains, least_damping
 from fieldsid.schedule.linear_plant import LinearPlant
 
 FREQUENCY_GRID_RAD_S = np.geomspace(1e-3, 200.0, 1500)
-HELD_SHARE = 0.95
+HELD_SHARE = CONFIDENCE_LEVEL
 """Share of the draws that a number of the identified set speaks for."""
 
 

@@ -113,6 +113,11 @@ class Schedule(InControl, Plotted):
         return Wish(self.kind, self.damping, self.phase_margin_deg, a.step, a.bandwidth, settling, a.overshoot, a.fin_use)
 
     @property
+    def stated_limits(self) -> FinLimits:
+        """What was said of the fin: what was not is that of the models that the schedule is tried on, varied over their draws."""
+        return FinLimits(*(self.stated.get(name) for name in body_of(FinLimits())))
+
+    @property
     def speeds(self) -> tuple[float, ...]:
         """Speeds of the rows, m/s."""
         return tuple(r.speed for r in self.rows)

@@ -31,7 +31,7 @@ from fieldsid.schedule.flown.response import (
     tightest,
 )
 from fieldsid.schedule.flown.straight_leg import straight_leg
-from fieldsid.schedule.linear_plant import PARTS, FinLimits, LinearPlant
+from fieldsid.schedule.linear_plant import PARTS, LinearPlant
 from fieldsid.schedule.margins import HELD_SHARE, margins, worst_of
 from fieldsid.schedule.plants import Plants, models_plants, plants_of
 from fieldsid.schedule.record import Row, Schedule
@@ -130,14 +130,13 @@ def verify_schedule(
     source: ParameterSource,
     *,
     draws: int = VERIFY_DRAWS,
-    limits: FinLimits | None = None,
     runs: Sequence[Run] = (),
 ) -> Verification:
     """Fly a schedule on the parameters it was made from, with their errors, at its knots and midway between them.
 
     runs are those the models came from: the vehicle in surge, sway and yaw is identified from them, unless that took no gains.
     """
-    of = plants_behind(schedule, source, runs, limits)
+    of = plants_behind(schedule, source, runs)
     places = checked_speeds(schedule)
     plants = [of.family_at(speed, schedule.at(speed).fin_limit, draws, SEED + 10 * i) for i, (speed, _) in enumerate(places)]
     seen, size = of.tightest_flown, schedule.wish.step_of(schedule.axis)
@@ -179,18 +178,18 @@ def verify_schedule(
     )
 
 
-def plants_behind(schedule: Schedule, source: ParameterSource, runs: Sequence[Run], limits: FinLimits | None = None) -> Plants:
+def plants_behind(schedule: Schedule, source: ParameterSource, runs: Sequence[Run]) -> Plants:
     """Return the plants that a schedule is tried on: as it was designed, the vehicle of the models' runs or the models alone."""
-    limits = limits or stated_limits(schedule)
+    limits = schedule.stated_limits
     if schedule.provenance.get("belief_refused", False):
         return models_plants(source, limits, runs)
     return plants_of(source, limits, runs, schedule.provenance.get("length_m"))
 
 
-def promised_step(schedule: Schedule, of: Plants, speed: float, size: float, *, draws: int = VERIFY_DRAWS) -> StepCheck:
+def promised_step(schedule: Schedule, of: Plants, speed: float, size: float) -> StepCheck:
     """Return what a verification says of one step (rad) at one speed (m/s)."""
     limit = schedule.at(speed).fin_limit
-    plant = of.family_at(speed, limit, draws, SEED)
+    plant = of.family_at(speed, limit, VERIFY_DRAWS, SEED)
     flown = _flown_to_rest(plant, schedule.rows, size, pace_of(plant, limit, schedule.wish.step_of(schedule.axis)))
     return _with_what_is_known(_step(flown, size), flown, plant, of.tightest_flown)
 
@@ -212,12 +211,6 @@ def checked_speeds(schedule: Schedule) -> list[tuple[float, bool]]:
     knots = list(schedule.speeds)
     between = [0.5 * (a + b) for a, b in pairwise(knots)]
     return sorted([(s, True) for s in knots] + [(s, False) for s in between])
-
-
-def stated_limits(schedule: Schedule) -> FinLimits:
-    """Return what was said of the fin: what was not is that of the models it is tried on, varied over their draws."""
-    a = schedule.stated
-    return FinLimits(a.get("lag_s"), a.get("delay_s"), a.get("fin_rate_rad_s"), a.get("latency_s"))
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,6 @@ from fieldsid.numerics.arrays import FloatArray
 
 RISE_TIME_CONSTANTS = 2.31
 """ln 10 rounded up, as the paper has it: the time constants to 90 % of the final rate."""
-FIN_ZERO_TOLERANCE = 0.0175
-"""One degree: a fin's zero is not rigged better than that, so a smaller offset is not counted on (nor against)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,19 +35,6 @@ def u_turn(speed: npt.ArrayLike, damping: npt.ArrayLike, authority: npt.ArrayLik
     rate = np.abs(b) * d / a
     time = np.pi / rate + RISE_TIME_CONSTANTS / a
     return UTurn(rate, np.asarray(time), np.asarray(v * time / np.pi), np.asarray(v / rate))
-
-
-def usable_fin(limit: float, offset: float, rate_sign: float, authority_sign: float) -> float:
-    """Return the fin angle (rad, magnitude) a turn has left when the fin's offset delta_r0 is counted in.
-
-    `rate_sign` is +1 for starboard. The fin turns that way at sign(b2) times its limit, and acts as fin + offset.
-    """
-    return limit + rate_sign * authority_sign * offset
-
-
-def counted_offset(offset: float, tolerance: float = FIN_ZERO_TOLERANCE) -> float:
-    """Return the offset, or zero where it is within the tolerance of a fin's zero."""
-    return offset if abs(offset) > tolerance else 0.0
 
 
 def refuse_unstable(damping: float, where: str, hint: str) -> None:

@@ -8,24 +8,19 @@ from dataclasses import replace
 import numpy as np
 
 from fieldsid.errors import ModelError, UsageError
+from fieldsid.logs.doctor.fin_findings import FIN_ZERO
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.several.sifting import Refused
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.plant.remedies import damping_that_holds, in_radians, wider_fin
+from fieldsid.records.check import LARGEST_FIN_RAD
 from fieldsid.turning.believed_rows import believed_rows, doubts_of_draws
 from fieldsid.turning.flown_circles import against_rudder, circles_of, compared_with, turned_against, with_measurement
 from fieldsid.turning.maneuvering.belief import SEED, Belief, believe, not_fitted
 from fieldsid.turning.model_error import DataCoverage, data_coverage, model_error, model_error_draws
-from fieldsid.turning.paper_formulas import (
-    FIN_ZERO_TOLERANCE,
-    counted_offset,
-    refuse_short_fin,
-    refuse_unstable,
-    u_turn,
-    usable_fin,
-)
+from fieldsid.turning.paper_formulas import refuse_short_fin, refuse_unstable, u_turn
 from fieldsid.turning.prediction import SIDES, TurnPrediction, TurnRow, settling_flight
 from fieldsid.turning.steady.blended_turns import BlendedTurns, blended_turns
 from fieldsid.turning.steady.speed_loss import SurgeModel, fit_surge
@@ -45,7 +40,7 @@ def turn_radius(
     measured: Sequence[Run] = (),
     method: str = "auto",
     draws: int = RADIUS_DRAWS,
-    fin_zero: float = FIN_ZERO_TOLERANCE,
+    fin_zero: float = FIN_ZERO,
     unfit: Refused[Run] | None = None,
     length: float | None = None,
 ) -> TurnPrediction:
@@ -221,7 +216,7 @@ def _row(
     simulated = method == "simulated"
     value = _median(radius * spread) if simulated else float(radius[0])
     interval = _interval(radius * spread, value)
-    because = (*coverage.missing, *_doubts(radius, interval, value))
+    because = (*coverage.missing, *doubts_of_draws(value, interval, float(np.mean(~np.isfinite(radius)))))
     return TurnRow(
         speed=float(speed),
         side=side,
@@ -243,12 +238,6 @@ def _row(
     )
 
 
-def _doubts(radius: FloatArray, interval: tuple[float, float], value: float) -> tuple[str, ...]:
-    """Return what the draws themselves say against taking a turn as identified."""
-    unsettled = float(np.mean(~np.isfinite(radius)))
-    return doubts_of_draws(value, interval, unsettled)
-
-
 def _median(draws: FloatArray) -> float:
     """Return the median of the draws that have a settled turn."""
     return float(np.median(draws[np.isfinite(draws)]))
@@ -264,12 +253,10 @@ def _interval(draws: FloatArray, value: float) -> tuple[float, float]:
 
 def _usable(rudder: float, offset: FloatArray, sign: float, fin_zero: float, rng: np.random.Generator) -> FloatArray:
     """Return draws of the usable fin; an offset that is not counted still widens the band to both sides."""
-    nominal = float(offset[0])
-    if counted_offset(nominal, fin_zero) != 0.0:
+    if abs(offset[0]) > fin_zero:
         fin = rudder + sign * offset
-        fin[0] = usable_fin(rudder, nominal, sign, 1.0)
     else:
-        fin = rudder + rng.uniform(-1.0, 1.0, offset.size) * abs(nominal)
+        fin = rudder + rng.uniform(-1.0, 1.0, offset.size) * abs(offset[0])
         fin[0] = rudder
     return np.maximum(fin, 0.05 * rudder)
 
@@ -301,7 +288,7 @@ def _check(source: ParameterSource, speeds: Sequence[float], rudder_max: float, 
         raise UsageError(f"there is no method {method!r}", found=", ".join(METHODS), hint="leave `--method` out")
     if method in ("simulated", "maneuvering") and not source.models:
         raise UsageError("a table cannot be simulated", found="no model", hint="give model files, or `--method u_turn`")
-    if not 0.0 < rudder_max <= 1.5708:
+    if not 0.0 < rudder_max <= LARGEST_FIN_RAD:
         raise UsageError(
             "the rudder held in a turn lies above 0 and at most at 90 deg",
             found=f"--fin-max {rudder_max:g}",

@@ -28,12 +28,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import MappingError
-from fieldsid.logs.run import GOALS, MOTORS, PART, STEP_LINES, Note, signal_of
+from fieldsid.logs.run import COMMANDS, PART, STEP_LINES, Note, signal_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
-
-COMMANDS = frozenset({"rudder_rad", "elevator_rad", *MOTORS}) | GOALS
-"""Signals that stand until the next one."""
 
 ANGLES_AND_RATES = ("yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s", "roll_rad", "roll_rate_rad_s")
 """Signals whose clock the others come to, the first one where rates are equal."""

@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from fieldsid.logs.convert.clock import GAP_FACTOR, Track, straight
 from fieldsid.logs.convert.frames import unwrapped
+from fieldsid.logs.few_of import few_of
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.trapezoid import trapezoid_integral
@@ -39,11 +40,10 @@ NEIGHBOURS = 8
 """Steps on each side that say what the motion is."""
 HELD_S = 1.0
 """A heading held at the wrap comes back to it within this time."""
-AGREES = (0.7, 1.4)
-"""Slopes of the heading's steps on the integrated rate between which the rate is trusted."""
+ALIKE = (0.7, 1.4)
+"""Ratios of what two sensors say of one motion between which they agree: the next unit is further off."""
 RARE = 0.02
 """Share of samples that bend, below which they tell no noise."""
-SHOWN = 5
 
 
 def unwrapped_over(heading: Track, rate: Track | None = None, gap_factor: float = GAP_FACTOR) -> tuple[Track, list[Note]]:
@@ -61,7 +61,7 @@ def unwrapped_over(heading: Track, rate: Track | None = None, gap_factor: float 
 
 
 def _note(times: FloatArray, missing: int) -> Note:
-    places = ", ".join(f"{t:.2f}" for t in times[:SHOWN]) + (", ..." if times.size > SHOWN else "")
+    places = few_of([f"{t:.2f}" for t in times])
     samples = "1 sample was" if times.size == 1 else f"{times.size} samples were"
     now = "now missing" if missing == times.size else "now between their neighbours"
     if 0 < missing < times.size:
@@ -163,7 +163,7 @@ def _swept(time: FloatArray, turned: FloatArray, calm: npt.NDArray[np.intp], rat
         return None
     slope = float(said @ made) / power
     error = float(np.std(made - slope * said)) / math.sqrt(power)
-    return swept if AGREES[0] < slope < AGREES[1] and error < 0.1 else None
+    return swept if ALIKE[0] < slope < ALIKE[1] and error < 0.1 else None
 
 
 def _crossings(path: _Path) -> Iterator[tuple[int, int]]:

@@ -48,7 +48,7 @@ PAIRS = (("yaw_rad", "yaw_rate_rad_s"), ("pitch_rad", "pitch_rate_rad_s"), ("rol
 CONTRADICTING = frozenset({"rate_sign", "unit", "swapped", "unrelated"})
 
 
-def angle_findings(run: Run, stated: Stated, faulty: Container[str] = ()) -> list[Note]:
+def angle_findings(run: Run, stated: Stated, faulty: Container[str]) -> list[Note]:
     """Return the findings on each angle of a run and its rate; `faulty` are the signals of which another fault is known."""
     found: list[Note] = []
     for angle, rate in PAIRS:

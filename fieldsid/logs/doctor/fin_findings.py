@@ -10,7 +10,8 @@ import numpy as np
 from fieldsid.errors import DataError
 from fieldsid.logs.convert.conditioning import blocks_of
 from fieldsid.logs.convert.servo_counts import servo_of
-from fieldsid.logs.doctor.together import together
+from fieldsid.logs.doctor.holes import MOVED
+from fieldsid.logs.doctor.together import SURE, together
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
@@ -18,14 +19,11 @@ WIDEST = 0.8
 """Deflection in rad, 46 deg, that no fin of a vehicle has: the flow leaves it at half of that."""
 BEYOND = math.pi
 """Deflection in rad that no fin, rudder or turning thruster reaches: such numbers are in another unit."""
-LARGE = 0.25
-"""Share of a fin's range from which on a change is a step."""
-ALONE_S = 1.5
-"""How long before a step the fin must have been still, for what moves then to be the step's."""
 BEFORE_S, AFTER_S = 0.5, 1.0
+"""Times over which what moves before a step is set against what moves after it: so long the fin must have been still before,
+for the last step's answer to be over."""
 EARLY = 0.15
 """Share of the answer to a step that may come before it, by what is left of the motion before."""
-SPREADS = 4.0
 FEWEST = 5
 ROLLED = math.acos(0.9)
 """Roll in rad from which on the rate about the body's axis is a tenth off that of the heading: r = psi' cos(phi)."""
@@ -84,7 +82,7 @@ def _early(run: Run, fin: str, rate: str) -> list[Note]:
     error = float(np.std(before, ddof=1)) / math.sqrt(at.size)
     share = float(np.mean(before)) / whole if whole != 0.0 else 0.0
     of_whole = float(np.std(before + after, ddof=1)) / math.sqrt(at.size)
-    is_clear = abs(float(np.mean(before))) > SPREADS * error and abs(whole) > SPREADS * of_whole
+    is_clear = abs(float(np.mean(before))) > SURE * error and abs(whole) > SURE * of_whole
     if not is_clear or share <= EARLY:
         return []
     message = (
@@ -101,7 +99,7 @@ def _steps(time: FloatArray, fin: FloatArray) -> tuple[FloatArray, FloatArray]:
     if not moved.size:
         return np.zeros(0), np.zeros(0)
     still = np.diff(time[moved + 1], prepend=time[0])
-    kept = moved[(np.abs(change[moved]) > LARGE * float(np.ptp(fin))) & (still > ALONE_S)]
+    kept = moved[(np.abs(change[moved]) > MOVED * float(np.ptp(fin))) & (still > AFTER_S + BEFORE_S)]
     return time[kept], change[kept]
 
 
@@ -130,7 +128,8 @@ def _upright(time: FloatArray, roll: FloatArray) -> str:
 BEYOND_SHARE = 0.05
 """Share of a run in which a command may be beyond the fin's limit."""
 FIN_ZERO = 0.0175
-"""How far off the zero of a fin may be, in rad: commands about a trim reach so far beyond the limit."""
+"""One degree, in rad: a fin's zero is not rigged better. Commands about a trim reach so far beyond the limit; a smaller offset
+is not counted on, nor against."""
 
 
 def limit_findings(run: Run, fin_max_rad: Mapping[str, float]) -> list[Note]:

@@ -1,6 +1,6 @@
 """Holes in a fin's log that hide a move: what the fin did meanwhile nobody knows, and a fit that takes it as held is wrong.
 
-A log with a usual step has a hole where the next sample comes more than GAP steps later, whether the other signals go on
+A log with a usual step has a hole where the next sample comes more than OWN_STEPS steps later, whether the other signals go on
 or not; a command that is published when it changes has none. Where the fin is at another angle after a hole the run is cut
 there, and the part in which the fin moves most is used.
 """
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldsid.logs.convert.conditioning import OWN_STEPS
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
@@ -19,10 +20,8 @@ JITTER = 0.35
 """Share of the usual step within which steps differ by the clock's jitter, not by a sample that is missing."""
 REGULAR = 0.9
 """Share of the steps that are the usual one, but for jitter, from which on a longer one has lost samples."""
-GAP = 5.0
-"""Steps from which on samples that are missing are a hole."""
 MOVED = 0.25
-"""Share of the fin's range from which on a change over a hole is a move; less is held, or taken as half way."""
+"""Share of the fin's range from which on a change is a move; over a hole less is held, or taken as half way."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +54,7 @@ def holes_of(time: FloatArray, fin: FloatArray) -> tuple[Hole, ...]:
     usual = usual_step(steps)
     if usual is None:
         return ()
-    places = np.flatnonzero(steps > GAP * usual)
+    places = np.flatnonzero(steps > OWN_STEPS * usual)
     return tuple(
         Hole(float(time[i]), float(time[j]), float(fin[i]), float(fin[j]))
         for i, j in ((seen[p], seen[p + 1]) for p in places.tolist())

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldsid.logs.convert.heading_unwrap import ALIKE
 from fieldsid.logs.convert.units import UNIT_LIMIT, factor_to, unit_of_ratio
 from fieldsid.logs.doctor.angle_and_rate import LAG_S, TRUSTED
 from fieldsid.logs.doctor.stated import Stated
-from fieldsid.logs.doctor.together import FEWEST, over, together, width_of
+from fieldsid.logs.doctor.together import FEWEST, SURE, over, together, width_of
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.shifted_correlation import lag_of, slope_of
@@ -121,19 +122,17 @@ ALL_BUT = 0.95
 RATIO = 2.0
 """How much further than the heading the course may turn: a hull that slides in a turn turns as far as its course in the end."""
 FEWEST_MOVED = 20
-LEAST_DIVE, MOST_DIVE = 0.7, 1.4
+LEAST_DIVE, MOST_DIVE = ALIKE
 """How many times what speed and pitch say a depth may change: a heave lies between."""
 DEPTHS = {unit: factor_to("depth_m", unit) for unit in ("ft", "fathom", "cm", "mm")}
 """Units in which a depth is logged, in m."""
 HEADINGS = {"deg": math.degrees(1.0), "rad": math.radians(1.0)}
 """Units in which a heading is that was taken for the other one, by how many times as far it turns."""
-SPREADS = 4.0
-"""Standard deviations by which a correlation must be off zero, by Fisher's z = atanh(r) over windows that share no sample."""
 
 
-def course_findings(run: Run, stated: Stated | None = None) -> list[Note]:
+def course_findings(run: Run, stated: Stated) -> list[Note]:
     """Return the findings on the course and the slope of the way of a run."""
-    return [*_course(run), *_dive(run, stated or Stated())]
+    return [*_course(run), *_dive(run, stated)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,7 +242,8 @@ def _dived(run: Run) -> tuple[float, float] | None:
         return None
     time, depth, pitch, surge = seen
     made, wanted = over(depth, width), over(trapezoid_integral(time, -surge * np.sin(pitch)), width)
-    enough = math.atanh(TRUSTED) * math.sqrt(max(made.size / width - 3.0, 0.0)) >= SPREADS
+    # Fisher's z = atanh(r), over windows that share no sample
+    enough = math.atanh(TRUSTED) * math.sqrt(max(made.size / width - 3.0, 0.0)) >= SURE
     if not enough or float(np.ptp(made)) == 0.0 or float(np.ptp(wanted)) == 0.0:
         return None
     return float(np.corrcoef(made, wanted)[0, 1]), float(np.std(made) / np.std(wanted))

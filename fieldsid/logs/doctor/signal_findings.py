@@ -10,10 +10,9 @@ from fieldsid.logs.convert.servo_counts import servo_of
 from fieldsid.logs.doctor.holes import usual_step
 from fieldsid.logs.doctor.pair_findings import goes_with_way
 from fieldsid.logs.doctor.stated import Stated
-from fieldsid.logs.run import FINS, GOALS, MOTORS, SIGNALS, Note, Run
+from fieldsid.logs.run import FINS, GOALS, MEASURED, MOTORS, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
-MEASURED = frozenset(SIGNALS) - {*MOTORS, "rudder_rad", "elevator_rad"} - GOALS
 FITTED = frozenset({"yaw_rad", "pitch_rad", "yaw_rate_rad_s", "pitch_rate_rad_s"})
 """What the free run is fitted to."""
 MISSING_LIMIT = 0.05

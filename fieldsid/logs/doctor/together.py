@@ -12,6 +12,8 @@ from fieldsid.numerics.arrays import FloatArray
 
 FEWEST = 50
 """Samples, or windows, from which on signals are compared."""
+SURE = 4.0
+"""Standard errors from which on a difference is no chance: 16,000 of noise alone make one."""
 Number = TypeVar("Number", np.float64, np.complex128)
 
 

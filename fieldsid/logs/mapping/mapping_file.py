@@ -138,9 +138,9 @@ def load_mapping(path: Path) -> ChannelMap:
     return _channel_map(read_model(_File, path, error=MappingError), f"`{path}`", path)
 
 
-def mapping_of(body: Mapping[str, Any], *, place: str = "the mapping") -> ChannelMap:
+def mapping_of(body: Mapping[str, Any]) -> ChannelMap:
     """Return a mapping given as the keys of mapping.yaml; raises MappingError."""
-    return _channel_map(validated(_File, body, place=place, error=MappingError), place, None)
+    return _channel_map(validated(_File, body, place="the mapping", error=MappingError), "the mapping", None)
 
 
 def _refuse(place: str, *faults: tuple[object, str, object, str]) -> None:

@@ -99,7 +99,7 @@ def tried(log: Log, body: dict[str, Any], defined: frozenset[str]) -> Proposal:
 ANGLES_BESIDE = (*FINS, "pitch_rad", "roll_rad")
 
 
-def mended(body: dict[str, Any], run: Run, findings: Iterable[Note], by_size: Container[str] = ()) -> list[Note]:
+def mended(body: dict[str, Any], run: Run, findings: Iterable[Note], by_size: Container[str]) -> list[Note]:
     """Set in a mapping's body what findings on the run it gives say; return what was set and why, none where nothing was.
 
     `by_size` holds the signals that were taken for degrees because their numbers are large.

@@ -15,6 +15,7 @@ from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ATTITUDE, COMBINED, ChannelMap, Source
 from fieldsid.logs.convert.number_cells import as_numbers
 from fieldsid.logs.convert.times.time_column import seconds_of, seconds_of_parts
+from fieldsid.logs.few_of import few_of
 from fieldsid.logs.mapping.canonical_names import Canonical, canonical, unit_in_name, words_of
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
@@ -291,5 +292,4 @@ def _ignored(columns: Columns, mapping: ChannelMap) -> list[Note]:
     extra = [name for i, name in enumerate(columns.names) if i not in used]
     if not extra:
         return []
-    shown = ", ".join(extra[:6]) + (", ..." if len(extra) > 6 else "")
-    return [Note("ignored_columns", f"columns that are not used: {shown}", {"columns": extra})]
+    return [Note("ignored_columns", f"columns that are not used: {few_of(extra)}", {"columns": extra})]

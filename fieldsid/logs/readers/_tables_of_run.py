@@ -13,6 +13,7 @@ from shlex import quote
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import TableForm
+from fieldsid.logs.few_of import few_of
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import check_readable
@@ -63,8 +64,7 @@ def tables_beside(path: Path) -> list[Note]:
     if not others:
         return []
     files = quote(str(path.parent)) if len(runs) == 1 else " ".join(["--join", *(quote(str(p)) for p in own)])
-    shown = ", ".join(p.name for p in others[:6]) + (", ..." if len(others) > 6 else "")
-    message = f"beside it lie {shown}: where they are of the same run, `sysid inspect {files}`"
+    message = f"beside it lie {few_of([p.name for p in others])}: where they are of the same run, `sysid inspect {files}`"
     return [Note("tables_beside", message, {"tables": [str(p) for p in others]})]
 
 

@@ -21,7 +21,7 @@ OTHER_UNITS = frozenset({
 """Units of what is no signal here, as rows of units state them."""
 
 
-OTHER_SEPARATORS = ("\t", ";", ",", "|", "whitespace")
+SEPARATORS = ("\t", ";", ",", "|", "whitespace")
 _RULE = re.compile(r"^[\s|+:=-]*[-=]{2,}[\s|+:=-]*$")
 """A line drawn below the names."""
 
@@ -87,7 +87,7 @@ def _names(line: str, separator: str, width: int) -> tuple[str, ...]:
 
 def _otherwise(line: str, separator: str, width: int) -> list[str]:
     """Return the words of a line above a table that are parted otherwise than its rows, where they name signals or units."""
-    for other in OTHER_SEPARATORS:
+    for other in SEPARATORS:
         words = cells(line, other) if other != separator else []
         if len(words) == width and (_state_units(tuple(words)) or sum(meaning_of(w) is not None for w in words) > 1):
             return words
@@ -100,7 +100,6 @@ def _are_units(line: str, separator: str, width: int) -> bool:
     return len(parts) == width and all(p == "" or (p[:1] in "[(" and p[-1:] in "])") for p in parts)
 
 
-SEPARATORS = ("\t", ";", ",", "|", "whitespace")
 LOOKED_AT = 400
 """Lines at the start of a file among which the first row of numbers must be."""
 AGREEING = 20

@@ -15,6 +15,7 @@ import numpy as np
 
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import COMBINED, ChannelMap, Source, TableForm
+from fieldsid.logs.few_of import few_of
 from fieldsid.logs.mapping.canonical_names import unit_of_field
 from fieldsid.logs.reader import (
     DEFINED,
@@ -36,8 +37,8 @@ from fieldsid.registry import near
 
 DATA = "data"
 """Field of a topic that is one number."""
-SHOWN = 12
-"""Topics that a message names."""
+MOST_DEVICES = 32
+"""Numbers of servos, motors and the like in one kind of message or table; more are no numbers of devices."""
 Means = Mapping[str, tuple[str, Mapping[str, Any]]]
 """What a format's own definition says: by `topic.field`, the signal and how a mapping reads it."""
 
@@ -168,7 +169,7 @@ def topic_name(path: Path, what: str, topics: Collection[str], signal: str, sour
     if source.topic not in topics:
         raise MappingError(
             f"`{path}` has no topic `{source.topic}` for `{signal}`",
-            found=", ".join(sorted(topics)[:SHOWN]) or "no topics",
+            found=few_of(sorted(topics)) or "no topics",
             hint=near(source.topic, list(topics)),
             signal=signal,
         )

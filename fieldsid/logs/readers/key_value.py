@@ -24,7 +24,7 @@ from fieldsid.logs.readers._cells import cells, is_word
 from fieldsid.logs.readers._clock import unit_by_size
 from fieldsid.logs.readers._columns import Columns
 from fieldsid.logs.readers._plain_text import HEAD, plain_text
-from fieldsid.logs.readers._text import Form, form_of
+from fieldsid.logs.readers._text import LOOKED_AT, Form, form_of
 from fieldsid.logs.readers._topics import DATA, Topic, Topics, topic_of, topic_reader
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
@@ -32,7 +32,6 @@ from fieldsid.numerics.arrays import FloatArray
 KEYS = frozenset({"key", "name", "variable", "signal", "topic", "field", "channel", "parameter", "path", "tag", "entry"})
 VALUES = frozenset({"value", "val", "data", "reading"})
 """Words of the column that says what was read, and of that which holds it."""
-LOOKED_AT = 200
 FEWEST, OFTEN = 2, 3
 """Keys that there must be, and how often one returns on the average."""
 
@@ -77,8 +76,7 @@ def _places(form: Form, head: str) -> _Places | None:
 def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
     """Return the keys whose values are numbers as topics of one number, in the order of their times."""
     with csv_table.opened(path, TableForm(), options) as table:
-        with plain_text(path, limit=HEAD) as text:
-            places = _places(table.form, text.head())
+        places = _places(table.form, table.text.head())
         if places is None:
             raise LogError(f"`{path}` is no table of keys and values", found=", ".join(table.form.names), hint="name its columns")
         columns = table.columns((places.time, places.key, places.value))

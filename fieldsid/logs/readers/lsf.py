@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from fieldsid.errors import LogError
 from fieldsid.logs.reader import ReadOptions
-from fieldsid.logs.readers._topics import Means, Topic, Topics, topic_of, topic_reader
+from fieldsid.logs.readers._topics import MOST_DEVICES, Means, Topic, Topics, topic_of, topic_reader
 from fieldsid.logs.readers._unpacked import GZIP, inflated
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN, head_of, imc_order
@@ -84,8 +84,6 @@ def _numbers_of(message: ET.Element) -> tuple[tuple[str, str], ...]:
 
 
 HEADER, FOOTER = 20, 2
-MOST_IDS = 32
-"""Numbers of servos, motors and the like in one kind of message; more are no numbers of devices."""
 _STATE = {
     "psi": ("yaw_rad", "rad"), "theta": ("pitch_rad", "rad"), "phi": ("roll_rad", "rad"), "r": ("yaw_rate_rad_s", "rad/s"),
     "q": ("pitch_rate_rad_s", "rad/s"), "p": ("roll_rate_rad_s", "rad/s"), "u": ("surge_m_s", "m/s"), "v": ("sway_m_s", "m/s"),
@@ -216,7 +214,7 @@ def _named(
         time = np.concatenate([t for t, _ in blocks])
         fields = {n: np.concatenate([f[n] for _, f in blocks]) for n in blocks[0][1]}
         devices = np.unique(fields["id"]) if "id" in fields else np.zeros(0)
-        if not 1 < devices.size <= MOST_IDS:
+        if not 1 < devices.size <= MOST_DEVICES:
             yield name, topic_of(time, fields)
             continue
         for device in devices:

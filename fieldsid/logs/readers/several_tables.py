@@ -18,6 +18,7 @@ import numpy.typing as npt
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ATTITUDE, ChannelMap, TableForm
 from fieldsid.logs.convert.times.time_column import EPOCH_FROM_S
+from fieldsid.logs.few_of import few_of
 from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.guesses import quaternion_of
 from fieldsid.logs.reader import JOINED, TABLE, Inventory, RawLog, Reader, ReadOptions, reader_of
@@ -25,7 +26,7 @@ from fieldsid.logs.readers import csv_table, parquet
 from fieldsid.logs.readers._clock import Clock, clock_of
 from fieldsid.logs.readers._columns import Columns, numbers_mostly
 from fieldsid.logs.readers._tables_of_run import names_in_run, run_of, runs_in
-from fieldsid.logs.readers._topics import Means, Topic, Topics, inventory_of, raw_log_of, topic_of, wanted_by
+from fieldsid.logs.readers._topics import MOST_DEVICES, Means, Topic, Topics, inventory_of, raw_log_of, topic_of, wanted_by
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import name_of_run
 from fieldsid.numerics.arrays import FloatArray
@@ -95,7 +96,7 @@ def _parts(
         notes += said
         without += [] if found else [file.name]
         options.progress((i + 1) / len(chosen))
-    message = f"tables without a clock that is known, left out: {', '.join(without[:6])}{', ...' if len(without) > 6 else ''}"
+    message = f"tables without a clock that is known, left out: {few_of(without)}"
     return parts, (*notes, *([Note("no_clock", message, {"tables": without})] if without else []))
 
 
@@ -198,7 +199,6 @@ READER = Reader(
 
 CALLED = frozenset({"id", "device", "instance", "servo", "channel", "fin", "motor", "actuator", "thruster", "number", "no", "nr"})
 """Words of a column that tells the device."""
-MOST_DEVICES = 32
 IN_TURN = 0.5
 """Share of the rows that are another device's than the one before."""
 

@@ -7,11 +7,11 @@ that still moves is a way of flying.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from fieldsid.logs.convert.conditioning import MAIN, OWN_STEPS, blocks_of
+from fieldsid.logs.doctor.pair_findings import SLOWEST
+from fieldsid.logs.few_of import few_of
 from fieldsid.logs.run import MOTORS, Note, Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
@@ -21,29 +21,18 @@ LEAST_S = 20.0
 """A stretch shorter than this is none."""
 IDLE = 0.15
 """Share of the usual speed below which no way is made."""
-LEAST_SPEED = 0.1
-"""Usual speed in m/s below which a log tells nothing by it."""
 DIVES_M, DIVES = 1.0, 0.2
 """Depth in m, and share of the log below it, from which on a log is one of dives."""
 SURFACE_M = 0.3
 
 
-@dataclass(frozen=True, slots=True)
-class Stretch:
-    """A part of a log in s."""
-
-    start_s: float
-    end_s: float
-
-    @property
-    def part(self) -> tuple[float, float]:
-        """Its times in s, as `load_run` takes them."""
-        return self.start_s, self.end_s
+Part = tuple[float, float]
+"""Start and end of a stretch in s, as `load_run` takes them."""
 
 
-def stretches_of(run: Run) -> tuple[tuple[Stretch, ...], tuple[Note, ...]]:
+def stretches_of(run: Run) -> tuple[tuple[Part, ...], tuple[Note, ...]]:
     """Return the stretches of a run under way, and notes on what lies outside of them; the whole run where there is none else."""
-    whole = (Stretch(float(run.time[0]), float(run.time[-1])),)
+    whole = ((float(run.time[0]), float(run.time[-1])),)
     reasons = {
         "no way is made": _idle(run),
         "at the surface": _at_surface(run),
@@ -53,19 +42,20 @@ def stretches_of(run: Run) -> tuple[tuple[Stretch, ...], tuple[Note, ...]]:
     away = np.any(np.stack(list(off.values())), axis=0)
     breaks = np.flatnonzero((np.diff(run.time) > max(OFF_S, OWN_STEPS * float(np.median(np.diff(run.time))))) | np.diff(away)) + 1
     parts = [p for p in np.split(np.arange(run.time.size), breaks) if not away[p[0]]]
-    kept = tuple(s for p in parts if (s := Stretch(float(run.time[p[0]]), float(run.time[p[-1]]))).end_s - s.start_s >= LEAST_S)
+    found = ((float(run.time[p[0]]), float(run.time[p[-1]])) for p in parts)
+    kept = tuple((start, end) for start, end in found if end - start >= LEAST_S)
     if not kept or kept == whole:
         return whole, ()
     return kept, (_note(run, kept, off),)
 
 
-def _note(run: Run, kept: tuple[Stretch, ...], off: dict[str, BoolArray]) -> Note:
+def _note(run: Run, kept: tuple[Part, ...], off: dict[str, BoolArray]) -> Note:
     whys = [f"{why} ({_seconds(run.time, mask):.0f} s)" for why, mask in off.items() if mask.any()]
-    shown = ", ".join(f"{s.start_s:.2f} .. {s.end_s:.2f} s" for s in kept[:6]) + (", ..." if len(kept) > 6 else "")
-    left = float(run.time[-1] - run.time[0]) - sum(s.end_s - s.start_s for s in kept)
+    shown = few_of([f"{start:.2f} .. {end:.2f} s" for start, end in kept])
+    left = float(run.time[-1] - run.time[0]) - sum(end - start for start, end in kept)
     reasons = "; ".join(whys) or "gaps of the log"
     message = f"under way {shown}; {left:.0f} s are left out: {reasons}; `--whole` keeps them"
-    data = {"stretches": [list(s.part) for s in kept], "left_out_s": left}
+    data = {"stretches": [list(part) for part in kept], "left_out_s": left}
     return Note("stretches", message, data)
 
 
@@ -75,7 +65,7 @@ def _seconds(time: FloatArray, mask: BoolArray) -> float:
 
 def _idle(run: Run) -> BoolArray:
     """Where no way is made and the motor, if it is in the log, is off."""
-    speed = _speed(run)
+    speed = np.abs(run["surge_m_s"]) if run.has("surge_m_s") else None
     motor = next((run[m] for m in MOTORS if run.has(m)), None)
     off = np.zeros(run.time.size, dtype=np.bool_)
     if motor is not None:
@@ -83,14 +73,10 @@ def _idle(run: Run) -> BoolArray:
         off = np.abs(motor) <= 0.02 * full if full > 0.0 else off
         off &= np.isfinite(motor)
     usual = float(np.nanpercentile(speed, 75)) if speed is not None else 0.0
-    if speed is None or usual < LEAST_SPEED:
+    if speed is None or usual < SLOWEST:
         return off
     still = np.isfinite(speed) & (speed < IDLE * usual)
     return still & off if motor is not None and off.any() else still
-
-
-def _speed(run: Run) -> FloatArray | None:
-    return np.abs(run["surge_m_s"]) if run.has("surge_m_s") else None
 
 
 def _at_surface(run: Run) -> BoolArray:

@@ -16,21 +16,19 @@ from fieldsid.planning.belief.prior_model import draws_of, scales_of
 from fieldsid.planning.design.information import information_of
 from fieldsid.planning.design.leg import Expected, Leg, turn_back_s
 from fieldsid.planning.design.objective import Objective, make_objective
-from fieldsid.planning.design.optimise import Scored, SearchEffort, as_switched, catalogue, largest_paying, switching
+from fieldsid.planning.design.optimise import SMALLEST, Scored, as_switched, catalogue, largest_paying, switching
 from fieldsid.planning.flight.excitation import Excitation, Window, fits, flown
 from fieldsid.planning.flight.operating_point import operating_point
 from fieldsid.planning.flight.rule_flight import fly_operating_points
 from fieldsid.planning.safety.envelope import Envelope
 from fieldsid.planning.safety.monte_carlo import Ensemble, draw_ensemble, fly_ensemble, fly_list
 
-DESIGN_PROBABILITY_SHARE, CHANCE_PROBABILITY_SHARE = 0.7, 0.75
-"""A plan aims at these parts of the accepted probability, so that other draws of the prior keep to it as well."""
+DESIGN_PROBABILITY_SHARE = 0.7
+"""A plan aims at this part of the accepted probability, so that other draws of the prior keep to it as well."""
 COARSE_DRAWS, DRAWS, ERROR_DRAWS = 200, 500, 12
 FINALISTS = 3
-SMALLEST = 0.02
 RUN_UP_S = 10.0
 """Straight run before the window of each leg, unless another is asked for."""
-EFFORT = SearchEffort(20, 12, 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +42,6 @@ class Setting:
     run_up_s: float = RUN_UP_S
     seed: int = 1
     open_loop: bool = False
-    effort: SearchEffort = EFFORT
 
 
 def best_leg(setting: Setting, speed: float, known: Sequence[Excitation] = ()) -> Leg:
@@ -58,10 +55,10 @@ def best_leg(setting: Setting, speed: float, known: Sequence[Excitation] = ()) -
     straight = fly_list(crowd.first(COARSE_DRAWS), np.zeros(0), judge.envelope, judge.autopilot, judge.run_up)
     if np.mean(straight.outside(judge.envelope)) > setting.envelope.share:
         raise _nothing_inside(judge)  # as the autopilot steers straight on
-    scored = _known_again(judge, known) if known else catalogue(judge, setting.effort)
+    scored = _known_again(judge, known) if known else catalogue(judge)
     scored = [s for s in scored if s.candidate.record.rule is None or not setting.open_loop]
     seeds = [s for s in (as_switched(judge, c.candidate) for c in scored) if s is not None]
-    scored.append(switching(judge, seeds, setting.effort, setting.seed))
+    scored.append(switching(judge, seeds, setting.seed))
     scored.sort(key=lambda s: s.cost)
     leg = _best_of(judge, setting, crowd, scored)
     if not leg.flown_from_list_in(setting.envelope):
@@ -72,12 +69,13 @@ def best_leg(setting: Setting, speed: float, known: Sequence[Excitation] = ()) -
 
 def _best_of(judge: Objective, setting: Setting, crowd: Ensemble, scored: Sequence[Scored]) -> Leg:
     """Return the leg of the best of some maneuvers, best first, at the angles at which it stays inside; raises UsageError."""
-    kept = (enforce_envelope(judge, setting, crowd, s.candidate) for s in scored)
+    few = crowd.first(COARSE_DRAWS)
+    kept = (enforce_envelope(judge, setting, few, s.candidate) for s in scored)
     finalists = islice((c for c in kept if c is not None), FINALISTS)
     inside = [Scored(c, judge.cost(c, margin=10.0)) for c in finalists]
-    if not inside:
+    best = enforce_envelope(judge, setting, crowd, min(inside, key=lambda s: s.cost).candidate) if inside else None
+    if best is None:
         raise _nothing_inside(judge)
-    best = enforce_chance_constraint(judge, setting, crowd, min(inside, key=lambda s: s.cost).candidate)
     return leg_of(judge, setting, best, crowd)
 
 
@@ -185,34 +183,20 @@ def _known_again(judge: Objective, known: Sequence[Excitation]) -> list[Scored]:
 
 
 def enforce_envelope(judge: Objective, setting: Setting, crowd: Ensemble, candidate: Excitation) -> Excitation | None:
-    """Return the candidate with its angles lowered until the envelope is kept often enough, None where none is."""
-    share, high = 1.0, setting.envelope.share * DESIGN_PROBABILITY_SHARE
-    low_share, high_share, few = 0.0, 1.0, crowd.first(COARSE_DRAWS)
-    trial: Excitation | None = candidate
+    """Return the candidate with its angles lowered until enough of the draws keep the envelope, None where none is inside."""
+    share, inside, outside = 1.0, 0.0, 1.0
     for step in range(7):
         trial = lowered(candidate, share)
         if trial is None:
             break
-        risk, _ = risk_of(judge, few, trial)
-        if risk <= high:
-            low_share = share
+        if risk_of(judge, crowd, trial)[0] <= setting.envelope.share * DESIGN_PROBABILITY_SHARE:
+            inside = share
             if share == 1.0:
                 break
         else:
-            high_share = share
-        share = 0.5 * (low_share + high_share) if low_share > 0 or step > 2 else share * 0.7
-    return lowered(candidate, low_share) if low_share > 0 else None
-
-
-def enforce_chance_constraint(judge: Objective, setting: Setting, crowd: Ensemble, candidate: Excitation) -> Excitation:
-    """Return the candidate lowered in small steps until many more draws of the prior agree."""
-    for _ in range(8):
-        risk, _ = risk_of(judge, crowd, candidate)
-        smaller = lowered(candidate, 0.94)
-        if risk <= CHANCE_PROBABILITY_SHARE * setting.envelope.share or smaller is None:
-            break
-        candidate = smaller
-    return candidate
+            outside = share
+        share = 0.5 * (inside + outside) if inside > 0 or step > 2 else share * 0.7
+    return lowered(candidate, inside) if inside > 0 else None
 
 
 def lowered(candidate: Excitation, share: float) -> Excitation | None:

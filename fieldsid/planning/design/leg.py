@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -19,10 +20,8 @@ from fieldsid.rounding import number
 
 CIRCLE = "turn radius"
 """The purpose of a leg that is a circle."""
-TURN_LAG = 2.31
-"""Time constants a turn needs to settle: ln 10 (the paper's u-turn)."""
-
-
+TURN_LAG = math.log(10.0)
+"""Time constants to 90 % of a turn's rate (the paper's u-turn)."""
 LARGEST_SHARE = 0.5
 """Share of a value that its standard error may be before the value may as well be zero."""
 

@@ -14,7 +14,7 @@ from fieldsid.planning.belief.prior_model import corner, scales_of
 from fieldsid.planning.design.information import Information, information_of
 from fieldsid.planning.flight.excitation import Excitation, Window, flown, flown_all
 from fieldsid.planning.flight.operating_point import OperatingPoint, autopilot_of, operating_point
-from fieldsid.planning.safety.envelope import Envelope, excursion_of, used
+from fieldsid.planning.safety.envelope import Envelope, excursions_of, used
 from fieldsid.planning.safety.monte_carlo import ROLL_SPREAD
 
 CORNER = 1.3
@@ -45,13 +45,14 @@ class Objective:
 
     def cost(self, candidate: Excitation, margin: float = 1.0) -> float:
         """Return the mean log of the worst weighted error over the scenes, plus a penalty outside margin x envelope."""
-        total, most = 0.0, 0.0
         responses = flown_all(self.scenes, candidate, self.window, self.envelope.limits, self.autopilot)
-        for scene, response in zip(self.scenes, responses, strict=True):
-            excursion = excursion_of(scene.axis, response, scene.speed, run_up=self.run_up, roll_gain=1.0 + ROLL_SPREAD)
-            most = max(most, used(excursion.over(self.envelope)))
-            total += np.log(self.worst(information_of(scene, response)))
-        return float(total / len(self.scenes) + PENALTY * max(0.0, most / margin - 1.0))
+        angle, rate = (np.stack([getattr(r, part) for r in responses], axis=1) for part in ("angle", "rate"))
+        far = excursions_of(
+            self.scene.axis, angle, rate, speed=self.scene.speed, step=1.0 / self.window.rate_hz, run_up=self.run_up,
+            roll_gain=1.0 + ROLL_SPREAD,
+        )  # fmt: skip
+        errors = [self.worst(information_of(scene, response)) for scene, response in zip(self.scenes, responses, strict=True)]
+        return float(np.mean(np.log(errors)) + PENALTY * max(0.0, np.max(used(far, self.envelope)) / margin - 1.0))
 
     def worst(self, information: Information) -> float:
         """Return the largest weighted error of an information."""

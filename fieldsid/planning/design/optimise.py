@@ -21,6 +21,9 @@ LEFT_OUT = ("switched", "turning_circle")
 """Searched apart; a full circle is flown for the radius, not for parameters."""
 STEP_FACTOR = 1.35
 SHORTEST_HOLD_S = 0.25
+MEMBERS, ROUNDS, PATTERN_ROUNDS = 20, 12, 2
+SMALLEST = 0.02
+"""Of an amplitude, over the fin limit."""
 DIFFERENTIAL_WEIGHT, CROSSOVER_SHARE = 0.7, 0.8
 """Step of the coordinate search, as a factor; shortest hold; differential weight and crossover share."""
 SEARCH_MARGIN = 0.9
@@ -36,17 +39,7 @@ class Scored:
     cost: float
 
 
-@dataclass(frozen=True, slots=True)
-class SearchEffort:
-    """How long to search: members and rounds of the evolution, rounds of the pattern search, rounds per catalogued one."""
-
-    members: int = 24
-    rounds: int = 22
-    pattern: int = 3
-    catalogue: int = 1
-
-
-def catalogue(judge: Objective, effort: SearchEffort) -> list[Scored]:
+def catalogue(judge: Objective) -> list[Scored]:
     """Return every maneuver of the catalogue that fits the window, tuned, best first."""
     found = []
     for maneuver in all_maneuvers().values():
@@ -54,11 +47,11 @@ def catalogue(judge: Objective, effort: SearchEffort) -> list[Scored]:
             continue
         start = _started(maneuver, judge)
         if start is not None:
-            found.append(_coordinate_search(judge, start, effort.catalogue))
+            found.append(_coordinate_search(judge, start))
     return sorted(found, key=lambda s: s.cost)
 
 
-def switching(judge: Objective, seeds: list[Excitation], effort: SearchEffort, seed: int) -> Scored:
+def switching(judge: Objective, seeds: list[Excitation], seed: int) -> Scored:
     """Return the best switched signal found from some seeds, which take part themselves, its holds in whole samples."""
     rng = np.random.default_rng(seed)
     base = pick_maneuver("switched")
@@ -72,12 +65,12 @@ def switching(judge: Objective, seeds: list[Excitation], effort: SearchEffort, s
         return judge.cost(candidate(x), margin=SEARCH_MARGIN)
 
     room = judge.window.excitation
-    members = _population(judge, seeds, room, effort.members, rng)
+    members = _population(judge, seeds, room, rng)
     costs = np.array([cost(m) for m in members])
-    for _ in range(effort.rounds):
+    for _ in range(ROUNDS):
         _evolve(members, costs, cost, room, rng)
     best = int(np.argmin(costs))
-    x, _ = _pattern_search(members[best], float(costs[best]), cost, room, effort.pattern)
+    x, _ = _pattern_search(members[best], float(costs[best]), cost, room)
     tidy = candidate(np.append(merge_short_holds(x[:COUNT], 1.0 / judge.window.rate_hz), x[COUNT]))
     return Scored(tidy, judge.cost(tidy))
 
@@ -97,12 +90,12 @@ def merge_short_holds(holds: FloatArray, step: float) -> FloatArray:
     return np.round(np.pad(left, (0, holds.size - len(left))), 9)
 
 
-def _population(judge: Objective, seeds: list[Excitation], room: float, count: int, rng: np.random.Generator) -> FloatArray:
-    """Return members (count, COUNT + 1): holds in s and amplitude over the fin limit."""
+def _population(judge: Objective, seeds: list[Excitation], room: float, rng: np.random.Generator) -> FloatArray:
+    """Return members (MEMBERS, COUNT + 1): holds in s and amplitude over the fin limit."""
     scale = 1.0 / max(judge.scene.base.damping, 0.3)
-    holds = np.exp(rng.normal(np.log(2.0 * scale), 0.6, (count, COUNT)))
-    members = np.column_stack([holds, rng.uniform(0.5, 1.0, count)])
-    for i, one in enumerate(seeds[: count // 2]):
+    holds = np.exp(rng.normal(np.log(2.0 * scale), 0.6, (MEMBERS, COUNT)))
+    members = np.column_stack([holds, rng.uniform(0.5, 1.0, MEMBERS)])
+    for i, one in enumerate(seeds[: MEMBERS // 2]):
         members[i] = [*(one.parameters[h] for h in HOLDS), one.parameters["amplitude"] / judge.envelope.fin]
     return _legal(members, room)
 
@@ -125,9 +118,9 @@ def as_switched(judge: Objective, candidate: Excitation) -> Excitation | None:
 
 
 def _legal(members: FloatArray, room: float) -> FloatArray:
-    """Return members with holds that fit the room and an amplitude in (0.02, 1]."""
+    """Return members with holds that fit the room and an amplitude from SMALLEST on."""
     out = np.abs(members)
-    out[..., COUNT] = np.clip(out[..., COUNT], 0.02, 1.0)
+    out[..., COUNT] = np.clip(out[..., COUNT], SMALLEST, 1.0)
     out[..., :COUNT] = np.minimum(out[..., :COUNT], room)
     total = out[..., :COUNT].sum(axis=-1, keepdims=True)
     out[..., :COUNT] *= np.minimum(1.0, room / np.maximum(total, 1e-9))
@@ -150,11 +143,9 @@ def _evolve(
             members[i], costs[i] = trial, value
 
 
-def _pattern_search(
-    x: FloatArray, lowest: float, cost: Callable[[FloatArray], float], room: float, rounds: int
-) -> tuple[FloatArray, float]:
+def _pattern_search(x: FloatArray, lowest: float, cost: Callable[[FloatArray], float], room: float) -> tuple[FloatArray, float]:
     size = 0.25
-    for _ in range(rounds):
+    for _ in range(PATTERN_ROUNDS):
         moved = False
         for i in range(x.size):
             for factor in (1.0 + size, 1.0 / (1.0 + size)):
@@ -193,17 +184,15 @@ def _started(maneuver: Maneuver, judge: Objective) -> Excitation | None:
     return candidate if fits(candidate, judge.window) else None
 
 
-def _coordinate_search(judge: Objective, start: Excitation, rounds: int) -> Scored:
+def _coordinate_search(judge: Objective, start: Excitation) -> Scored:
+    """Return the best of a maneuver after one step of each of its parameters in turn."""
     best = largest_paying(judge, start)
-    for _ in range(rounds):
-        for parameter in start.record.parameters:
-            if not parameter.tuned:
-                continue
-            for value in moves_of(parameter, best.candidate.parameters[parameter.name], judge.envelope.fin):
-                trial = best.candidate.with_(**{parameter.name: value})
-                if fits(trial, judge.window) and (cost := judge.cost(trial)) < best.cost:
-                    best = Scored(trial, cost)
-                    break
+    for parameter in (p for p in start.record.parameters if p.tuned):
+        for value in moves_of(parameter, best.candidate.parameters[parameter.name], judge.envelope.fin):
+            trial = best.candidate.with_(**{parameter.name: value})
+            if fits(trial, judge.window) and (cost := judge.cost(trial)) < best.cost:
+                best = Scored(trial, cost)
+                break
     return best
 
 

@@ -10,21 +10,22 @@ from typing import Annotated
 import numpy as np
 
 from fieldsid.errors import UsageError
-from fieldsid.maneuvers import pick_maneuver
+from fieldsid.maneuvers import RATE_HZ, pick_maneuver
 from fieldsid.models.model import Model
 from fieldsid.planning.design.optimise import moves_of
 from fieldsid.planning.discriminate.t_optimality import MAX_REFIT_ITERATIONS, Rival, log_odds, rival_of
 from fieldsid.planning.flight.closed_loop import Response
 from fieldsid.planning.flight.excitation import Excitation, Window, fits, flown_all
 from fieldsid.planning.flight.operating_point import autopilot_of, operating_point
-from fieldsid.planning.safety.envelope import Envelope, excursion_of, used
+from fieldsid.planning.safety.envelope import Envelope, excursions_of, used
 from fieldsid.records.keys import Key, Number
 
 Pairs = Mapping[str, float]
 Map = Callable[[Callable[[Excitation], Pairs], Sequence[Excitation]], list[Pairs]]
 """The expected log odds of each ordered pair of rivals; and what evaluates a function of them at several candidates."""
 
-DEFAULT_WINDOW_S = 60.0
+LONGEST_WINDOW_S = 60.0
+"""Length of the window unless another is requested: slow differences discriminate rivals as well."""
 MOST_LOG_ODDS = 300.0
 CANDIDATES_TUNED = 3
 FAST_HZ, FAST_ROUNDS, BEYOND_DOUBT = 10.0, 3, 50.0
@@ -105,8 +106,11 @@ class _RivalFlights:
         for rival in self.rivals:
             flights += flown_all([rival.scene], candidate, self.window, limits, pilot)
         for rival, flight in zip(self.rivals, flights, strict=True):
-            far = excursion_of(rival.scene.axis, flight, self.speed, run_up=self.run_up).over(self.envelope)
-            if not np.isfinite(flight.angle).all() or used(far) > 1.0:
+            far = excursions_of(
+                rival.scene.axis, flight.angle[:, None], flight.rate[:, None], speed=self.speed, step=1.0 / self.window.rate_hz,
+                run_up=self.run_up, roll_gain=1.0,
+            )  # fmt: skip
+            if not np.isfinite(flight.angle).all() or used(far, self.envelope)[0] > 1.0:
                 return None
         return flights
 
@@ -134,8 +138,8 @@ def separate(
     envelope: Envelope,
     *,
     speeds: Sequence[float],
-    rate_hz: float = 20.0,
-    window_s: float = DEFAULT_WINDOW_S,
+    rate_hz: float = RATE_HZ,
+    window_s: float = LONGEST_WINDOW_S,
     run_up_s: float = 0.0,
     candidates: Sequence[Excitation] | None = None,
     fast: bool = False,

@@ -8,18 +8,17 @@ from dataclasses import replace
 from fieldsid.errors import UsageError
 from fieldsid.maneuvers import parse_spec
 from fieldsid.models.model import Model
-from fieldsid.planning.design.best_leg import Setting, enforce_chance_constraint, enforce_envelope, ensemble_at, leg_of
+from fieldsid.planning.design.best_leg import Setting, enforce_envelope, ensemble_at, leg_of
 from fieldsid.planning.design.leg import Leg
-from fieldsid.planning.design.objective import make_objective
+from fieldsid.planning.design.objective import Objective, make_objective
 from fieldsid.planning.design.plan import Plan, Request, checked_circles, plan_of, setting_at
 from fieldsid.planning.discriminate.discriminate import FAST_HZ, Separation, as_flown, candidate_maneuvers, separate, worth
 from fieldsid.planning.flight.excitation import Excitation
+from fieldsid.planning.safety.monte_carlo import Ensemble
 from fieldsid.runtime.parallel_map import parallel_map
 
 COARSE_DRAWS = 60
 """Draws of the prior that each maneuver of the catalogue is first lowered by; the one that is flown is kept inside by many."""
-LONGEST_WINDOW_S = 60.0
-"""Length of the window unless another is requested: slow differences discriminate rivals as well."""
 
 
 def separating_plan(
@@ -41,23 +40,23 @@ def separating_plan(
 def _leg_at(rivals: Sequence[Model], request: Request, speed: float) -> tuple[Leg, Separation]:
     """Return the leg of one speed: the maneuver that tells most at the angles at which draws of the prior keep inside."""
     envelope, setting = request.envelope, setting_at(rivals[0], request, speed)
-    roughly = _EnvelopeCache(
-        replace(setting, window=replace(setting.window, rate_hz=min(setting.window.rate_hz, FAST_HZ))), speed
-    )
-    few = roughly.crowd.first(COARSE_DRAWS)
+    roughly = replace(setting, window=replace(setting.window, rate_hz=min(setting.window.rate_hz, FAST_HZ)))
+    judge, crowd = _judged(roughly, speed)
+    few = crowd.first(COARSE_DRAWS)
     tried = [c for c in candidate_maneuvers(setting.window, envelope) if c.record.rule is None or not request.open_loop]
-    inside = [enforce_envelope(roughly.judge, roughly.setting, few, c) for c in tried]
+    inside = [enforce_envelope(judge, roughly, few, c) for c in tried]
     found = separate(
         rivals, envelope, speeds=(speed,), rate_hz=setting.window.rate_hz, window_s=setting.window.length,
         run_up_s=request.run_up_s, candidates=[c for c in inside if c is not None],
     )  # fmt: skip
-    known = _EnvelopeCache(replace(setting, window=found.window), speed)
+    setting = replace(setting, window=found.window)
+    judge, crowd = _judged(setting, speed)
     first = [Excitation(m.name, p) for m, p in (parse_spec(spec) for spec in list(found.alternatives)[:1])]
-    flyable = [c for c in map(known.inside, (found.candidate, *first)) if c is not None]
+    flyable = [c for one in (found.candidate, *first) if (c := enforce_envelope(judge, setting, crowd, one)) is not None]
     ways = [as_flown(found, rivals, envelope, c, request.run_up_s) for c in flyable]
     best = max((w for w in ways if w.pairs), key=lambda w: worth(w.pairs), default=found)
     names = ", ".join("+".join(r.effects) or "none" for r in rivals)
-    leg = leg_of(known.judge, known.setting, best.candidate, known.crowd, purpose=f"separate {names}")
+    leg = leg_of(judge, setting, best.candidate, crowd, purpose=f"separate {names}")
     if leg.break_probability > envelope.share:
         raise UsageError(
             f"`{best.candidate.spec}` would leave the envelope {leg.break_probability:.0%} of the time at {speed:g} m/s",
@@ -69,15 +68,7 @@ def _leg_at(rivals: Sequence[Model], request: Request, speed: float) -> tuple[Le
     return leg, best
 
 
-class _EnvelopeCache:
-    """The envelope check of excitations at one speed, over many draws of the prior."""
-
-    def __init__(self, setting: Setting, speed: float) -> None:
-        self.setting = setting
-        self.judge = make_objective(setting.model, speed, setting.envelope, setting.window, {}, setting.run_up_s)
-        self.crowd = ensemble_at(self.judge, setting)
-
-    def inside(self, candidate: Excitation) -> Excitation | None:
-        """Return a candidate at the angles at which it is kept inside, None where there are none."""
-        lowered = enforce_envelope(self.judge, self.setting, self.crowd, candidate)
-        return None if lowered is None else enforce_chance_constraint(self.judge, self.setting, self.crowd, lowered)
+def _judged(setting: Setting, speed: float) -> tuple[Objective, Ensemble]:
+    """Return what judges excitations at one speed, and the draws of the prior that they are kept inside by."""
+    judge = make_objective(setting.model, speed, setting.envelope, setting.window, {}, setting.run_up_s)
+    return judge, ensemble_at(judge, setting)

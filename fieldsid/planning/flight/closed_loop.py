@@ -11,7 +11,7 @@ import numpy as np
 from fieldsid.dynamics.assemble import KernelInputs, assemble, fin_path
 from fieldsid.dynamics.free_run import command_record
 from fieldsid.dynamics.nonlinear_kernel import over_interval
-from fieldsid.maneuvers import Autopilot, Limits, steer
+from fieldsid.maneuvers import steer
 from fieldsid.models.hull import FIN, MOMENT_END, MOMENT_START, kinds_of, named
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
@@ -62,39 +62,6 @@ def closed_loop(
             break
         hold_fin(drive, i, limits[3] + fin + off[i, 0], limits[3] + fin + off[i, 1], push[i, 0], push[i, 1])
         state = over_interval(k, kinds, drive, i, steps[i], pieces, -0.5 * steps[i], state)
-
-
-def respond(
-    scene: OperatingPoint,
-    asked: FloatArray,
-    rate_hz: float,
-    limits: Limits,
-    autopilot: Autopilot,
-    moment: FloatArray | None = None,
-) -> Response:
-    """Return the flight of a scene under a command about trim, (n,) rad with NaN where the autopilot steers.
-
-    moment (n,) rad/s^2 is a disturbance. Actuator effects act on the whole command path, so their part is put
-    back by a few rounds of correction.
-    """
-    ready = prepared(scene, asked.size, rate_hz)
-    n = asked.size
-    moving = any(e.fin is not None for e in scene.effects)
-    off = np.zeros((n - 1, 2))
-    command, out = np.zeros(n), np.zeros((n, 3))
-    gains, trim = autopilot.gains, scene.trim_fin
-    bounds = np.array([min(-limits.fin - trim, 0.0), max(limits.fin - trim, 0.0), limits.fin_rate, trim])
-    clean = ready.drive.copy()
-    if moment is not None:
-        clean[:, MOMENT_START] += moment[:-1]
-        clean[:, MOMENT_END] += moment[1:]
-    idle = idle_records([scene], ready.time) if moving else {}
-    for left in reversed(range(ACTUATOR_ROUNDS if moving else 1)):
-        drive = clean.copy() if moving else clean
-        closed_loop(ready.steps, drive, ready.constants, ready.pieces, asked, off, ready.push, gains, bounds, command, out)
-        if left:
-            off = fin_offset(scene, idle, command)
-    return Response(ready.time, command, out[:, 0], out[:, 1])
 
 
 @dataclass(frozen=True, slots=True)

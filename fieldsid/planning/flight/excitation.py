@@ -9,11 +9,11 @@ from typing import Annotated
 import numpy as np
 
 from fieldsid.errors import UsageError
-from fieldsid.maneuvers import Autopilot, Limits, Maneuver, Schedule, pick_maneuver, spec_of
+from fieldsid.maneuvers import RATE_HZ, Autopilot, Limits, Maneuver, Schedule, pick_maneuver, spec_of
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.planning.flight.closed_loop import Response, respond
+from fieldsid.planning.flight.closed_loop import Response
 from fieldsid.planning.flight.operating_point import OperatingPoint
-from fieldsid.planning.flight.rule_flight import fly_operating_points
+from fieldsid.planning.flight.rule_flight import fly_fins, fly_operating_points, plant_of
 from fieldsid.records.keys import Key
 
 LONGEST_WINDOW_S = 300.0
@@ -27,7 +27,7 @@ class Window:
     length: Annotated[float, Key("Its length.", "length_s")] = 33.0
     lead: Annotated[float, Key("Straight run at its start.", "lead_s")] = 2.0
     recover: Annotated[float, Key("Recovery at its end.", "recover_s")] = 5.0
-    rate_hz: float = 20.0
+    rate_hz: float = RATE_HZ
 
     @property
     def excitation(self) -> float:
@@ -122,16 +122,17 @@ def flown_all(
     scenes: Sequence[OperatingPoint], candidate: Excitation, window: Window, limits: Limits, autopilot: Autopilot
 ) -> list[Response]:
     """Return a candidate flown on several scenes, one response each."""
+    time = window.time
     if candidate.record.rule is None:
-        asked = asked_of(candidate, window)
-        return [respond(s, asked, window.rate_hz, limits, autopilot) for s in scenes]
-    schedule = Schedule(window.rate_hz, window.lead, window.recover)
-    flight = fly_operating_points(
-        scenes, candidate.record, candidate.parameters, limits=limits, autopilot=autopilot, schedule=schedule
-    )
-    n = min(flight.time.size, window.time.size)
-    columns = [flight.fin, flight.angle, flight.rate]
-    return [Response(flight.time[:n], *(c[:n, i].copy() for c in columns)) for i in range(len(scenes))]
+        plant = plant_of(scenes, time.size, window.rate_hz, None)
+        columns = fly_fins(scenes, plant, time, asked_of(candidate, window), limits, autopilot)
+    else:
+        schedule = Schedule(window.rate_hz, window.lead, window.recover)
+        flight = fly_operating_points(
+            scenes, candidate.record, candidate.parameters, limits=limits, autopilot=autopilot, schedule=schedule
+        )
+        time, columns = flight.time[: time.size], (flight.fin, flight.angle, flight.rate)
+    return [Response(time, *(c[: time.size, i].copy() for c in columns)) for i in range(len(scenes))]
 
 
 def fits(candidate: Excitation, window: Window) -> bool:

@@ -1,4 +1,4 @@
-"""Fly a maneuver that is a rule on the motion, on many scenes at once: the exact core stepped by `maneuvers.fly`."""
+"""Fly scenes, many at once: fins that are known before, or a maneuver that is a rule on the motion, by `maneuvers.fly`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fieldsid.models.hull import CONSTANTS, DRIVES, MOMENT_END, MOMENT_START, ki
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
-from fieldsid.planning.flight.closed_loop import ACTUATOR_ROUNDS, fin_offset, hold_fin, idle_records, prepared
+from fieldsid.planning.flight.closed_loop import ACTUATOR_ROUNDS, closed_loop, fin_offset, hold_fin, idle_records, prepared
 from fieldsid.planning.flight.operating_point import OperatingPoint
 
 
@@ -94,6 +94,38 @@ def plant_of(scenes: Sequence[OperatingPoint], n: int, rate_hz: float, moments: 
         drive[:, :, MOMENT_END] += moments[:, 1:]
     trim = np.array([s.trim_fin for s in scenes])
     return OperatingPointPlant(drive, constants, pieces, push, trim, np.zeros((count, n - 1, 2)), np.zeros((count, 3)))
+
+
+def fly_fins(
+    scenes: Sequence[OperatingPoint],
+    plant: OperatingPointPlant,
+    time: FloatArray,
+    asked: FloatArray,
+    limits: Limits,
+    pilot: Autopilot,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return command, angle and rate (n, m) of scenes from rest, asked for fins about trim (n,), NaN for the autopilot.
+
+    plant: the scenes together, from `plant_of`.
+
+    Actuator effects act on the whole command path, so their part is put back by a few rounds of correction.
+    """
+    command, angle, rate = (np.empty((plant.size, time.size)) for _ in range(3))
+    low, high = np.minimum(-limits.fin - plant.trim, 0.0), np.maximum(limits.fin - plant.trim, 0.0)
+    bounds = np.column_stack([low, high, np.full(plant.size, limits.fin_rate), plant.trim])
+    moving = any(e.fin is not None for s in scenes for e in s.effects)
+    gains, off, steps, out = pilot.gains, plant.off, np.diff(time), np.empty((time.size, 3))
+    idle = idle_records(scenes, time) if moving else {}
+    for left in reversed(range(ACTUATOR_ROUNDS if moving else 1)):
+        for i in range(plant.size):
+            closed_loop(
+                steps, plant.drive[i].copy(), plant.constants[i], plant.pieces, asked, off[i], plant.push[i], gains, bounds[i],
+                command[i], out,
+            )  # fmt: skip
+            angle[i], rate[i] = out[:, 0], out[:, 1]
+        if left:
+            off = np.stack([fin_offset(s, idle, command[i]) for i, s in enumerate(scenes)])
+    return command.T, angle.T, rate.T
 
 
 def fly_operating_points(

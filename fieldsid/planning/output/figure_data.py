@@ -53,7 +53,7 @@ def figure_data(plan: Plan, leg: Leg, model: Model) -> LegFigure:
     mean = flown(operating_point(model, leg.speed), leg.candidate, leg.window, envelope.limits, leg.autopilot)
     n = min(flights.time.size, mean.time.size)
     _, fin, steered = commands_of(leg, envelope)
-    along, across = track_of(plan.axis, mean, leg.speed)
+    along, across = track_of(plan.axis, mean.angle, leg.speed, 1.0 / leg.window.rate_hz)
     tracks = np.stack([flights.along[:n, :TRACKS].T, flights.side[:n, :TRACKS].T])
     shown = np.where(steered[:n] > 0, mean.command[:n], fin[:n])
     errors = {k: error_in_words(e.value, e.std_error, e.relative) for k, e in leg.expected.items() if np.isfinite(e.std_error)}

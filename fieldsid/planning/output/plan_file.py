@@ -26,9 +26,9 @@ MAX_LEG_S = 3600.0
 MOST_LEGS = 200
 
 
-def save_plan(plan: Plan, path: Path, *, inputs: Sequence[Path] = (), parent: Path | None = None, force: bool = False) -> Path:
+def save_plan(plan: Plan, path: Path, *, inputs: Sequence[Path] = (), force: bool = False) -> Path:
     """Write a plan as YAML; raises ArtifactError."""
-    return save_record(path, f"{KIND}/1", body_of(plan), inputs=inputs, parent=parent, force=force)
+    return save_record(path, f"{KIND}/1", body_of(plan), inputs=inputs, force=force)
 
 
 def load_plan(path: Path) -> Plan:

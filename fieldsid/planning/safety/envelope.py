@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import degrees
 from typing import Annotated
 
@@ -12,18 +12,19 @@ import numpy as np
 from fieldsid.angles import said
 from fieldsid.errors import UsageError
 from fieldsid.logs.convert.units import GRAVITY
-from fieldsid.maneuvers import Limits
+from fieldsid.maneuvers import AMPLITUDE_HIGH, Limits
 from fieldsid.models.axis import Axis
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.planning.flight.closed_loop import Response
 from fieldsid.records.keys import Key, Number
 
-LARGEST_FIN = 0.7
+LARGEST_FIN = AMPLITUDE_HIGH
 LARGEST_SPEED = 15.0
 MOST_TURNS = 4.0
 """Turns that a deviation of heading may be: more was meant in degrees."""
 LEAST_FIN = 0.01
 """rad: what trims and the play of a linkage are of."""
+ACCEPTED_SHARE = 0.05
+"""Share of the draws of the prior that may leave an envelope, unless another is asked for."""
 NOT_LIMITED = "NOT LIMITED"
 _NO_LIMIT = ", or leave it out where there is no limit"
 OPTIONS: Mapping[str, tuple[str, str, str]] = {
@@ -35,7 +36,7 @@ OPTIONS: Mapping[str, tuple[str, str, str]] = {
     "roll": ("--max-roll", "rad", f"write `--max-roll 20deg`{_NO_LIMIT}"),
     "area_length": ("--area", "m long", f"write `--area 200x60`{_NO_LIMIT}"),
     "area_width": ("--area", "m wide", f"write `--area 200x60`{_NO_LIMIT}"),
-    "share": ("--risk", "", "no maneuver is without risk: write `--risk 0.01`, or leave it out for 0.05"),
+    "share": ("--risk", "", f"no maneuver is without risk: write `--risk 0.01`, or leave it out for {ACCEPTED_SHARE:g}"),
 }
 """Of each limit: the option, its unit, and what to write instead of zero."""
 
@@ -67,7 +68,7 @@ class Envelope:
     roll: Annotated[float | None, Key("Largest roll, rad.")] = None
     area_length: Annotated[float | None, Key("Room along the leg, m.")] = None
     area_width: Annotated[float | None, Key("Room across it, m.")] = None
-    share: Annotated[float, Key("Accepted probability of leaving them.")] = 0.05
+    share: Annotated[float, Key("Accepted probability of leaving them.")] = ACCEPTED_SHARE
 
     def __post_init__(self) -> None:
         for name in ("fin", "fin_rate", "heading", "track", "pitch", "roll", "area_length", "area_width", "share"):
@@ -128,36 +129,42 @@ class Excursion:
     behind: Annotated[float, Key("Way beyond the end of the area, m.")]
     across: Annotated[float, Key("Width needed, m.")]
 
-    def over(self, envelope: Envelope) -> dict[str, float]:
-        """Return the share of its limit that each limited excursion uses, 1 at the limit: the area begins at the start."""
-        over = {k: getattr(self, k) / room for k, room in envelope.rooms().items()}
-        if envelope.area_length is not None and self.behind > 0.0:
-            over["along"] = max(over["along"], 1.0 + self.behind / envelope.area_length)
-        return over
+
+def track_of(axis: Axis, angle: FloatArray, speed: float, step: float) -> tuple[FloatArray, FloatArray]:
+    """Return distance along and across the leg (n, m) in m of angles (n, m) `step` s apart; across is depth for pitch.
+
+    The speed is kept in the turn.
+    """
+    along, side = (np.cumsum(speed * step * part, axis=0) for part in (np.cos(angle), np.sin(angle)))
+    return along, side if axis is Axis.YAW else -side
 
 
-def track_of(axis: Axis, response: Response, speed: float) -> tuple[FloatArray, FloatArray]:
-    """Return distance along and across the leg (n,) in m; across is depth for pitch. The speed is kept in the turn."""
-    step = np.diff(response.time, append=response.time[-1])
-    along = np.cumsum(speed * np.cos(response.angle) * step)
-    side = np.cumsum(speed * np.sin(response.angle) * step) * (1.0 if axis is Axis.YAW else -1.0)
-    return along, side
+def excursions_of(
+    axis: Axis, angle: FloatArray, rate: FloatArray, *, speed: float, step: float, run_up: float, roll_gain: FloatArray | float
+) -> dict[str, FloatArray]:
+    """Return how far flights went, (m,) each by the names of `Excursion`, by their angles and rates (n, m) `step` s apart.
 
-
-def excursion_of(axis: Axis, response: Response, speed: float, *, run_up: float = 0.0, roll_gain: float = 1.0) -> Excursion:
-    """Return how far a flight went.
-
-    run_up is the distance (m) flown before it. Roll is that of a neutrally buoyant hull in a steady turn, u r / g,
+    run_up is the distance (m) flown before them. Roll is that of a neutrally buoyant hull in a steady turn, u r / g,
     times `roll_gain`: the centripetal force acts at the centre of mass, the hull's at its axis.
     """
-    along, side = track_of(axis, response, speed)
-    angle = float(np.max(np.abs(response.angle)))
-    ahead, behind = run_up + float(np.max(along)), max(0.0, -run_up - float(np.min(along)))
-    off = float(np.max(np.abs(side)))
-    if axis is Axis.PITCH:
-        return Excursion(0.0, 0.0, off, angle, 0.0, ahead, behind, 0.0)
-    roll = roll_gain * speed * float(np.max(np.abs(response.rate))) / GRAVITY
-    return Excursion(angle, off, 0.0, 0.0, roll, ahead, behind, off)
+    along, side = track_of(axis, angle, speed, step)
+    most, off, fastest = (np.max(np.abs(part), axis=0) for part in (angle, side, rate))
+    moved = (
+        {"heading": most, "track": off, "roll": roll_gain * speed * fastest / GRAVITY, "across": off}
+        if axis is Axis.YAW
+        else {"depth": off, "pitch": most}
+    )
+    ahead, behind = run_up + np.max(along, axis=0), np.maximum(0.0, -run_up - np.min(along, axis=0))
+    return dict.fromkeys((f.name for f in fields(Excursion)), np.zeros_like(most)) | moved | {"along": ahead, "behind": behind}
+
+
+def used(excursions: Mapping[str, FloatArray], envelope: Envelope) -> FloatArray:
+    """Return the largest share of a limit that flights use, (m,), 1 at the limit: the area begins at the start."""
+    shares = [excursions[name] / room for name, room in envelope.rooms().items()]
+    if envelope.area_length is not None:
+        behind = excursions["behind"]
+        shares.append(np.where(behind > 0.0, 1.0 + behind / envelope.area_length, 0.0))
+    return np.asarray(np.max([np.zeros_like(excursions["along"]), *shares], axis=0))
 
 
 def check_speeds(speeds: tuple[float, ...], low: float | None, high: float | None) -> None:
@@ -218,11 +225,6 @@ def _at_most(name: str, value: float | None, most: float, unit: str, says: str) 
         raise UsageError(
             f"the {says} {value:g} {unit}".rstrip() + " cannot be right", found=f"{name} = {value:g}, most {most:g}", hint=degrees
         )
-
-
-def used(over: Mapping[str, float]) -> float:
-    """Return the largest share of a limit that is used, 0 where there is no limit."""
-    return max(over.values(), default=0.0)
 
 
 def limits_said(envelope: Envelope) -> dict[str, str]:

@@ -6,17 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldsid.logs.convert.units import GRAVITY
 from fieldsid.maneuvers import Autopilot, Schedule
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.arrays import BoolArray, FloatArray
 from fieldsid.planning.belief.prior_model import disturbances, draws_of
-from fieldsid.planning.flight.closed_loop import ACTUATOR_ROUNDS, closed_loop, fin_offset, idle_records
 from fieldsid.planning.flight.excitation import Excitation, Window, asked_of
 from fieldsid.planning.flight.operating_point import OperatingPoint, operating_point
-from fieldsid.planning.flight.rule_flight import OperatingPointPlant, fly_operating_points, plant_of
-from fieldsid.planning.safety.envelope import Envelope
+from fieldsid.planning.flight.rule_flight import OperatingPointPlant, fly_fins, fly_operating_points, plant_of
+from fieldsid.planning.safety.envelope import Envelope, excursions_of, track_of, used
 
 ROLL_SPREAD = 0.4
 TRIM_SPREAD = 0.005
@@ -51,14 +49,9 @@ class Flights:
     side: FloatArray
     excursions: dict[str, FloatArray]
 
-    def outside(self, envelope: Envelope) -> FloatArray:
-        """Return 1 for each draw that left the envelope, (m,)."""
-        broken = np.zeros(self.angle.shape[1])
-        for name, room in envelope.rooms().items():
-            broken = np.maximum(broken, self.excursions[name] > room)
-        if envelope.area_length is not None:
-            broken = np.maximum(broken, self.excursions["behind"] > 0.0)
-        return broken
+    def outside(self, envelope: Envelope) -> BoolArray:
+        """Return which draws left the envelope, (m,)."""
+        return np.asarray(used(self.excursions, envelope) > 1.0)
 
     def quantiles(self, share: float) -> dict[str, float]:
         """Return a quantile of every excursion."""
@@ -80,7 +73,8 @@ def draw_ensemble(model: Model, speed: float, window: Window, count: int, seed: 
 def fly_ensemble(crowd: Ensemble, candidate: Excitation, envelope: Envelope, autopilot: Autopilot, run_up_m: float) -> Flights:
     """Return an excitation flown by an ensemble, all under the autopilot that was designed on the prior's mean."""
     if candidate.record.rule is None:
-        angle, rate = _open_loop(crowd, asked_of(candidate, crowd.window), envelope, autopilot)
+        asked = asked_of(candidate, crowd.window)
+        _, angle, rate = fly_fins(crowd.scenes, crowd.plant, crowd.window.time, asked, envelope.limits, autopilot)
     else:
         schedule = Schedule(crowd.window.rate_hz, crowd.window.lead, crowd.window.recover)
         flight = fly_operating_points(
@@ -97,50 +91,12 @@ def fly_list(crowd: Ensemble, fins: FloatArray, envelope: Envelope, autopilot: A
     asked = np.full(crowd.window.time.size, np.nan)
     count = min(asked.size, fins.size)
     asked[:count] = fins[:count]
-    return _measured(crowd, *_open_loop(crowd, asked, envelope, autopilot), run_up_m)
-
-
-def _open_loop(crowd: Ensemble, asked: FloatArray, envelope: Envelope, autopilot: Autopilot) -> tuple[FloatArray, FloatArray]:
-    """Return angle and rate (n, m)."""
-    plant, time = crowd.plant, crowd.window.time
-    size = (plant.size, time.size)
-    command, angle, rate = np.empty(size), np.empty(size), np.empty(size)
-    fin, fin_rate = envelope.fin, envelope.fin_rate
-    low, high = np.minimum(-fin - plant.trim, 0.0), np.maximum(fin - plant.trim, 0.0)
-    limits = np.column_stack([low, high, np.full(plant.size, fin_rate), plant.trim])
-    gains = autopilot.gains
-    moving = any(e.fin is not None for s in crowd.scenes for e in s.effects)
-    off, steps, out = plant.off, np.diff(time), np.empty((time.size, 3))
-    rounds = ACTUATOR_ROUNDS if moving else 1
-    idle = idle_records(crowd.scenes, time) if moving else {}
-    for left in reversed(range(rounds)):
-        for i in range(plant.size):
-            closed_loop(
-                steps, plant.drive[i].copy(), plant.constants[i], plant.pieces, asked, off[i], plant.push[i], gains, limits[i],
-                command[i], out,
-            )  # fmt: skip
-            angle[i], rate[i] = out[:, 0], out[:, 1]
-        if left:
-            off = np.stack([fin_offset(s, idle, command[i]) for i, s in enumerate(crowd.scenes)])
-    return angle.T, rate.T
+    _, angle, rate = fly_fins(crowd.scenes, crowd.plant, crowd.window.time, asked, envelope.limits, autopilot)
+    return _measured(crowd, angle, rate, run_up_m)
 
 
 def _measured(crowd: Ensemble, angle: FloatArray, rate: FloatArray, run_up_m: float) -> Flights:
-    """Return the flights with their excursions; the formulas are those of `envelope.excursion_of`."""
+    """Return the flights with their excursions."""
     step, speed = 1.0 / crowd.window.rate_hz, crowd.scenes[0].speed
-    yaw = crowd.axis is Axis.YAW
-    along = np.cumsum(speed * step * np.cos(angle), axis=0)
-    side = np.cumsum(speed * step * np.sin(angle), axis=0) * (1.0 if yaw else -1.0)
-    most, off = np.max(np.abs(angle), axis=0), np.max(np.abs(side), axis=0)
-    none = np.zeros_like(most)
-    excursions = {
-        "heading": most if yaw else none,
-        "track": off if yaw else none,
-        "depth": none if yaw else off,
-        "pitch": none if yaw else most,
-        "roll": crowd.roll * speed * np.max(np.abs(rate), axis=0) / GRAVITY if yaw else none,
-        "along": run_up_m + np.max(along, axis=0),
-        "behind": np.maximum(0.0, -run_up_m - np.min(along, axis=0)),
-        "across": off if yaw else none,
-    }
-    return Flights(crowd.window.time[: angle.shape[0]], angle, rate, along, side, excursions)
+    far = excursions_of(crowd.axis, angle, rate, speed=speed, step=step, run_up=run_up_m, roll_gain=crowd.roll)
+    return Flights(crowd.window.time[: angle.shape[0]], angle, rate, *track_of(crowd.axis, angle, speed, step), far)

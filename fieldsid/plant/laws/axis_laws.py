@@ -18,7 +18,7 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import KIND as MODEL_KIND
 from fieldsid.models.model import Model, model_of
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.plant.laws.parameter_law import ParameterLaw, authority_law, other_law, without_candidates
+from fieldsid.plant.laws.parameter_law import ParameterLaw, authority_law, other_law
 from fieldsid.plant.laws.regression import Regression, regression_of
 from fieldsid.plant.points import Point, check_authority, distinct_speeds
 from fieldsid.records.check import ShapeError
@@ -122,10 +122,10 @@ def with_own_law(laws: Laws, text: str) -> Laws:
     size = coefficients.size
     powers = (0.0, 2.0)[:size]
     line = Regression("affine" if size == 2 else "constant", powers, coefficients, np.zeros((size, size)), 0, float("nan"), 0.0)
-    base = laws.by_name.get(name)
     speeds = laws.speeds
-    empty = ParameterLaw(name, 1.0, speeds, np.asarray(line.at(speeds)), None, (line,), line.kind, None, ())
-    own = empty if base is None else without_candidates(replace(base, sign=1.0, values=base.sign * base.values), line)
+    bare = ParameterLaw(name, 1.0, speeds, np.asarray(line.at(speeds)), None, (line,), line.kind, None, ())
+    base = laws.by_name.get(name, bare)
+    own = replace(base, sign=1.0, values=base.sign * base.values, candidates=(line,), chosen=line.kind, exponent=None, points=())
     return replace(laws, by_name=MappingProxyType({**laws.by_name, name: own}))
 
 

@@ -8,7 +8,7 @@ externally studentised residuals (Cook & Weisberg 1982, chapter 2) against Bonfe
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -17,12 +17,11 @@ import numpy.typing as npt
 from fieldsid.display import Brief
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.numerics.tail_probabilities import student_quantile, student_tail
+from fieldsid.numerics.tail_probabilities import student_tail
 from fieldsid.plant.laws.regression import ROUNDING_SHARE, Regression, fit_power_law, fit_powers, rounding_of, t_factor
 from fieldsid.records.keys import Interval, Key, Number
 from fieldsid.rounding import nine_digits, p_value
 
-FAMILY_ALPHA = 0.05
 MIN_DEGREES_OF_FREEDOM = 2
 """Degrees of freedom of the others' scatter above which a point is tested against it: with one, two points in line by chance
 (rounded digits make such) put a third any number of its standard errors off."""
@@ -167,7 +166,7 @@ def leave_one_out(
     degrees = count - 1 - size
     if degrees < 1:
         return ()
-    limit = student_quantile(1.0 - FAMILY_ALPHA / (2 * count), degrees) if degrees >= MIN_DEGREES_OF_FREEDOM else float("inf")
+    limit = t_factor(degrees, count) if degrees >= MIN_DEGREES_OF_FREEDOM else float("inf")
     checks = []
     for i in range(count):
         keep = np.arange(count) != i
@@ -221,8 +220,3 @@ def _notes(name: str, affine: Regression, power: Regression) -> tuple[Note, ...]
     if affine.r2 > 0.95 and power.dof > 0:
         notes.append(Note("r2_proves_little", f"R^2 = {affine.r2:.3f} proves little: read the exponent", {"r2": affine.r2}))
     return tuple(notes)
-
-
-def without_candidates(law: ParameterLaw, line: Regression) -> ParameterLaw:
-    """Return the law replaced by a given line (a user's own), nothing else changed."""
-    return replace(law, candidates=(line,), chosen=line.kind, exponent=None, points=())

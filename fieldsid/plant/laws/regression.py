@@ -110,9 +110,9 @@ def fit_power_law(speed: FloatArray, value: FloatArray, std_error: FloatArray | 
     return Regression("power", (), coefficients, covariance, dof, _r2(value, error), _rms(error))
 
 
-def t_factor(dof: int) -> float:
-    """Return Student's 97.5 % point; the normal one where no scatter could be measured."""
-    return student_quantile(0.5 + CONFIDENCE_LEVEL / 2, dof)
+def t_factor(dof: int, tests: int = 1) -> float:
+    """Return Student's 97.5 % point, Bonferroni's of so many tests; the normal one where no scatter could be measured."""
+    return student_quantile(1.0 - (1.0 - CONFIDENCE_LEVEL) / (2 * tests), dof)
 
 
 def rounding_of(value: FloatArray) -> float:

@@ -15,6 +15,7 @@ from fieldsid.schedule.flown.hull_kernel import close_hull_loop
 from fieldsid.schedule.flown.pace import STEP_S
 from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.record import Row
+from fieldsid.turning.steady.transient import LEAST_SURGE_M_S
 
 HULL_STEPS = 2.0
 """Steps of a plant in one of a flight in surge, sway and yaw: half of it moves the settling by less than a hundredth."""
@@ -29,10 +30,8 @@ LIMIT_CYCLE_SHARE = 2.0 * SETTLING_BAND
 """Peak to peak over the step: what swings through the whole corridor of settling after 45 s does not settle."""
 
 
-HELD_S, LEAST_SPEED_M_S = 1.0, 0.05
-"""A curvature counts where it is held this long, as that of the runs does; speeds below this one are taken as it."""
-MOST_ERROR = 3.0
-"""Steps of error at which a response counts as lost: what diverges is not later than that."""
+HELD_S = 1.0
+"""A curvature counts where it is held this long, as that of the runs does."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -62,15 +61,6 @@ def settling(time: FloatArray, values: FloatArray, size: float, band: float = SE
     return np.asarray(np.where(off.any(axis=0), np.where(last >= time.size - 1, np.inf, time[last]), 0.0))
 
 
-def lateness(time: FloatArray, values: FloatArray, size: float) -> FloatArray:
-    """Return sqrt(int t |error|/size dt) of steps (t, n) of `size`, (n,) s: the time constant of a first-order answer.
-
-    Unlike the time to settle it does not jump where an overshoot leaves the corridor. An error counts up to three steps.
-    """
-    off, step = np.minimum(np.abs(values / size - 1.0), MOST_ERROR), float(time[1] - time[0])
-    return np.asarray(np.sqrt(np.maximum(time @ np.nan_to_num(off, nan=MOST_ERROR), step) * step))
-
-
 def swing(values: FloatArray, size: float) -> FloatArray:
     """Return what steps (t, n) of `size` still swing in their last quarter, peak to peak, (n,), as a share of it."""
     tail = values[-max(2, round(TAIL_SHARE * values.shape[0])) :]
@@ -83,7 +73,7 @@ def tightest(steps: Steps) -> float:
     """Return the largest curvature (1/m) that the first case holds for HELD_S."""
     width = max(1, round(HELD_S / float(steps.time[1] - steps.time[0])))
     turned = np.abs(steps.angle[width:, 0] - steps.angle[:-width, 0]) / HELD_S
-    return float(np.max(turned / np.maximum(steps.speed[width:, 0], LEAST_SPEED_M_S)))
+    return float(np.max(turned / np.maximum(steps.speed[width:, 0], LEAST_SURGE_M_S)))
 
 
 def about_rest(values: FloatArray, size: float) -> FloatArray:

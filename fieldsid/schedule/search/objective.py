@@ -25,7 +25,6 @@ from fieldsid.schedule.flown.pace import Pace, full_bandwidth, pace_of
 from fieldsid.schedule.flown.response import (
     FLIGHT_ERROR_SHARE,
     LIMIT_CYCLE_SHARE,
-    MOST_ERROR,
     SETTLING_BAND,
     about_rest,
     overshoot,
@@ -51,6 +50,8 @@ FLOWN_TIMES, LEAST_SHARE = 25.0, 1.0 / 3.0
 """A step is flown for so many times 1/bandwidth of the full fin: within this share of what its pace has and all of that."""
 ANSWER_TIMES = 3.0
 """And for so many times the settling that is asked."""
+MOST_ERROR = 3.0
+"""Steps of error at which a response counts as lost: what diverges is not later than that."""
 FORBIDDEN = 100.0
 """Cost of what lacks a requirement: the log of no time in s, of no gain and of no share of a fin comes near it."""
 

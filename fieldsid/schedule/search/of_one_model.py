@@ -52,10 +52,8 @@ def usual(fin_limit: float, *, by_rate: bool, limits: FinLimits | None = None, d
 
 def wanted_of(loaded: Schedule) -> Wanted:
     """Return what a schedule was designed for; its rows say the fin's limit, of which the least is taken."""
-    s = loaded.stated
-    limits = FinLimits(s.get("lag_s"), s.get("delay_s"), s.get("fin_rate_rad_s"), s.get("latency_s"))
     least = min(row.fin_limit for row in loaded.rows)
-    return Wanted(loaded.wish, least, limits, loaded.depth, loaded.answer.settling, loaded)
+    return Wanted(loaded.wish, least, loaded.stated_limits, loaded.depth, loaded.answer.settling, loaded)
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,14 +20,15 @@ from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import NAMES
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.block_means import block_means, block_width
 from fieldsid.plant.yaw_plant import steady_fins
 from fieldsid.turning.maneuvering.equations import coefficients, longest_step, simulate
 from fieldsid.turning.maneuvering.fit import Fitted, fit_maneuvering
-from fieldsid.turning.maneuvering.flown import HEADING, OWN_EFFECTS, RATE, SURGE, SWAY, FlownRun, usable_runs
+from fieldsid.turning.maneuvering.flown import HEADING, OWN_EFFECTS, SURGE, SWAY, FlownRun, nearest_model, usable_runs
 from fieldsid.turning.maneuvering.posterior import Posterior, draw_posterior, effective_draws, settled_turns, weighted_quantile
 from fieldsid.turning.maneuvering.prior import FARTHEST_COST
 from fieldsid.turning.model_error import STALL_LOG_SD
-from fieldsid.turning.steady.transient import Transient, read_off
+from fieldsid.turning.steady.transient import LEAST_SURGE_M_S, Transient, read_off
 
 T = TypeVar("T")
 SEED = 20240511
@@ -95,17 +96,11 @@ class Belief:
         """The largest curvature that a run held for a moment, 1/m."""
         largest = 0.0
         for run in self.runs:
-            rate = run.measured[RATE]
-            if not np.isfinite(rate).any():
-                rate = np.gradient(run.measured[HEADING], run.time)
-            ok = np.isfinite(rate)
+            ok = np.isfinite(run.rate)
             # where nothing measures the surge it is at most that of the straight part: the curvature is at least this
             surge = np.where(np.isfinite(run.measured[SURGE]), run.measured[SURGE], run.speed)
-            width = max(1, round(1.0 / float(np.median(np.diff(run.time)))))
-            count = int(ok.sum()) // width * width
-            if count:
-                means = np.stack([rate[ok][:count], surge[ok][:count]]).reshape(2, -1, width).mean(axis=2)
-                largest = max(largest, float(np.max(np.abs(means[0]) / np.maximum(means[1], 0.05))))
+            rates, speeds = (block_means(of[ok], block_width(np.diff(run.time), 1.0)) for of in (run.rate, surge))
+            largest = max(largest, float(np.max(np.abs(rates) / np.maximum(speeds, LEAST_SURGE_M_S), initial=0.0)))
         return largest
 
     def _transient(self, entry: float, fin: float, side: float) -> Transient:
@@ -207,7 +202,7 @@ def _fin(models: Sequence[Model], speed: float, rudder: float, side: float) -> f
     """Return the fin angle that a rudder at its limit leaves, positive to port, as the equations have it."""
     if not models:
         return -side * rudder
-    near = min(models, key=lambda m: abs(np.log(m.law.reference / speed)) if m.law.reference > 0 else np.inf)
+    near = nearest_model(models, speed)
     sign = float(np.sign(near.base[NAMES[near.axis].authority])) or 1.0
     acting = [e for e in effects_of(near) if e.name not in OWN_EFFECTS]
     values = {c.name: c.start for e in acting for c in e.nuisance} | dict(near.values)

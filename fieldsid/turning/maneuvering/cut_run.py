@@ -16,6 +16,7 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 from fieldsid.turning.maneuvering.equations import longest_step, simulate
 from fieldsid.turning.maneuvering.flown import HEADING, RATE, SURGE, SWAY, FlownRun
+from fieldsid.turning.steady.transient import LEAST_SURGE_M_S
 
 OWN = 3
 """Nuisances of a run before its segments': straight speed, bias of the rate, bias of the sway."""
@@ -23,7 +24,6 @@ SWAY_BIAS_SD = 0.02
 """m/s: what a Doppler log may be off by across the hull."""
 STATE_SD = 0.3
 """Prior of a segment's first state about that measured: m/s, and rad/s."""
-LEAST_STRAIGHT_M_S = 0.05
 LARGEST_RESIDUAL = 1e6
 """Weighted residuals are clipped here where a simulation has left the water."""
 
@@ -44,7 +44,7 @@ class CutRun:
     def misfit(self, p: FloatArray, local: FloatArray) -> FloatArray:
         """Return measured less simulated (4, n) with coefficients p and nuisances `local`, NaN where nothing was measured."""
         run, states = self.run, local[OWN:].reshape(-1, 3)
-        straight = max(float(local[0]), LEAST_STRAIGHT_M_S)
+        straight = max(float(local[0]), LEAST_SURGE_M_S)
         out = simulate(p, straight, states, self.begins, run.time, run.fin, run.thrust, self.longest)
         out[RATE] += local[1]
         out[HEADING] += local[1]

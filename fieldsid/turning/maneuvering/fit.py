@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.turning.correlated import inflation
 from fieldsid.turning.maneuvering.cut_run import OWN, CutRun, cut_run
 from fieldsid.turning.maneuvering.equations import NAMES, coefficients, growth_rate
 from fieldsid.turning.maneuvering.flown import FlownRun
@@ -34,7 +35,6 @@ MAX_BACKTRACKS = 8
 TOLERANCE, START_TOLERANCE = 0.02, 0.5
 """Of minus twice the log posterior; a start need not be at its minimum."""
 DIFFERENCE = 1e-4
-MAX_RHO = 0.98
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,9 +172,7 @@ class _Problem:
             if not parts:
                 continue
             power = sum(float(p @ p) for p in parts)
-            rho = min(max(sum(float(p[1:] @ p[:-1]) for p in parts) / max(power, 1e-30), 0.0), MAX_RHO)
-            size = sum(p.size for p in parts)
-            out[channel] = max(np.sqrt(power / size * (1.0 + rho) / (1.0 - rho)), LEAST_NOISE[channel])
+            out[channel] = max(np.sqrt(power / sum(p.size for p in parts) * inflation(parts)), LEAST_NOISE[channel])
         return out
 
 

@@ -10,26 +10,28 @@ import numpy.typing as npt
 
 from fieldsid.dynamics.assemble import fin_path
 from fieldsid.dynamics.free_run import effects_of
+from fieldsid.logs.doctor.pair_findings import SLOWEST
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
 from fieldsid.models.record import Record, knows_speed, record_of
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.block_means import block_means
+from fieldsid.turning.correlated import inflation
+from fieldsid.turning.steady.speed_loss import LEAST_SAMPLES
+from fieldsid.turning.thrust import RPM, at_start, thrust_ratio
 
 OWN_EFFECTS = frozenset({"servo_lag", "rate_limit"})
 """Effects of the actuator that the maneuvering model has itself."""
-LEAST_SAMPLES = 40
 LEAST_TURN_RAD_S = 0.005
 UNKNOWN_BIAS_RAD_S = 0.002
 """What a gyro may be off by, where no heading shows it."""
 LEAST_BIAS_SD_RAD_S = 1e-5
-LEAST_SPEED_M_S = 0.1
 DISCREPANCY = 0.03
 """Share of the motion that the equations themselves are off by."""
 DISCREPANCY_LENGTH_M = 2.0
 START_SD = 0.3
 """Of a straight speed about that measured, m/s."""
-RPM = "propeller_rpm"
 SPEED_OF_RPM_SHARE = 0.03
 """A propeller's slip on a straight course is alike at every speed to within a few hundredths (Fossen 2011, section 9.4)."""
 SURGE, SWAY, RATE, HEADING = range(4)
@@ -55,12 +57,15 @@ class FlownRun:
     speed_sd: float
 
     @property
+    def rate(self) -> FloatArray:
+        """The yaw rate (n,) rad/s: that measured, else the heading's slope."""
+        rate = self.measured[RATE]
+        return rate if np.isfinite(rate).any() else np.asarray(np.gradient(self.measured[HEADING], self.time))
+
+    @property
     def turns(self) -> bool:
         """Whether it turns at all."""
-        rate = self.measured[RATE]
-        if not np.isfinite(rate).any():
-            rate = np.gradient(self.measured[HEADING], self.time)
-        return float(np.nanpercentile(np.abs(rate), 98)) > LEAST_TURN_RAD_S
+        return float(np.nanpercentile(np.abs(self.rate), 98)) > LEAST_TURN_RAD_S
 
     def begins(self, segment_s: float) -> npt.NDArray[np.int64]:
         """Return the samples (m,) at which segments of about `segment_s` begin."""
@@ -102,9 +107,8 @@ def flown_run(run: Run, model: Model | None, speed_per_rpm: float | None = None)
     fin = np.stack([path.start, path.end], axis=1)
     if model is not None and model.base[NAMES[model.axis].authority] > 0.0:
         fin = -fin  # the equations' rudder turns to port
-    thrust = _thrust(record.signals.get("thrust"), record.thrust_column, len(record))
     off = _discrepancy(record.time, measured, speed)
-    return FlownRun(run.name, record.time, fin, thrust, measured, bias_sd, off, speed, speed_sd)
+    return FlownRun(run.name, record.time, fin, thrust_ratio(record), measured, bias_sd, off, speed, speed_sd)
 
 
 def speed_per_rpm(runs: Sequence[Run]) -> float | None:
@@ -115,9 +119,7 @@ def speed_per_rpm(runs: Sequence[Run]) -> float | None:
 
 
 def _turns_at_start(run: Run) -> float:
-    turns = run[RPM]
-    turns = turns[np.isfinite(turns)]
-    return float(np.median(turns[: max(10, turns.size // 20)])) if turns.size else float("nan")
+    return at_start(run[RPM][np.isfinite(run[RPM])])
 
 
 def _discrepancy(time: FloatArray, measured: FloatArray, speed: float) -> FloatArray:
@@ -132,7 +134,7 @@ def _discrepancy(time: FloatArray, measured: FloatArray, speed: float) -> FloatA
     for i in range(4):
         values = measured[i][np.isfinite(measured[i])] - straight[i]
         if values.size >= width:
-            whole = values[: values.size // width * width].reshape(-1, width).mean(axis=1)
+            whole = block_means(values, width)
             out[i] = np.sqrt(np.mean((whole - (whole.mean() if i == HEADING else 0.0)) ** 2))
     return np.asarray(DISCREPANCY * out * np.sqrt(max(2.0 * DISCREPANCY_LENGTH_M / speed / step, 1.0)))
 
@@ -147,20 +149,13 @@ def _rate_bias(record: Record) -> tuple[float, float]:
     power = float(time @ time)
     slope = float(time @ between) / power
     left = between - between.mean() - slope * time
-    rho = min(max(float(left[1:] @ left[:-1]) / max(float(left @ left), 1e-30), 0.0), 0.98)
-    sd = float(np.sqrt(np.mean(left**2) / power * (1.0 + rho) / (1.0 - rho)))
+    sd = float(np.sqrt(np.mean(left**2) / power * inflation([left])))
     return slope, min(max(sd, LEAST_BIAS_SD_RAD_S), UNKNOWN_BIAS_RAD_S)
 
 
-def _thrust(thrust: FloatArray | None, column: str, count: int) -> FloatArray:
-    """Return the thrust over that at the run's start, one where it is not logged; it goes with the rpm squared."""
-    if thrust is None:
-        return np.ones(count)
-    start = float(np.median(thrust[: max(10, thrust.size // 20)]))
-    if not start > 0.0:
-        return np.ones(count)
-    ratio = np.maximum(thrust / start, 0.0)
-    return np.asarray(ratio**2 if column == "propeller_rpm" else ratio)
+def nearest_model(models: Sequence[Model], speed: float) -> Model:
+    """Return the model whose own speed is nearest to a speed in m/s."""
+    return min(models, key=lambda m: abs(np.log(m.law.reference / speed)) if m.law.reference > 0 else np.inf)
 
 
 def usable_runs(runs: Sequence[Run], models: Sequence[Model]) -> tuple[FlownRun, ...]:
@@ -170,8 +165,7 @@ def usable_runs(runs: Sequence[Run], models: Sequence[Model]) -> tuple[FlownRun,
     for run in runs:
         near = models[0] if models else None
         if models and knows_speed(run):
-            speed = max(float(np.nanmedian(run["surge_m_s"])), LEAST_SPEED_M_S)
-            near = min(models, key=lambda m: abs(np.log(m.law.reference / speed)) if m.law.reference > 0 else np.inf)
+            near = nearest_model(models, max(float(np.nanmedian(run["surge_m_s"])), SLOWEST))
         flown = flown_run(run, near, of_rpm)
         if flown is not None:
             found.append(flown)

@@ -1,8 +1,8 @@
 """A robust geometric circle through a track, on a centre that a steady current carries along.
 
 Minimises sum rho(d_i), d_i = |p_i - c - w t_i| - R, over centre c, radius R and current w (Gander, Golub & Strebel 1994
-for the geometric distance; Taubin 1991 for the start; Huber's rho for outliers). The standard error is corrected for
-correlated residuals by the length of their autocorrelation.
+for the geometric distance; Huber's rho for outliers). The heading gives a start that stands any current. The standard error is
+corrected for correlated residuals by the length of their autocorrelation.
 """
 
 from __future__ import annotations
@@ -47,13 +47,12 @@ class Circle(Brief):
         return self.radius - half, self.radius + half
 
 
-def fit_circle(time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray | None = None) -> Circle:
-    """Fit a circle to a track (n,) in s and m; the current is fitted too where most of a circle was turned.
+def fit_circle(time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray) -> Circle:
+    """Fit a circle to a track and its unwrapped heading, (n,) in s, m and rad; the current too where most of a circle was turned.
 
-    `heading` (n,) rad, unwrapped, gives a start that stands any current; without it a weak current is taken for granted.
     Raises DataError when there are too few samples or too short an arc.
     """
-    ok = np.isfinite(x) & np.isfinite(y) & (True if heading is None else np.isfinite(heading))
+    ok = np.isfinite(x) & np.isfinite(y) & np.isfinite(heading)
     t, track = time[ok] - time[ok][0] if ok.any() else time[:0], np.stack([x[ok], y[ok]], axis=1)
     if t.size < LEAST_SAMPLES:
         raise DataError(
@@ -70,12 +69,8 @@ def fit_circle(time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArr
             hint="give the run of a turn",
         )
     points = (track - middle) / scale
-    if heading is None:
-        start = np.concatenate([_taubin(_medians(points)), [0.0, 0.0]])
-        turned = _turned(_medians(points), start)
-    else:
-        start = _by_heading(points, t / (float(t[-1]) or 1.0), heading[ok])
-        turned = float(abs(heading[ok][-1] - heading[ok][0]))
+    start = _by_heading(points, t / (float(t[-1]) or 1.0), heading[ok])
+    turned = float(abs(heading[ok][-1] - heading[ok][0]))
     if turned < LEAST_TURN_RAD:
         raise DataError(
             "the settled part of the turn is too short an arc for a circle",
@@ -140,36 +135,6 @@ def _by_heading(points: FloatArray, share: FloatArray, heading: FloatArray) -> F
         found = np.linalg.lstsq(columns * root, values * root[:, 0], rcond=None)[0]
         weight = 1.0 / np.maximum(np.abs(values - columns @ found), 1e-3)
     return np.array([found[0], found[1], np.hypot(found[4], found[5]), found[2], found[3]])
-
-
-def _medians(points: FloatArray) -> FloatArray:
-    """Return running medians of nine fixes, (n, 2), so that a wild one does not count."""
-    padded = np.pad(points, ((4, 4), (0, 0)), mode="edge")
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 9, axis=0), axis=-1))
-
-
-def _taubin(points: FloatArray) -> FloatArray:
-    """Return (cx, cy, R) of Taubin's algebraic fit, by SVD (Chernov 2010, section 5.7)."""
-    middle = points.mean(axis=0)
-    centred = points - middle
-    z = np.sum(centred**2, axis=1)
-    mean_z = float(z.mean())
-    z0 = (z - mean_z) / (2.0 * np.sqrt(mean_z))
-    _, _, vt = np.linalg.svd(np.stack([z0, centred[:, 0], centred[:, 1]], axis=1), full_matrices=False)
-    a = vt[2].copy()
-    a[0] /= 2.0 * np.sqrt(mean_z)
-    if abs(a[0]) < ROUNDING_SHARE:
-        raise DataError("the track is a straight line, no circle", found="no curvature", hint="give the run of a turn")
-    last = -mean_z * a[0]
-    centre = -a[1:] / (2.0 * a[0])
-    radius = np.sqrt(max(a[1] ** 2 + a[2] ** 2 - 4.0 * a[0] * last, 0.0)) / (2.0 * abs(a[0]))
-    return np.array([*(centre + middle), radius])
-
-
-def _turned(points: FloatArray, circle: FloatArray) -> float:
-    """Return the angle swept about the centre, rad: from first to last, unwrapped."""
-    angle = np.unwrap(np.arctan2(points[:, 1] - circle[1], points[:, 0] - circle[0]))
-    return float(abs(angle[-1] - angle[0]))
 
 
 def _robust_sd(residual: FloatArray) -> float:

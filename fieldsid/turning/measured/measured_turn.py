@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from fieldsid.display import Plotted
 from fieldsid.errors import DataError
+from fieldsid.logs.convert.conditioning import blocks_of
 from fieldsid.logs.run import Run
 from fieldsid.models.record import knows_speed
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.arrays import BoolArray, FloatArray
 from fieldsid.records.keys import INLINE, Key, Number, Side
 from fieldsid.turning.measured.circle import LEAST_TURN_FOR_CURRENT_RAD, Circle, fit_circle
 
@@ -47,15 +47,15 @@ class MeasuredTurn(Plotted):
         return self.entry_speed if np.isfinite(self.entry_speed) else self.path_speed
 
 
-def measure_turn(run: Run, *, start_s: float | None = None, end_s: float | None = None) -> MeasuredTurn:
-    """Fit the circle of a run's settled turn, found in the yaw rate (or between start_s and end_s).
+def measure_turn(run: Run) -> MeasuredTurn:
+    """Fit the circle of a run's settled turn, found in the yaw rate.
 
     Raises DataError when positions or heading are missing, when there is no turn, or it is too short an arc.
     """
     _need_positions(run)
     raw = _yaw_rate(run)
     rate = _smooth(run.time, raw, SMOOTH_S)
-    first, last = _settled(run, rate) if start_s is None and end_s is None else _given(run, start_s, end_s)
+    first, last = _settled(run, rate)
     span = slice(first, last)
     circle = fit_circle(run.time[span], run["x_m"][span], run["y_m"][span], _heading(run, raw)[span])
     turn_start = _turn_start(rate, first)
@@ -131,19 +131,8 @@ def _settled(run: Run, rate: FloatArray) -> tuple[int, int]:
     return start, max(end, start + 2)
 
 
-def _given(run: Run, start_s: float | None, end_s: float | None) -> tuple[int, int]:
-    first = 0 if start_s is None else int(np.searchsorted(run.time, start_s))
-    last = len(run) if end_s is None else int(np.searchsorted(run.time, end_s, side="right"))
-    if last - first < 2:
-        raise DataError(
-            f"run {run.name!r} has no samples there", found=f"{start_s} .. {end_s} s", hint="change `--from` and `--to`"
-        )
-    return first, last
-
-
-def _longest(mask: npt.NDArray[np.bool_]) -> tuple[int, int]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
-    starts, ends = edges[::2], edges[1::2]
+def _longest(mask: BoolArray) -> tuple[int, int]:
+    starts, ends = blocks_of(mask)
     best = int(np.argmax(ends - starts))
     return int(starts[best]), int(ends[best])
 

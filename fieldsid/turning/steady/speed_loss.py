@@ -21,6 +21,8 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.block_means import block_means, block_width
 from fieldsid.numerics.jit import jit
 from fieldsid.records.keys import Key, Number
+from fieldsid.turning.correlated import inflation
+from fieldsid.turning.thrust import thrust_ratio
 
 BLOCK_S, BLOCK_SHARE = 0.2, 0.2
 """Block means are of 0.2 s, or of a fifth of the time in which a slow vehicle takes up its largest rate: its speed is slower."""
@@ -156,11 +158,8 @@ def _case(run: Run) -> _Case | None:
     )
     width = block_width(record.steps, max(BLOCK_S, BLOCK_SHARE * _time_of_change(record.time, rate)))
     none = np.full(len(record), np.nan)
-    thrust = record.signals.get("thrust")
-    start = float(np.median(thrust[: max(10, thrust.size // 20)])) if thrust is not None else 0.0
-    ratio = thrust / start if thrust is not None and start > 0 else np.ones(len(record))
     surge = _filled(run, "surge_m_s", none) if knows_speed(run) else none
-    columns = (record.time, surge, _filled(run, "sway_m_s", none), rate, record.fin, ratio)
+    columns = (record.time, surge, _filled(run, "sway_m_s", none), rate, record.fin, thrust_ratio(record))
     blocks = [block_means(c, width) for c in columns]
     if blocks[0].size < LEAST_SAMPLES or float(np.max(np.abs(blocks[3]))) < LEAST_TURN_RAD_S:
         return None
@@ -219,7 +218,7 @@ def _fit_loss(cases: Sequence[_Case]) -> tuple[tuple[float, float, float], Float
     fit = least_squares(residual, start, bounds=(low, high), x_scale=np.maximum(start, 0.05))
     jac = np.asarray(fit.jac, dtype=np.float64)
     variance = float(np.sum(fit.fun**2)) / max(fit.fun.size - start.size, 1)
-    covariance = np.linalg.pinv(jac.T @ jac)[:3, :3] * variance * _inflation(fit.fun)
+    covariance = np.linalg.pinv(jac.T @ jac)[:3, :3] * variance * inflation([fit.fun - np.mean(fit.fun)])
     return (float(fit.x[0]), float(fit.x[1]), float(fit.x[2])), np.asarray(covariance), float(np.sqrt(variance))
 
 
@@ -230,13 +229,4 @@ def _fit_drift(cases: Sequence[_Case]) -> tuple[float, float]:
     power = float(rate @ rate)
     slope = -float(rate @ sway) / power
     left = sway + slope * rate
-    return slope, float(np.mean(left**2)) / power * _inflation(left)
-
-
-def _inflation(residual: FloatArray) -> float:
-    """Return how much fewer independent samples correlated residuals hold: (1 + rho) / (1 - rho)."""
-    centred = residual - residual.mean()
-    power = float(centred @ centred)
-    rho = float(centred[1:] @ centred[:-1]) / power if power > 0 else 0.0
-    rho = min(max(rho, 0.0), 0.98)
-    return (1.0 + rho) / (1.0 - rho)
+    return slope, float(np.mean(left**2)) / power * inflation([left - left.mean()])

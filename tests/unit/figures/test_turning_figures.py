@@ -53,7 +53,7 @@ def test_turn_figure_draws_both_sides_with_their_bands(source, count):
 def test_track_figure_draws_the_circle_with_its_radius():
     time = np.linspace(0.0, 40.0, 400)
     x, y = 3.0 * np.cos(0.4 * time), 3.0 * np.sin(0.4 * time)
-    circle = fit_circle(time, x, y)
+    circle = fit_circle(time, x, y, 0.4 * time + 0.5 * np.pi)
     measured = MeasuredTurn("run", "starboard", circle, -0.3, 1.5, 1.2, 0.0, 40.0, (x, y), (x, y))
     top, bottom = axes_of(turn.track_figure(measured))
     assert any("R = 3.000" in t.get_text() for t in top.get_legend().get_texts())

@@ -15,7 +15,7 @@ from fieldsid.schedule.flown import response
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.plants import plants_of
 from fieldsid.schedule.verdict import verdict_of
-from fieldsid.schedule.verify import stated_limits, verify_schedule
+from fieldsid.schedule.verify import verify_schedule
 from fieldsid.schedule.wish import Wish
 
 KIND = {kind.name: kind for kind in KINDS}
@@ -41,7 +41,7 @@ def _verified(kind):
             patched.setattr(response, name, _counting(getattr(response, name), steps))
         schedule = design_schedule(source, LIMIT, wish=Wish("pd"))
         checked = verify_schedule(schedule, source)
-    return schedule, checked, sum(steps), plants_of(source, stated_limits(schedule), (), None)
+    return schedule, checked, sum(steps), plants_of(source, schedule.stated_limits, (), None)
 
 
 def _counting(loop, steps):

@@ -7,7 +7,7 @@ import pytest
 from truth.paper import YAW
 
 from fieldsid.errors import ModelError, UsageError
-from fieldsid.turning.paper_formulas import counted_offset, refuse_short_fin, refuse_unstable, u_turn, usable_fin
+from fieldsid.turning.paper_formulas import refuse_short_fin, refuse_unstable, u_turn
 
 TABLE_4 = ((8.91, 22.42, 7.61), (11.53, 17.68, 7.65), (15.48, 13.93, 7.23), (19.54, 11.35, 6.94), (24.87, 9.34, 6.54))
 
@@ -19,9 +19,7 @@ def test_table_4_follows_from_table_2_within_one_percent(row, wanted):
 
 
 def test_case_study_is_9_7_metres_and_its_steady_circle_9_2():
-    fin = usable_fin(0.26, -0.064, -1.0, -1.0)
-    assert fin == pytest.approx(0.196)
-    turn = u_turn(1.37, 2.15, -1.62, fin)
+    turn = u_turn(1.37, 2.15, -1.62, 0.26 - 0.064)
     assert float(turn.radius) == pytest.approx(9.74, abs=0.05)
     assert float(turn.steady_radius) == pytest.approx(9.27, abs=0.1)
 
@@ -35,21 +33,6 @@ def test_papers_law_has_its_minimum_of_the_upper_branch_at_3_7_metres_per_second
     assert turn.radius[best] == pytest.approx(5.75, abs=0.01)
     assert turn.radius[0] == pytest.approx(4.0, abs=0.02)
     assert turn.time[0] == pytest.approx(50.0, abs=0.5)
-
-
-@pytest.mark.parametrize("authority_sign", [-1.0, 1.0])
-def test_the_offset_helps_one_side_by_what_it_costs_the_other(authority_sign):
-    b, offset, limit = authority_sign * 1.5, 0.03, 0.26
-    for side in (1.0, -1.0):
-        fin = side * authority_sign * limit
-        rate = b * (fin + offset)
-        assert abs(rate) == pytest.approx(abs(b) * usable_fin(limit, offset, side, authority_sign))
-
-
-def test_an_offset_within_a_degree_is_not_counted():
-    assert counted_offset(0.014) == 0.0
-    assert counted_offset(-0.064) == -0.064
-    assert counted_offset(0.014, 0.0) == 0.014
 
 
 def test_an_unstable_damping_and_a_fin_below_its_offset_are_refused():

@@ -15,14 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.faults.spikes import DIGITS, OF_MEDIAN, SPREADS, last_digit
-from fieldsid.logs.run import FINS, GOALS, MOTORS, SIGNALS, Note
+from fieldsid.logs.run import FINS, MEASURED, SIGNALS, Note
 from fieldsid.numerics.arrays import FloatArray
 
 MOST_CHANCE = 1e-3
 """Chance, of any number at all, that jumps land on it as often, above which it is one of few digits."""
 FEWEST = 3
 """Jumps to one number from which on it is a drop-out; a spike may stand alone."""
-SENSED = frozenset(SIGNALS) - GOALS - {*MOTORS, *FINS}
+SENSED = MEASURED - {*FINS}
 """A fin jumps, and to the same angles."""
 
 
@@ -67,16 +67,16 @@ class Dropout:
 def without_dropouts(name: str, values: FloatArray) -> tuple[FloatArray, list[Note]]:
     """Return a signal (n,) with its drop-outs missing, and the notes that say so."""
     notes = list[Note]()
-    while (found := _dropout_of(name, values[np.isfinite(values)])) is not None:
+    while (found := _dropout_of(values[np.isfinite(values)])) is not None:
         notes.append(found.note(name))
         values = np.where(values == found.number, np.nan, values)
     return values, notes
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def _dropout_of(name: str, values: FloatArray) -> Dropout | None:
+def _dropout_of(values: FloatArray) -> Dropout | None:
     """Return the number to which a signal (n,) without gaps jumps and back time and again; None where it does not."""
-    if name not in SENSED or values.size < 20:
+    if values.size < 20:
         return None
     steps = np.diff(values)
     usual = float(np.median(np.abs(np.diff(values, 2))))

@@ -15,14 +15,13 @@ import numpy.typing as npt
 
 from fieldsid.logs.convert.clock import Track
 from fieldsid.logs.convert.conditioning import blocks_of
+from fieldsid.logs.convert.faults.dropouts import FEWEST
 from fieldsid.logs.convert.heading_unwrap import FASTEST_RAD_S, MIN_JUMP_RAD, NOISES, noise_of_steps, within_half_turn
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 END_RAD = 1e-6
 """How far from a multiple of a right angle, which every frame makes of it, an end of the range may be."""
-FEWEST = 3
-"""Visits by a jump from which on a number is a fill."""
 GOES_ON = 0.8
 """Share of them over which the other samples must go on."""
 MOSTLY = 0.5

@@ -6,16 +6,18 @@ a kink and the peak of a fast answer are on one of the lines, so that at least o
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.white_noise import MEDIAN_OF_NORMAL
 
 SPREADS = 8.0
 """Standard deviations of the signal's own noise that all three distances exceed."""
-OF_MEDIAN = 1.2
+OF_MEDIAN = 1.0 / (MEDIAN_OF_NORMAL * math.sqrt(1.5))
 """Standard deviation of white noise over the median distance of its samples from the middle of their neighbours."""
 DIGITS = 3.0
 """Steps of the log's last digit that they exceed."""

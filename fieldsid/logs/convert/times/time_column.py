@@ -31,7 +31,7 @@ from fieldsid.logs.convert.times.clock_text import (
     stamps_of_text,
 )
 from fieldsid.logs.convert.times.coarse_stamps import rebuilt
-from fieldsid.logs.convert.times.dates import days_of_columns, texts
+from fieldsid.logs.convert.times.dates import YEARS, days_of_columns, texts
 from fieldsid.logs.convert.units import UNITS, pick_unit
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.run import Note
@@ -155,7 +155,7 @@ def _are_digits_of_a_clock(seen: npt.NDArray[Any]) -> bool:
     return bool(full.any() and (jumps >= 40.0).all() and (np.abs(steps[full]) <= FEW_STEPS * np.median(steps)).all())
 
 
-STAMPS = ((1.97e13, 2.12e13), (1.97e16, 2.12e16))
+STAMPS = tuple((YEARS[0] * 10.0**digits, YEARS[1] * 10.0**digits) for digits in (10, 13))
 """Dates and times of a log as one number, with milliseconds or without: ms and us since 1970 are of another size until 2500."""
 
 

@@ -22,6 +22,7 @@ from fieldsid.logs.convert.clock import Track, held
 from fieldsid.logs.convert.servo_counts import COUNTS, SERVOS, Servo
 from fieldsid.logs.convert.units import pick_unit
 from fieldsid.logs.doctor.together import width_of
+from fieldsid.logs.few_of import few_of
 from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.fins.shares import EXPLAINS, WINDOWS_S, FinShares, explains, fin_shares, moved_by
 from fieldsid.logs.mapping.mapping_file import mapping_of
@@ -107,8 +108,6 @@ def is_on_starboard(name: str) -> bool:
 PLACE = ("column", "topic", "field")
 THRUST_RAD = 0.4
 """What the largest difference of thrusters is taken for."""
-SHOWN = 8
-"""Outputs that a message names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,8 +160,7 @@ def which_output(inventory: Inventory, signals: Mapping[str, Any]) -> list[Note]
         ]
     )
     message = (
-        f"which servo moves which fin is not in the log; one line is missing, as `rudder_rad: {{{line}}}`, of: "
-        f"{', '.join(named[:SHOWN])}{', ...' * (len(named) > SHOWN)}"
+        f"which servo moves which fin is not in the log; one line is missing, as `rudder_rad: {{{line}}}`, of: {few_of(named)}"
     )
     return [Note("which_output", message, {"signal": "rudder_rad", "others": named})]
 

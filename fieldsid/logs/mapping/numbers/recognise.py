@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.frames import north_and_east
-from fieldsid.logs.convert.units import UNITS
+from fieldsid.logs.convert.units import CLEARLY, UNITS
 from fieldsid.logs.doctor.angle_and_rate import PAIRS
 from fieldsid.logs.doctor.together import FEWEST, change, width_of
 from fieldsid.logs.mapping.fins.shares import EXPLAINS, beyond, explained, explains, moved_by
@@ -38,8 +38,6 @@ MOST_SLIP = 3.0
 """How many times as far a heading may turn as its course, or the course as the heading: sideslip lies between them."""
 MOST_WAYS = 30
 BEYOND_TILTS_DEG = 90.0
-CLEARLY = 2.0
-"""How many times as much as any other column a fin must explain that the others do not: 4.8 to 20 on six zigzags of ships."""
 ALIKE = 0.95
 """Correlation of two columns that are one signal twice."""
 ONE_SIDED = 0.2

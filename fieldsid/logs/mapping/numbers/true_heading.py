@@ -19,9 +19,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.frames import north_and_east
+from fieldsid.logs.convert.units import CLEARLY
 from fieldsid.logs.doctor.angle_and_rate import PAIRS, changes_of
 from fieldsid.logs.doctor.pair_findings import AGREES, TURNED, WINDOW_S, course_of
-from fieldsid.logs.doctor.together import FEWEST, change, width_of
+from fieldsid.logs.doctor.together import FEWEST, SURE, change, width_of
 from fieldsid.logs.mapping.canonical_names import unit_in_name, words_of
 from fieldsid.logs.mapping.numbers.units_told import in_radians
 from fieldsid.logs.mapping.vocabulary import COMMANDED, COMPASS, LATITUDE, LONGITUDE, OF_ANOTHER, OVER_GROUND
@@ -32,10 +33,6 @@ from fieldsid.numerics.arrays import FloatArray
 
 LEAD_S = 1.0
 """Time over which a course is taken: in a longer one a vehicle turns more than once."""
-SURE = 4.0
-"""Standard errors by which one heading must lead, and the other not."""
-BETTER = 2.0
-"""How many times as well as another a heading must follow the rate of turn that is logged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +52,7 @@ def better_heading(runs: Sequence[Run], names: Sequence[str]) -> tuple[int, Note
     """Return which of the headings of one log, the first taken so far, is the vehicle's own in place of it, and why; or None."""
     misfits = [_off_rate(run) for run in runs]
     best = min(range(len(runs)), key=lambda i: misfits[i])
-    if np.isfinite(misfits[0]) and best != 0 and misfits[0] > BETTER * misfits[best]:
+    if np.isfinite(misfits[0]) and best != 0 and misfits[0] > CLEARLY * misfits[best]:
         why = f"the logged rate makes it within {misfits[best]:.2g} rad, the other within {misfits[0]:.2g} rad"
         return best, _taken(names, best, why)
     other = lead_of(runs[0])

@@ -23,8 +23,6 @@ from fieldsid.logs.doctor.signal_findings import LARGEST
 from fieldsid.logs.run import FINS, GOALS, MOTORS, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
-TURN = 6.4
-"""A heading whose numbers are larger is not within a turn in rad."""
 LARGEST_DEG = 180.0
 """A fin whose numbers are larger is in no unit of an angle."""
 WRAPPING = ("rad", "deg", "gon", "ddeg", "cdeg")
@@ -33,6 +31,8 @@ OF_A_TURN = 0.9
 """Share of a turn by which a heading jumps at least where it wraps: a vehicle does not turn by a tenth between two samples."""
 TO_A_TURN = 1.01
 """Turns that a heading which wraps spans at most: one, and what its last digit is rounded up by."""
+TURN = TO_A_TURN * math.tau
+"""A heading whose numbers are larger is not within a turn in rad."""
 OFTEN = 0.05
 """Share of the samples that must be beyond a turn in degrees: fewer may be damage."""
 MOST_TURNS = 10.0

@@ -131,13 +131,11 @@ class Collector:
         for topic, packets in self.packets.items():
             packets.leave_out_from(counts.get(topic, 0))
 
-    def has_read(self, size: int) -> bool:
-        """Count bytes that were read; return whether what waits was settled, as it is every SETTLE_BYTES."""
+    def has_read(self, size: int) -> None:
+        """Count bytes that were read; what waits is settled every SETTLE_BYTES."""
         self._waiting += size
-        if self._waiting < SETTLE_BYTES:
-            return False
-        self.settle()
-        return True
+        if self._waiting >= SETTLE_BYTES:
+            self.settle()
 
     def settle(self) -> None:
         """Hand on what waits, and tell how far the reading is."""

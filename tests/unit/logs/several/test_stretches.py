@@ -21,7 +21,7 @@ def between(start, end):
 
 
 def parts(run):
-    return [(round(s.start_s), round(s.end_s)) for s in stretches_of(run)[0]]
+    return [(round(start), round(end)) for start, end in stretches_of(run)[0]]
 
 
 @pytest.mark.parametrize("signal", ["surge_m_s", "thrust", "propeller_rpm"])
@@ -53,10 +53,7 @@ def test_a_tail_in_which_nothing_changes_is_left_out():
 
 def test_a_gap_of_the_log_makes_two_runs():
     time = np.where(TIME < 150, TIME, TIME + 60)
-    assert [(round(s.start_s), round(s.end_s)) for s in stretches_of(Run("run", time, flown().signals))[0]] == [
-        (0, 150),
-        (210, 360),
-    ]
+    assert parts(Run("run", time, flown().signals)) == [(0, 150), (210, 360)]
 
 
 def test_a_short_stop_is_no_reason_to_cut():

@@ -10,32 +10,30 @@ from plan_legs import leg
 
 from fieldsid.models.axis import Axis
 from fieldsid.planning.design.abort_conditions import aborts_of
-from fieldsid.planning.flight.closed_loop import Response
-from fieldsid.planning.safety.envelope import NOT_LIMITED, Envelope, excursion_of, limits_said
+from fieldsid.planning.safety.envelope import NOT_LIMITED, Envelope, excursions_of, limits_said, used
 
 TIME = 0.05 * np.arange(801)
 
 
-def flown(angle):
-    """A flight that follows a heading (n,) rad at 1 m/s."""
-    return Response(TIME, 0.0 * TIME, angle, np.gradient(angle, TIME))
+def flown(heading, run_up):
+    """How far a flight goes that holds a heading in rad at 1 m/s."""
+    angle = np.full((TIME.size, 1), heading)
+    return excursions_of(Axis.YAW, angle, 0.0 * angle, speed=1.0, step=0.05, run_up=run_up, roll_gain=1.0)
 
 
 def test_a_flight_all_to_one_side_leaves_an_area_whose_half_it_leaves():
-    sideways = flown(np.full(TIME.size, np.pi / 2))  # 40 m to starboard
-    far = excursion_of(Axis.YAW, sideways, 1.0, run_up=10.0)
-    assert far.across == pytest.approx(40.0, abs=0.1)
-    assert far.over(Envelope(0.2, area_length=100.0, area_width=60.0))["across"] > 1.3
-    assert far.over(Envelope(0.2, area_length=100.0, area_width=90.0))["across"] < 1.0
+    sideways = flown(np.pi / 2, 10.0)  # 40 m to starboard
+    assert sideways["across"] == pytest.approx(40.0, abs=0.1)
+    assert used(sideways, Envelope(0.2, area_length=100.0, area_width=60.0)) > 1.3
+    assert used(sideways, Envelope(0.2, area_length=100.0, area_width=90.0)) < 1.0
 
 
 def test_the_area_begins_at_the_start_of_the_run_up():
-    back = flown(np.full(TIME.size, np.pi))
     area = Envelope(0.2, area_length=100.0, area_width=60.0)
-    assert excursion_of(Axis.YAW, back, 1.0, run_up=50.0).over(area)["along"] < 1.0
-    behind = excursion_of(Axis.YAW, back, 1.0, run_up=30.0)
-    assert behind.behind == pytest.approx(10.0, abs=0.1)
-    assert behind.over(area)["along"] > 1.0
+    assert used(flown(np.pi, 50.0), area) < 1.0
+    behind = flown(np.pi, 30.0)
+    assert behind["behind"] == pytest.approx(10.0, abs=0.1)
+    assert used(behind, area) > 1.0
 
 
 def test_every_limit_that_is_set_ends_the_maneuver_whatever_axis_it_moves():

@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import LogError, MappingError
+from fieldsid.logs.few_of import SHOWN
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
 
@@ -34,7 +35,6 @@ PADDING = "structure_needs_at_least_one_member"
 QUATERNION = ("x", "y", "z", "w")
 DEEPEST, MOST_PARTS = 50, 100_000
 """Types inside one another, and fields of all of them together: a message with more could be no message of any length."""
-DEEPEST_SHOWN = 5
 ROWS_APART = 32
 """Layouts tried on whole blocks before messages are taken one by one."""
 
@@ -232,7 +232,7 @@ def refuse_endless(definitions: Definitions, type_name: str) -> None:
         if name in above or len(above) > DEEPEST:
             raise LogError(
                 f"message type `{type_name}` is a type that holds itself, or one in one without end",
-                found=" in ".join([name, *above[::-1]][:DEEPEST_SHOWN]),
+                found=" in ".join([name, *above[::-1]][:SHOWN]),
                 hint="give a definition that ends: `--msg-path DIR`",
             )
         if name not in known:
