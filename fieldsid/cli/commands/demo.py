@@ -7,7 +7,6 @@ import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext, redirect_stderr, redirect_stdout
 from pathlib import Path
-from textwrap import fill
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,7 +18,7 @@ from fieldsid.cli.progress import compiling
 from fieldsid.cli.session import Session
 from fieldsid.cli.voice import voice
 from fieldsid.errors import ArtifactError
-from fieldsid.page import Page, written
+from fieldsid.page import Page, folded, written
 from fieldsid.runtime.background_tasks import BackgroundTasks
 
 if TYPE_CHECKING:
@@ -140,10 +139,10 @@ def _taken(place: int, step: Step, known: Mapping[str, str], session: Session, *
     meaning = step.means(result)
     if told == BRIEF:
         said = f"{place:2d}. {step.title}{'' if step.title.endswith('?') else ':'} {step.brief(result)}"
-        sys.stdout.write(f"{fill(said, WIDTH, subsequent_indent='    ', break_on_hyphens=False)}\n")
+        sys.stdout.write(f"{folded(said, WIDTH, rest='    ')}\n")
         sys.stdout.flush()
     if told == VERBOSE:
-        sys.stdout.write(f"\n{fill(meaning, WIDTH, initial_indent='=> ', subsequent_indent='   ', break_on_hyphens=False)}\n")
+        sys.stdout.write(f"\n{folded(meaning, WIDTH, first='=> ', rest='   ')}\n")
         sys.stdout.flush()
     return Taken("sysid " + " ".join(words), perf_counter() - began, meaning, result)
 
@@ -156,7 +155,7 @@ def _silence() -> Iterator[None]:
 
 def _told(text: str, told: str) -> None:
     if told != SILENT:
-        sys.stdout.write(f"\n{fill(text, WIDTH, break_on_hyphens=False)}\n" + ("\n" if told == BRIEF else ""))
+        sys.stdout.write(f"\n{folded(text, WIDTH, rest='')}\n" + ("\n" if told == BRIEF else ""))
         sys.stdout.flush()
 
 
