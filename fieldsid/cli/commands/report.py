@@ -53,7 +53,7 @@ def command(
             bytes=path.stat().st_size,
             verdicts=tuple(ReportVerdict(v["what"], v["says"]) for v in context["verdicts"]),
             runs=tuple(r["name"] for r in context["runs"]),
-            models=tuple(m["path"] for a in context["axes"] for m in a["models"]),
+            models=tuple(context["models"]),
             figures=text.count('<svg class="chart"') + text.count('<svg class="bars"'),
             skipped=tuple(context["skipped"]),
         )

@@ -109,5 +109,5 @@ def _row(item: Item) -> tuple[str, ...]:
     said = ", ".join(names) if len(names) <= MOST_SOURCES else f"{names[0]} and {len(names) - 1} more"
     what = NAMES[item.kind]
     effects = len((item.body or {}).get("effects", ())) if item.kind == "model" else 0
-    state = f"stale: {item.stale}" if item.stale else f"not there: {', '.join(item.missing)}" if item.missing else ""
-    return item.path, f"{what}, {counted(effects, 'effect')}" if effects else what, said, state
+    told = f"{what}, {counted(effects, 'effect')}" if effects else what
+    return item.path, told, said.replace("+", " +"), item.standing  # a line ends between effects
