@@ -42,8 +42,8 @@ def command(
         found = inspect_log(path, mapping=mapping, msg_path=msg_path, joined=joined, progress=on_share)
     written = write_proposal(found, write_mapping, force=force) if write_mapping is not None else None
     result = inspected(found, written)
-    body = body_of(result)
-    emit(body, as_json=as_json, render=lambda to: _render(found, result, to), headline=of_inspection(body, mapping))
+    headline = of_inspection(result, mapping)
+    emit(body_of(result), as_json=as_json, render=lambda to: _render(found, result, to), headline=headline)
 
 
 def _render(found: Inspection, result: Inspected, to: Console) -> None:

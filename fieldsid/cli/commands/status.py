@@ -62,19 +62,17 @@ def command(
     why, line = next_step(state)
     if line and folder.resolve() != Path.cwd():
         line = f"cd {shlex.quote(str(folder))} && {line}"
-    body = body_of(
-        Status(
-            folder=str(folder),
-            verdict=_verdict(state),
-            files=state.items,
-            stale=tuple(i.path for i in state.items if i.stale),
-            journal=state.entries,
-            unreadable_journal_lines=state.broken_lines,
-            warnings=tuple(notes),
-            next=NextStep(why, line),
-        )
+    told = Status(
+        folder=str(folder),
+        verdict=_verdict(state),
+        files=state.items,
+        stale=tuple(i.path for i in state.items if i.stale),
+        journal=state.entries,
+        unreadable_journal_lines=state.broken_lines,
+        warnings=tuple(notes),
+        next=NextStep(why, line),
     )
-    return emit(body, as_json=as_json, render=_page(state), headline=of_status(body), notes=notes)
+    return emit(body_of(told), as_json=as_json, render=_page(state), headline=of_status(told), notes=notes)
 
 
 def _verdict(state: FolderState) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import Body, named, used
+from fieldsid.cli.headlines.words import named, used
 from fieldsid.cli.voice import angles
 from fieldsid.page import counted
 from fieldsid.rounding import MANY, noise_fall, times_noise
@@ -18,7 +18,9 @@ from fieldsid.rounding import MANY, noise_fall, times_noise
 if TYPE_CHECKING:
     from fieldsid.diagnosis import Diagnosis
     from fieldsid.extension import Gain
+    from fieldsid.models.effect import Effect
     from fieldsid.results.diagnoses import Diagnosed
+    from fieldsid.results.effects import NewEffect
     from fieldsid.results.extensions import Extended, LeftOver, Undone
 
 MODELS = "models"
@@ -160,30 +162,27 @@ def of_undoing(told: Undone) -> Headline:
     )
 
 
-def of_catalogue(body: Body) -> Headline:
+def of_catalogue(effects: Sequence[Effect]) -> Headline:
     """Return how many effects there are."""
-    effects = body["effects"]
-    stages = [str(e["stage"]) for e in effects]
+    stages = [e.stage for e in effects]
     shares = ", ".join(f"{stages.count(s)} {s}" for s in dict.fromkeys(stages))
-    own = sum("/" in str(e["origin"]) for e in effects)
+    own = sum("/" in e.origin for e in effects)
     return Headline(
         f"{counted(len(effects), 'effect')}: {shares}",
         "what is built in" + (f" and {own} of your own" if own else "; your own go into effects/"),
-        pasted("effects", "show", effects[0]["name"]),
+        pasted("effects", "show", effects[0].name),
     )
 
 
-def of_effect(body: Body) -> Headline:
+def of_effect(effect: Effect) -> Headline:
     """Return what an effect is, and the maneuver that shows it."""
-    name, axis = str(body["name"]), str(body["axes"][0])
-    return Headline(
-        f"{name}: {body['says']}", str(body["source"]), pasted("plan", "--axis", axis, "--separate", f"none,{name}", "-o", "plan")
-    )
+    plan = pasted("plan", "--axis", effect.axes[0], "--separate", f"none,{effect.name}", "-o", "plan")
+    return Headline(f"{effect.name}: {effect.says}", effect.source, plan)
 
 
-def of_new_effect(body: Body, look: str) -> Headline:
+def of_new_effect(told: NewEffect, look: str) -> Headline:
     """Return what was written; look: the line to look at it."""
-    says, rests = f"wrote {body['file']}: edit its moment and coefficients", f"the template of an effect, for {body['axis']}"
+    says, rests = f"wrote {told.file}: edit its moment and coefficients", f"the template of an effect, for {told.axis}"
     return Headline(says, rests, look)
 
 
