@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
+from re import compile as pattern
 from textwrap import fill
 
 INDENT = "  "
 GAP = "  "
 WIDTH = 100
 """Columns from which on a sentence goes on in the next line."""
+_BESIDE_A_NUMBER = pattern(r" (?=\.\.|\+/-)|(?<=\.\.) |(?<=\+/-) |(?<=\d) (?=%|1/s|[A-Za-z]{1,3}\b)")
+"""The blanks of `1.2 +/- 0.3 rad/s`, `5 .. 9 deg` and `8 %`, at which no line ends."""
 LONGEST_WORD = 60
 """Characters of a name or a path in a line, beyond which its middle is left out."""
 
@@ -67,16 +70,16 @@ def written(**files: str | Iterable[str] | None) -> tuple[str, ...]:
 
 def text_of(page: Page) -> str:
     """Return a page as text: title and warnings first, then its blocks; sentences are folded, tables are not."""
-    head = [_folded(line) for line in (page.title, *(f"warning: {w}" for w in page.warnings))]
+    head = [folded(line) for line in (page.title, *(f"warning: {w}" for w in page.warnings))]
     parts = ["\n".join(head)]
     for b in page.blocks:
         if isinstance(b, Block):
             parts += [_block_text(b)] if b.rows else []
         elif b.startswith("\n"):
-            parts.append(_folded(b[1:]))
+            parts.append(folded(b[1:]))
         else:
-            parts[-1] += f"\n{_folded(b)}"
-    return "\n\n".join([*parts, *(["\n".join(map(_folded, page.closing))] if page.closing else [])])
+            parts[-1] += f"\n{folded(b)}"
+    return "\n\n".join([*parts, *(["\n".join(map(folded, page.closing))] if page.closing else [])])
 
 
 def html_of(page: Page) -> str:
@@ -110,12 +113,28 @@ def listed(names: Sequence[str], most: int = 4) -> str:
     return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
 
 
-def _folded(line: str, indent: int = len(INDENT)) -> str:
-    """Return a line as several of a page's width, all but the first indented, words and names unbroken."""
-    return fill(line, WIDTH, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False)
+def folded(line: str, width: int = WIDTH, *, first: str = "", rest: str = INDENT) -> str:
+    """Return a line as several of a width, words and names unbroken and a number in one line with its error and its unit.
+
+    first and rest: what the first of them, and what the others begin with.
+    """
+    glued = _BESIDE_A_NUMBER.sub("\u00a0", line)
+    folds = fill(glued, width, initial_indent=first, subsequent_indent=rest, break_long_words=False, break_on_hyphens=False)
+    return folds.replace("\u00a0", " ")
+
+
+def dense(block: Block) -> Block:
+    """Return a block without the columns that nothing stands in."""
+    if not block.rows:
+        return block
+    kept = [i for i in range(len(block.rows[0])) if any(row[i] for row in block.rows)]
+    rows = tuple(tuple(row[i] for i in kept) for row in block.rows)
+    columns = tuple(block.columns[i] for i in kept if block.columns)
+    return replace(block, rows=rows, columns=columns, left=sum(i < block.left for i in kept))
 
 
 def _block_text(block: Block) -> str:
+    block = dense(block)
     if not block.columns and block.left == 2:
         return "\n".join([block.title, *_fact_lines(block.rows)])
     rows = [block.columns, *block.rows] if block.columns else list(block.rows)
@@ -129,11 +148,12 @@ def _block_text(block: Block) -> str:
 
 def _fact_lines(rows: Sequence[tuple[str, ...]]) -> list[str]:
     width = max(len(name) for name, _ in rows)
-    indent = len(INDENT) + width + len(GAP)
-    return [_folded(f"{INDENT}{name.ljust(width)}{GAP}{said}", indent) for name, said in rows]
+    rest = " " * (len(INDENT) + width + len(GAP))
+    return [folded(said, first=f"{INDENT}{name.ljust(width)}{GAP}", rest=rest) for name, said in rows]
 
 
 def _block_html(block: Block) -> str:
+    block = dense(block)
     head = f"<tr>{_cells('th', block.columns, block.left)}</tr>" if block.columns else ""
     rows = "".join(f"<tr>{_cells('td', row, block.left)}</tr>" for row in block.rows)
     caption = f"<caption>{escape(block.title)}</caption>" if block.title else ""

@@ -26,7 +26,7 @@ from fieldsid.artifacts import plain
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.voice import voice
 from fieldsid.logs.run import Note
-from fieldsid.page import Block, Page, Whole, told
+from fieldsid.page import Block, Page, Whole, dense, folded, told
 from fieldsid.records.keys import body_of
 from fieldsid.text.one_line import one_line
 
@@ -137,8 +137,10 @@ def print_page(to: Console, page: Page) -> None:
             to.print()
         if isinstance(block, Block):
             to.print(table(block))
-        else:
-            to.print(block.removeprefix("\n"), soft_wrap=isinstance(block, Whole))
+            continue
+        said = one_line(block.removeprefix("\n"))
+        for line in [said] if isinstance(block, Whole) else folded(said, to.width, rest="").split("\n"):
+            to.print(line, soft_wrap=True)
     for line in page.closing:
         to.print(line, soft_wrap=True)
 
@@ -174,6 +176,7 @@ class Rows(Table):
 
 def table(block: Block) -> Table:
     """Return the table of a block: its columns behind those of words are to the right, and whole if of numbers."""
+    block = dense(block)
     made = Rows(
         title=block.title or None,
         title_justify="left",
@@ -217,7 +220,7 @@ def warn(notes: Iterable[Note], *, of: str = "") -> None:
     where, to = f"{of}: " if of else "", messages()
     for note in notes:
         said = f"{where}{note.message} [{note.code}]"
-        to.print(words(f"warning: {folded(said, to.width) if to.is_terminal else said}", "yellow"), soft_wrap=True)
+        to.print(words(f"warning: {shortened(said, to.width) if to.is_terminal else said}", "yellow"), soft_wrap=True)
 
 
 def alike(found: Iterable[tuple[Hashable, str, Note]]) -> list[Note]:
@@ -231,11 +234,12 @@ def alike(found: Iterable[tuple[Hashable, str, Note]]) -> list[Note]:
     said = []
     for (whose, note), *others in kinds.values():
         more = f" (and {len(others)} more like it)" if others else ""
-        said.append(Note(note.code, f"{whose}: {note.message}{more}", {}))
+        of = "" if whose in note.message else f"{whose}: "
+        said.append(Note(note.code, f"{of}{note.message}{more}", {}))
     return said
 
 
-def folded(text: str, width: int) -> str:
+def shortened(text: str, width: int) -> str:
     """Return a warning as it fits a line behind `warning: `, its code kept; whole with `-v`."""
     room = width - len("warning: ")
     if voice().is_verbose or len(text) <= room:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Annotated, Literal
 
 from fieldsid.comparison.conditions import conditions
@@ -21,12 +22,26 @@ from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import record_of
 from fieldsid.noise.white_floor import white_noise_floor
 from fieldsid.records.keys import INLINE, Key
-from fieldsid.rounding import MANY
+from fieldsid.rounding import MANY, Angles, number
 
 
 def left_in_words(over_floor: float, fit: float, digits: int = 1) -> str:
     """Return what a model leaves of a channel: the error over its noise; of a log without noise the fit in percent."""
     return f"{over_floor:.{digits}f} x its noise" if over_floor < MANY else f"fit {fit:.1f} %"
+
+
+def errors_in_words(merit: GoodnessOfFit, floor: Noise, angles: Angles, digits: int) -> list[tuple[str, str]]:
+    """Return each measured channel and, to some digits in a unit of angle, its free-run error beside its noise, and the fit."""
+
+    def said(unit: str, rms: float, noise: float, fit: float) -> str:
+        error, of = (number(angles.factor * v, digits) for v in (rms, noise))
+        return f"rms {error} {unit} (noise {of}), fit {number(fit, 3)} %"
+
+    channels = (
+        ("angle", angles.unit, merit.angle_rms, floor.angle, merit.angle_fit),
+        ("rate", f"{angles.unit}/s", merit.rate_rms, floor.rate, merit.rate_fit),
+    )
+    return [(name, said(unit, rms, *more)) for name, unit, rms, *more in channels if isfinite(rms)]
 
 
 def badness(over_floor: float, fit: float) -> tuple[float, float]:

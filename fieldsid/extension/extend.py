@@ -36,6 +36,8 @@ FITTED_TO_ALL = Note(
     "fitted_to_all",
     "the runs to fit leave the addition's size open, and the unseen ones settle it: all were fitted, none is left to judge by",
 )
+FORM_TAKEN = "form_taken"
+"""Code of the note that an effect was added in a form that is not the textbook's."""
 BEAM_WIDTH = 2
 """Orders in which several effects are added that are followed from one addition to the next."""
 
@@ -143,10 +145,10 @@ def extend_in_steps(
 
 
 def whole_of(steps: Sequence[Extension]) -> Extension:
-    """Return steps as one extension: from before the first to after the last."""
+    """Return steps as one extension, from before the first to after the last: how the runs were flown the last model says."""
     first, last = steps[0].gain, steps[-1].gain
     gain = replace(last, added=tuple(name for s in steps for name in s.gain.added), before=first.before)
-    notes = tuple({(n.code, n.message): n for s in steps for n in s.notes}.values())
+    notes = (*(n for s in steps[:-1] for n in s.notes if n.code == FORM_TAKEN), *steps[-1].notes)
     return replace(steps[-1], gain=gain, evidence=sum(s.evidence for s in steps), notes=notes)
 
 
@@ -211,7 +213,7 @@ def forms_taken(model: Model, new: Sequence[Effect]) -> tuple[Note, ...]:
                 f"`{effect.name}` has more evidence here in a form that is not the textbook's ({form.says}: "
                 f"{', '.join(sorted(own - textbook))}): where `diagnose` judged another form, its error is another"
             )
-            notes.append(Note("form_taken", words, {"effect": effect.name, "coefficients": sorted(own)}))
+            notes.append(Note(FORM_TAKEN, words, {"effect": effect.name, "coefficients": sorted(own)}))
     return tuple(notes)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
@@ -121,8 +122,8 @@ def runs_behind(source: ParameterSource, say: Callable[[str], None]) -> list[Run
     if not source.models or not source.paths or source.axis is not Axis.YAW:
         return []
     named = logs_of(source.paths)
-    there = [p for _, p in named if p is not None]
-    runs = [run for run in parallel_map(lambda path: attempt(load_run, path), there) if not isinstance(run, FieldsidError)]
+    there, read = [p for _, p in named if p is not None], partial(load_run, recognise=True)
+    runs = [run for run in parallel_map(lambda path: attempt(read, path), there) if not isinstance(run, FieldsidError)]
     if len(runs) < len(named):
         lost = f"{len(named) - len(runs)} of {len(named)} runs of the models"
         say(f"{lost} are gone, closed or outside of this folder: the speed lost in a turn is not measured in them")

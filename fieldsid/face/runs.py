@@ -33,7 +33,8 @@ Logs: TypeAlias = "Log | Iterable[Log] | Mapping[str, DataFrame]"
 class Reading:
     """How logs are read: mapping, single channels, message definitions, what is allowed, and the part that is taken in s.
 
-    `joined` are the other tables of a run of which the one file that is read is one.
+    `joined` are the other tables of a run of which the one file that is read is one. `recognise`: a log without a mapping is read
+    by what `inspect` proposes, where that is in no doubt.
     """
 
     mapping: ChannelMap | Path | None = None
@@ -46,6 +47,7 @@ class Reading:
     end: float | None = None
     whole: bool = True
     joined: tuple[Path, ...] = ()
+    recognise: bool = False
 
     def of_file(self, path: Path) -> list[Run]:
         """Return the run of a file, or where not all of it is wanted its stretches under way."""
@@ -53,7 +55,7 @@ class Reading:
         def load_part(part: tuple[float, float], max_gap_s: float) -> Run:
             return load_run(
                 path, self.mapping, channels=self.channels, msg_path=self.msg_path, joined=self.joined, salvage=self.salvage,
-                max_gap_s=max_gap_s, part=part, fin_max_rad=self.fin_max_rad,
+                max_gap_s=max_gap_s, part=part, fin_max_rad=self.fin_max_rad, recognise=self.recognise,
             )  # fmt: skip
 
         if self.whole or not (self.start is None and self.end is None):
@@ -138,8 +140,8 @@ def runs_of(logs: Logs, reading: Reading | None = None) -> Several[Run]:
 def runs_mapped(
     logs: Logs, mapping: ChannelMap | File | None, start: float | None = None, end: float | None = None
 ) -> Several[Run]:
-    """Return the runs of logs with a mapping, cut to start .. end s; raises as `load` does."""
-    return runs_of(logs, Reading(mapping=_mapping(mapping), start=start, end=end))
+    """Return the runs of logs as every command but `import` reads them, cut to start .. end s; raises as `load` does."""
+    return runs_of(logs, Reading(mapping=_mapping(mapping), start=start, end=end, recognise=True))
 
 
 def files_of(name: File, what: str = "log") -> list[Path]:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import degrees, isfinite
+from math import isfinite
 from textwrap import fill
 
 from matplotlib.figure import Figure, SubFigure
 
-from fieldsid.comparison.compare import Channel, Comparison, left_in_words
+from fieldsid.comparison.compare import Channel, Comparison, errors_in_words, left_in_words
 from fieldsid.figures import canvas, motion, where
 from fieldsid.models.model import Model
-from fieldsid.rounding import DEGREES, number
+from fieldsid.rounding import DEGREES
 
 MOST_BARS = 12
 TITLE_WIDTH = 38
@@ -54,14 +54,6 @@ def view_of(found: Comparison) -> motion.MotionView:
 
 def facts(found: Comparison) -> str:
     """Return the line of facts: speed, rms against the noise, fit."""
-    m, floor = found.merit, found.floor
-    parts = [f"{found.shown.record.speed:.2f} m/s"] if isfinite(found.shown.record.speed) else []
-    for name, unit, rms, noise, fit in (
-        ("angle", "deg", m.angle_rms, floor.angle, m.angle_fit),
-        ("rate", "deg/s", m.rate_rms, floor.rate, m.rate_fit),
-    ):
-        if isfinite(rms):
-            parts.append(
-                f"{name} rms {number(degrees(rms), 2)} {unit} (noise {number(degrees(noise), 2)}), fit {number(fit, 3)} %"
-            )
-    return "; ".join(parts)
+    speed = found.shown.record.speed
+    errors = (f"{name} {said}" for name, said in errors_in_words(found.merit, found.floor, DEGREES, 2))
+    return "; ".join([*([f"{speed:.2f} m/s"] if isfinite(speed) else []), *errors])

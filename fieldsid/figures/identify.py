@@ -50,7 +50,7 @@ def heading(model: Model, run: str) -> str:
 def facts(fit: Fit, shown: Prediction) -> str:
     """Return the second line: speed, method, effects, and how well the free run follows."""
     m, speed = goodness_of_fit([shown]), shown.record.speed
-    words = [f"{speed:.2f} m/s" if isfinite(speed) else "speed unknown", fit.model.method]
+    words = [f"flown at {speed:.2f} m/s" if isfinite(speed) else "speed unknown", fit.model.method]
     words += list(fit.model.effects)
     fits = ((f"{n} fit {v:.1f} %") for n, v in (("angle", m.angle_fit), ("rate", m.rate_fit)) if isfinite(v))
     return ", ".join((*words, *fits))

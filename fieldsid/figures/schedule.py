@@ -24,14 +24,16 @@ STOP_SHARE = 0.999
 
 
 def figure(schedule: Schedule, verification: Verification) -> Figure:
-    """Return gains, feed-forward, margins and a straight leg at the left, steps and their fin at the right."""
+    """Return gains, feed-forward, margins and a a leg in the disturbance, if any, at the left; steps and fin at the right."""
     sheet = canvas.sheet(12.0, 11.0)
     left, right = np.asarray(sheet.subfigures(1, 2, width_ratios=(1.0, 1.15)), dtype=object)
-    gains, forward, margins, leg = np.ravel(left.subplots(4, 1))
+    disturbance = verification.disturbance
+    gains, forward, margins, *leg = np.ravel(left.subplots(3 + (disturbance > 0), 1))
     draw_gains(schedule, gains)
     draw_forward(schedule, forward)
     draw_margins(schedule, verification.scheduled, margins)
-    draw_leg([(f.speed, f.leg) for f in verification.flown], verification.disturbance, leg)
+    for ax in leg:
+        draw_leg([(f.speed, f.leg) for f in verification.flown], disturbance, ax)
     *steps, fin = np.ravel(right.subplots(4, 1))
     until = SHOWN_SHARE * max(f.pace.flight for f in verification.flown)
     for at, (size, ax) in enumerate(zip(steps_of(schedule), steps, strict=True)):
@@ -143,9 +145,7 @@ def draw_leg(legs: Sequence[tuple[float, Steps]], disturbance: float, ax: Axes) 
         most = max(most, float(np.abs(angle).max()))
     ax.set_ylim(-max(1.1 * most, LEAST_LEG_DEG), max(1.1 * most, LEAST_LEG_DEG))
     canvas.dress(ax, x="time, s", y="straight leg, deg")
-    known = f"a disturbance as the runs had, up to {disturbance:.2g} rad/s² rms"
-    said = f"straight leg in {known}" if disturbance > 0 else "straight leg: the models' runs showed no disturbance"
-    ax.set_title(said, loc="left", fontsize=9)
+    ax.set_title(f"straight leg in a disturbance as the runs had, up to {disturbance:.2g} rad/s² rms", loc="left", fontsize=9)
 
 
 def _colours(speeds: Sequence[float]) -> list[tuple[float, float, float]]:

@@ -79,7 +79,8 @@ TURN_RADIUS: Shape = {
             "yaw_rate_max_rad_s": number(0.0),
             "trust": text,
             "extrapolated": flag,
-            **dict.fromkeys(("steady_radius_m?", "u_turn_radius_m?", "u_turn_time_s?"), maybe(number(0.0))),
+            "method?": one_of(("maneuvering", "simulated", "u_turn", "steady", "measured")),
+            **dict.fromkeys(("steady_radius_m?", "u_turn_radius_m?", "u_turn_time_s?", "model_radius_m?"), maybe(number(0.0))),
         }
     ),
 }

@@ -15,6 +15,7 @@ from fieldsid.models.axis import NAMES
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.reporting.chart import Band, Panel, Series, bars, chart, legend, thinned
 from fieldsid.rounding import DEGREES, TWO_SIDED_95
+from fieldsid.schedule.record import Schedule
 
 DEG = np.degrees(1.0)
 MOST_BARS = 8
@@ -125,19 +126,19 @@ def radius(body: Mapping[str, Any]) -> tuple[str, str]:
     )
 
 
-def gains(body: Mapping[str, Any]) -> str:
+def gains(schedule: Schedule) -> str:
     """Return the gains of a schedule and its phase margin over speed, and the margin that was asked for."""
-    rows = body["rows"]
-    x = np.array([r["speed_m_s"] for r in rows], dtype=float)
-    panels = []
-    for name, unit in (("kp", "rad/rad"), ("ki", "1/s"), ("kd", "s")):
-        y = np.array([r[name] for r in rows], dtype=float)
-        if np.any(y != 0):
-            panels.append(Panel(f"{name}, {unit}", (Series(x, y, "simulated", name), Series(x, y, "simulated", name, "points"))))
-    phase = np.array([r["phase_margin_deg"] if r["phase_margin_deg"] is not None else np.nan for r in rows], dtype=float)
-    wanted = np.full(x.size, float(body["phase_margin_wanted_deg"]))
-    margin = (Series(x, phase, "second", "phase margin"), Series(x, phase, "second", "phase margin", "points"))
-    asked = Series(x, wanted, "quiet", "asked for")
+    x = np.array(schedule.speeds, dtype=float)
+
+    def line(values: Sequence[float], kind: str, name: str) -> tuple[Series, Series]:
+        y = np.array(values, dtype=float)
+        return Series(x, y, kind, name), Series(x, y, kind, name, "points")
+
+    kinds = {"kp, rad/rad": "kp", "ki, 1/s": "ki", "kd, s": "kd"}
+    drawn = {label: [getattr(r.gains, name) for r in schedule.rows] for label, name in kinds.items()}
+    panels = [Panel(label, line(y, "simulated", kinds[label])) for label, y in drawn.items() if any(y)]
+    margin = line([r.phase_margin_deg for r in schedule.rows], "second", "phase margin")
+    asked = Series(x, np.full(x.size, schedule.phase_margin_deg), "quiet", "asked for")
     panels.append(Panel("phase margin, deg (line: asked for)", (asked, *margin), height=100, from_zero=True))
     return chart(panels, "speed, m/s", "gains and phase margin over speed")
 

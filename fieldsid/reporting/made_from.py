@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import PurePosixPath
 
+from fieldsid.page import Block
 from fieldsid.trial_folder.journal import Hashes, made_by, relative_to
 from fieldsid.trial_folder.state import LOG, RUN, FolderState, Item, Source
 
@@ -15,28 +16,29 @@ HASH = 8
 """Characters of a SHA-256 that are shown."""
 
 
-def lineage_rows(state: FolderState) -> list[dict[str, str]]:
+def lineage(state: FolderState) -> Block:
     """Return a row for each file; a log that a run was made from stands in the row of that run."""
     hashes = Hashes(state.folder, state.entries)
     used = {_name(s, state) for run in state.of_kind(RUN) for s in run.sources}
     items = [i for i in state.items if not (i.kind == LOG and i.path in used)]
     now = {i.path: hashes.of_named(state.place(i)) or NOT_HASHED for i in items}
-    return [_row(i, state, now) for i in items]
+    heads = ("file", "SHA-256", "what", "made from", "by", "")
+    return Block("Files, with the start of their SHA-256", tuple(_row(i, state, now) for i in items), heads, left=len(heads))
 
 
-def _row(item: Item, state: FolderState, now: Mapping[str, str]) -> dict[str, str]:
+def _row(item: Item, state: FolderState, now: Mapping[str, str]) -> tuple[str, ...]:
     maker = made_by(state.entries, item.path)
     named = [(s, _name(s, state)) for s in item.sources]
     told = [f"{name} ({s.sha256[:HASH]})" for s, name in named if s.sha256 and now.get(name) != s.sha256]
     plain = [name for s, name in named if not s.sha256 or now.get(name) == s.sha256]
-    return {
-        "path": item.path,
-        "sha": now[item.path][:HASH],
-        "kind": item.kind,
-        "made_from": "; ".join([*_together(plain, now), *told]),
-        "by": "" if maker is None else " ".join(maker.command[1 : 3 if maker.command[1] == "schedule" else 2]),
-        "state": f"stale: {item.stale}" if item.stale else f"not there: {', '.join(item.missing)}" if item.missing else "",
-    }
+    return (
+        item.path,
+        now[item.path][:HASH],
+        item.kind,
+        "; ".join([*_together(plain, now), *told]),
+        "" if maker is None else " ".join(maker.command[1 : 3 if maker.command[1] == "schedule" else 2]),
+        item.standing,
+    )
 
 
 def _name(source: Source, state: FolderState) -> str:

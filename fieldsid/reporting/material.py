@@ -18,6 +18,7 @@ from fieldsid.models.model import Model, load_model
 from fieldsid.plant.parameter_source import ParameterSource, load_parameter_source
 from fieldsid.records.check import ShapeError, check
 from fieldsid.records.kinds import DRAWN_DIAGNOSIS
+from fieldsid.schedule.record import Schedule, load_schedule
 from fieldsid.trial_folder.next_step import chosen_models, next_step, single_models
 from fieldsid.trial_folder.state import MODEL, RUN, FolderState, Item
 from fieldsid.vehicle import Vehicle, find_vehicle
@@ -52,6 +53,7 @@ class AxisMaterial(Brief):
     diagnosis: Item | None
     turning: Item | None
     schedule: Item | None
+    gains: Schedule | None
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -95,7 +97,7 @@ def _runs(state: FolderState, vehicle: Vehicle | None, skipped: list[str]) -> li
         skipped.append(f"{len(places) - MOST_RUNS} of {len(places)} runs are not drawn: {said}")
         places = _chosen(places, _fitted_to(state))
     limits = {} if vehicle is None else vehicle.signal_limits
-    tried = (_tried(partial(load_run, p, fin_max_rad=limits), p.name, skipped) for p in places)
+    tried = (_tried(partial(load_run, p, fin_max_rad=limits, recognise=True), p.name, skipped) for p in places)
     return [run for run in tried if run is not None]
 
 
@@ -140,13 +142,18 @@ def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]
     shown = tuple(s for p in paths if (s := _shown(state, p, runs, skipped)) is not None)
     if not shown:
         return None
+    diagnosis, turning, schedule = (_last(state, kind, axis, skipped) for kind in ("diagnosis", "turn-radius", "schedule"))
+    gains = None if schedule is None else _tried(partial(load_schedule, state.place(schedule)), schedule.path, skipped)
     return AxisMaterial(
         axis,
         shown,
         line,
         loop_of(line, shown[-1].found, shown[0].found) if ancestors and len(shown) == len(paths) else None,
         _tried(lambda: load_parameter_source(points), "no laws over speed", skipped),
-        *(_last(state, kind, axis, skipped) for kind in ("diagnosis", "turn-radius", "schedule")),
+        diagnosis,
+        turning,
+        schedule,
+        gains,
     )
 
 

@@ -9,6 +9,7 @@ import jinja2
 from markupsafe import Markup
 
 from fieldsid.errors import ArtifactError
+from fieldsid.page import dense
 from fieldsid.templates import template_path
 
 PAGE, STYLE, SCRIPT = "report.html", "report.css", "report.js"
@@ -26,6 +27,7 @@ def html_of(context: Mapping[str, Any]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["dense"] = dense
     environment.filters["drawn"] = Markup  # the charts are this program's own SVG, every word in them escaped
     try:
         style, script = ((folder / n).read_text(encoding="utf-8") for n in (STYLE, SCRIPT))

@@ -3,26 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
 from typing import Any
-
-import numpy as np
 
 from fieldsid._version import __version__
 from fieldsid.comparison.compare import Channel, Comparison, left_in_words
 from fieldsid.comparison.sufficient import is_noise, pooled
+from fieldsid.display import page_of, view_of
 from fieldsid.extension import Loop
-from fieldsid.page import Block
+from fieldsid.logs import Run
+from fieldsid.page import Block, counted
 from fieldsid.reporting import figures
-from fieldsid.reporting.made_from import lineage_rows
+from fieldsid.reporting.made_from import lineage
 from fieldsid.reporting.material import AxisMaterial, Material, Shown
-from fieldsid.rounding import DEGREES, MANY, TWO_SIDED_95, in_unit, interval, number, with_error
+from fieldsid.rounding import DEGREES, MANY, number
+from fieldsid.schedule.record import Schedule
 from fieldsid.trial_folder.journal import Entry
 from fieldsid.trial_folder.next_step import REPORT, verification_of
 from fieldsid.trial_folder.patterns import shortened
 from fieldsid.trial_folder.state import FolderState, Item
-from fieldsid.turning.known_radius import BRACKETED, is_band_only, radius_cell, turn_words
+from fieldsid.turning.known_radius import turn_words
 from fieldsid.views._candidates import candidates
+from fieldsid.views._words import merit_blocks, parameter_block
+from fieldsid.views.schedule import blocks_of
+from fieldsid.views.turn_prediction import turns_of
 
 DONE = (0, 1)
 
@@ -38,10 +43,11 @@ def context_of(material: Material) -> dict[str, Any]:
         "tool": f"fieldsid {__version__}",
         "verdicts": [v for a in material.axes for v in _verdicts(a, state)] + _state_verdict(state),
         "next": {"why": why, "command": "" if command.startswith(REPORT) else command},  # this page is that report
-        "runs": [_run(r) for r in material.runs],
+        "runs": [{"name": r.name, "says": view_of(Run).line(r), "page": page_of(r)} for r in material.runs],
+        "models": [s.path for a in material.axes for s in a.shown],
         "axes": [_axis(a) for a in material.axes],
         "vehicle": _vehicle(material),
-        "files": lineage_rows(state),
+        "files": lineage(state),
         "commands": _commands(state),
         "notes": material.notes.strip(),
         "skipped": list(material.skipped),
@@ -55,7 +61,7 @@ def _verdicts(axis: AxisMaterial, state: FolderState) -> list[dict[str, str]]:
         seen, unseen = _split(best)
         judged = unseen or seen
         over = pooled(c.over_noise for c in judged)
-        on = f"{len(judged)} run{'s' * (len(judged) > 1)} {'it was not fitted to' if unseen else 'it was fitted to'}"
+        on = f"{counted(len(judged), 'run')} {'it was not fitted to' if unseen else 'it was fitted to'}"
         worst = max(judged, key=lambda c: c.badness)
         good = is_noise(over)
         tail = ": nothing is left but the sensors' noise" if good else ": more is left than the sensors' noise"
@@ -65,11 +71,12 @@ def _verdicts(axis: AxisMaterial, state: FolderState) -> list[dict[str, str]]:
         out.append({"what": f"{axis.axis} model{effects}", "says": says, "state": "good" if good else "warn"})
     if axis.diagnosis is not None and axis.diagnosis.body is not None:
         body = axis.diagnosis.body
-        out.append({"what": f"{axis.axis} diagnosis: {body['verdict']}", "says": str(body.get("says", "")), "state": "plain"})
+        says = str(body.get("short") or body.get("says", ""))
+        out.append({"what": f"{axis.axis} diagnosis: {body['verdict']}", "says": says, "state": "plain"})
     if axis.turning is not None and axis.turning.body is not None:
         out.append(_turn_verdict(axis.turning.body))
-    if axis.schedule is not None and axis.schedule.body is not None:
-        out.append(_gain_verdict(axis.axis, axis.schedule.body, verification_of(state, axis.schedule)))
+    if axis.schedule is not None and axis.gains is not None:
+        out.append(_gain_verdict(axis.gains, verification_of(state, axis.schedule)))
     return out
 
 
@@ -89,15 +96,12 @@ FAILED = ("does not hold", "FAILED")
 """First words of a verification that the gains did not pass."""
 
 
-def _gain_verdict(axis: str, body: Mapping[str, Any], verified: Entry | None) -> dict[str, str]:
-    rows = body["rows"]
-    worst = min(rows, key=lambda r: np.inf if r["phase_margin_deg"] is None else float(r["phase_margin_deg"]))
-    phase, wanted = float(worst["phase_margin_deg"] or np.inf), float(body["phase_margin_wanted_deg"])
-    says = (
-        f"least phase margin {phase:.0f} deg at {number(worst['speed_m_s'], 3)} m/s, {wanted:.0f} deg asked for, by the estimate"
-    )
+def _gain_verdict(gains: Schedule, verified: Entry | None) -> dict[str, str]:
+    worst, wanted = min(gains.rows, key=lambda r: r.phase_margin_deg), gains.phase_margin_deg
+    phase = worst.phase_margin_deg
+    says = f"least phase margin {phase:.0f} deg at {number(worst.speed, 3)} m/s, {wanted:.0f} deg asked for, by the estimate"
     return {
-        "what": f"{axis} gains at {len(rows)} speed{'s' * (len(rows) > 1)}",
+        "what": f"{gains.axis.value} gains at {counted(len(gains.rows), 'speed')}",
         "says": says if verified is None else f"{says}; verified: {verified.verdict}",
         "state": "good" if phase >= wanted - 0.5 and not (verified and verified.verdict.startswith(FAILED)) else "warn",
     }
@@ -108,20 +112,7 @@ def _state_verdict(state: FolderState) -> list[dict[str, str]]:
     if not stale:
         return []
     said = "; ".join(f"{i.path}: {i.stale}" for i in stale[:3]) + (f" and {len(stale) - 3} more" if len(stale) > 3 else "")
-    return [{"what": f"{len(stale)} stale file{'s' * (len(stale) > 1)}", "says": said, "state": "warn"}]
-
-
-def _run(run: Any) -> dict[str, Any]:
-    surge = run.signals.get("surge_m_s")
-    speed = float(np.nanmedian(surge)) if surge is not None and np.isfinite(surge).any() else float("nan")
-    return {
-        "name": run.name,
-        "seconds": f"{run.time[-1] - run.time[0]:.1f}",
-        "samples": len(run),
-        "speed": number(speed, 3),
-        "signals": ", ".join(n for n in run.signals if run.has(n)),
-        "findings": [f"{n.message} [{n.code}]" for n in run.notes],
-    }
+    return [{"what": f"{counted(len(stale), 'stale file')}", "says": said, "state": "warn"}]
 
 
 def _axis(axis: AxisMaterial) -> dict[str, Any]:
@@ -131,7 +122,7 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
     return {
         "name": axis.axis,
         "pairs": [_pair(shown, c, axis) for shown in axis.shown for c in shown.found],
-        "models": [{"path": s.path, "effects": ", ".join(s.model.effects) or "none", "rows": _errors(s)} for s in axis.shown],
+        "merits": [_errors(s) for s in axis.shown],
         "failures": [
             {
                 "title": f"{run}: the {_followed(channel)}",
@@ -143,11 +134,10 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
         "candidates": _candidates(axis.diagnosis),
         "diagnosis": axis.diagnosis.body if axis.diagnosis is not None else None,
         "loop": None if axis.loop is None else _loop(axis.loop),
-        "parameters": [row for s in told for row in _parameters(s)],
-        "parameters_of": told[0].path if len(told) == 1 else None,
+        "parameters": _parameters(told),
         "laws": _laws(axis),
         "radius": None if axis.turning is None else _radius(axis.turning),
-        "gains": None if axis.schedule is None else _gains(axis.schedule),
+        "gains": None if axis.schedule is None or axis.gains is None else _gains(axis.gains, axis.schedule.path),
     }  # fmt: skip
 
 
@@ -184,39 +174,28 @@ def _pair(shown: Shown, found: Any, axis: AxisMaterial) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _errors(shown: Shown) -> list[dict[str, str]]:
-    return [
-        {
-            "run": c.run,
-            "speed": number(c.shown.record.speed, 3),
-            "angle": number(np.degrees(c.merit.angle_rms), 2),
-            "angle_noise": number(np.degrees(c.floor.angle), 2),
-            "rate": number(np.degrees(c.merit.rate_rms), 2),
-            "rate_noise": number(np.degrees(c.floor.rate), 2),
-            "fit": f"{number(c.merit.angle_fit, 3)} / {number(c.merit.rate_fit, 3)}",
-            "over": f"{c.over_noise:.2f}" if c.over_noise < MANY else "no noise",
-            "fitted": "yes" if shown.was_fitted_to(c.run) else "no",
-        }
-        for c in shown.found
-    ]
+def _errors(shown: Shown) -> Block:
+    """Return how well a model follows each run: over the noise, and whether it was fitted to it, before the errors themselves."""
+    merits, units = merit_blocks(((c.run, c.shown.record.speed, c.merit, c.floor) for c in shown.found), DEGREES)
+    rows = tuple(
+        (run, f"{c.over_noise:.2f}" if c.over_noise < MANY else "no noise", "yes" if shown.was_fitted_to(c.run) else "no", *cells)
+        for c, (run, *cells) in zip(shown.found, merits.rows, strict=True)
+    )
+    title = f"{shown.path}, effects: {', '.join(shown.model.effects) or 'none'}; {units}"
+    return Block(title, rows, (merits.columns[0], "x noise", "fitted to", *merits.columns[1:]))
 
 
 def _candidates(item: Item | None) -> tuple[Block, str] | None:
     return None if item is None or item.body is None else candidates(item.body, DEGREES)
 
 
-def _parameters(shown: Shown) -> list[dict[str, str]]:
-    model = shown.model
-    return [
-        {
-            "model": shown.path,
-            "name": model.shown(n),
-            "value": with_error(v, model.std_error(n)),
-            "interval": interval(v - TWO_SIDED_95 * model.std_error(n), v + TWO_SIDED_95 * model.std_error(n)),
-            "unit": in_unit(model.units.get(n, "")),
-        }
-        for n, v in model.values.items()
-    ]
+def _parameters(told: Sequence[Shown]) -> Block:
+    """Return the parameters of models in one table, whose they are beside them where there are several."""
+    blocks = [parameter_block(s.model) for s in told]
+    if len(told) == 1:
+        return replace(blocks[0], title=f"{blocks[0].title}: {told[0].path}")
+    rows = tuple((*row, s.path) for s, b in zip(told, blocks, strict=True) for row in b.rows)
+    return Block("Parameters", rows, (*blocks[0].columns, "model"))
 
 
 def _laws(axis: AxisMaterial) -> list[dict[str, str]]:
@@ -235,38 +214,11 @@ def _laws(axis: AxisMaterial) -> list[dict[str, str]]:
 def _radius(item: Item) -> dict[str, Any]:
     body: Mapping[str, Any] = item.body or {}
     drawn, key = figures.radius(body)
-    rows = [
-        {
-            "side": r["side"], "speed": number(r["speed_m_s"], 3), "radius": radius_cell(r["radius_m"], r["interval95"]),
-            "interval": f"{number(r['interval95'][0], 3)} .. {number(r['interval95'][1], 3)}",
-            "rate": number(np.degrees(r["yaw_rate_max_rad_s"]), 3), "trust": r["trust"],
-        }
-        for r in body["rows"]
-    ]  # fmt: skip
-    bracketed = BRACKETED if any(is_band_only(r["radius_m"], r["interval95"]) for r in body["rows"]) else ""
-    rudder = number(body.get("rudder_max_rad"))
-    return {"chart": drawn, "legend": key, "rows": rows, "rudder": rudder, "path": item.path, "bracketed": bracketed}
+    return {"chart": drawn, "legend": key, "blocks": turns_of(body, DEGREES), "path": item.path}
 
 
-def _gains(item: Item) -> dict[str, Any]:
-    body: Mapping[str, Any] = item.body or {}
-    rows = [
-        {
-            "speed": number(r["speed_m_s"], 3), "kp": f"{r['kp']:.4f}", "ki": f"{r['ki']:.4f}", "kd": f"{r['kd']:.4f}",
-            "forward": number(r["feed_forward_rad"], 3), "limit": f"{r['fin_limit_rad']:.3f}",
-            "phase": number(r["phase_margin_deg"], 3),
-            "gain": number(r["gain_margin_db"], 3), "delay": number(r["delay_margin_s"], 3),
-            "supported": "yes" if r["supported"] else "no",
-        }
-        for r in body["rows"]
-    ]  # fmt: skip
-    words = {"lag_s": ("lag", "s"), "delay_s": ("delay", "s"), "fin_rate_rad_s": ("fin rate", "rad/s")}
-    counted = [f"{words[k][0]} {number(v, 3)} {words[k][1]}" for k, v in body["actuator"].items() if v and k in words]
-    return {
-        "chart": figures.gains(body), "rows": rows, "path": item.path, "controller": body["controller"],
-        "signs": str((body.get("provenance") or {}).get("sign_convention", "")),
-        "actuator": ", ".join(counted),
-    }  # fmt: skip
+def _gains(gains: Schedule, path: str) -> dict[str, Any]:
+    return {"chart": figures.gains(gains), "blocks": tuple(blocks_of(gains, DEGREES)), "path": path}
 
 
 def _vehicle(material: Material) -> list[tuple[str, str]]:

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, TypeVar
 
 from fieldsid.change.promise import KeptStep
 from fieldsid.change.record import Change
-from fieldsid.comparison.compare import Channel, Comparison
+from fieldsid.comparison.compare import Channel, Comparison, badness
 from fieldsid.comparison.localize import Place, Stretch
 from fieldsid.comparison.metrics import Metrics
 from fieldsid.comparison.residuals import Companion
@@ -83,6 +83,16 @@ class ComparedRun:
     ]
     moves_with: Annotated[tuple[Companion, ...], Key("What the missing moment moves with, the most first.")]
     figure: Annotated[str | None, Key("The figure that was drawn.")]
+
+    @property
+    def fit(self) -> float:
+        """The fit of the channel it is judged by, in per cent."""
+        return self.merit.angle_fit if self.judged_by == "angle" else self.merit.rate_fit
+
+    @property
+    def badness(self) -> tuple[float, float]:
+        """What runs are ordered by."""
+        return badness(self.over_noise, self.fit)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,6 +8,7 @@ from math import nan
 from pathlib import Path
 from typing import Annotated
 
+from fieldsid.comparison.sufficient import pooled_over_noise
 from fieldsid.fitting.checks.warnings import METHOD_CHOSEN, is_warning
 from fieldsid.fitting.estimates import Estimate, estimates
 from fieldsid.fitting.fit import Fit
@@ -64,6 +65,11 @@ class FittedModel:
         Mapping[str, float] | None, Key("By parameter, when the recursive estimate settled; null for other methods.")
     ]
 
+    @property
+    def over_noise(self) -> float:
+        """Its error over the noise."""
+        return over_noise_of(self.merit, self.noise_floor)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identified(OfLogs):
@@ -73,6 +79,11 @@ class Identified(OfLogs):
 
     axis: Annotated[Axis, Key("The plane.")]
     fits: Annotated[tuple[FittedModel, ...], Key("One for each run, or one of all runs with `--joint`.")]
+
+
+def over_noise_of(merit: GoodnessOfFit, floor: Noise) -> float:
+    """Return free-run errors over a noise floor, the measured channels pooled."""
+    return pooled_over_noise((merit.angle_rms, floor.angle), (merit.rate_rms, floor.rate))
 
 
 def fitted_model(fit: Fit, path: Path | None, logs: Sequence[Run]) -> FittedModel:

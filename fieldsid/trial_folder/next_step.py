@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import chdir
 from pathlib import Path
-from typing import Any
 
 from fieldsid.comparison.left_by import left_by_addition
 from fieldsid.comparison.sufficient import is_noise
@@ -166,7 +165,7 @@ def _model(state: FolderState) -> tuple[str, str] | None:
 
 def _searched_on(state: FolderState, best: Item) -> tuple[str, str] | None:
     """Return how to ask what an extended model still lacks, by its own record, where no diagnosis asked since it was made."""
-    left = left_by(best.body or {})
+    left = left_by_addition((best.body or {}).get("info") or {})
     if is_noise(left):
         return None
     place = state.place(best)
@@ -179,11 +178,6 @@ def _searched_on(state: FolderState, best: Item) -> tuple[str, str] | None:
     return f"{best.path} leaves {left:.2f} x the noise" if left < MANY else f"{best.path} leaves more than the noise", shlex.join(
         words
     )
-
-
-def left_by(model: Mapping[str, Any]) -> float:
-    """Return the error over the noise floor that an extended model leaves, the larger of fitted and unseen runs; else NaN."""
-    return left_by_addition(model.get("info") or {})
 
 
 def _unsettled(state: FolderState, diagnosis: Entry | None) -> tuple[str, str] | None:
@@ -360,6 +354,6 @@ def _axis(state: FolderState) -> str:
 def _loaded(state: FolderState, item: Item) -> list[Run]:
     """Return a run; none where it cannot be read: who works with it says so."""
     try:
-        return [load_run(state.place(item))]
+        return [load_run(state.place(item), recognise=True)]
     except FieldsidError:
         return []

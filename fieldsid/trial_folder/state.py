@@ -52,6 +52,11 @@ class Item(Brief):
     body: Mapping[str, Any] | None = None
     fins: Mapping[str, float] | None = None
 
+    @property
+    def standing(self) -> str:
+        """Why it does not hold any more, or what it was made from and is not there; empty where all is as it was."""
+        return f"stale: {self.stale}" if self.stale else f"not there: {', '.join(self.missing)}" if self.missing else ""
+
 
 @dataclass(frozen=True, slots=True, repr=False)
 class FolderState(Brief):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.page import Block, counted, cut, facts
 from fieldsid.records.keys import body_of
-from fieldsid.rounding import MANY, RADIANS, Angles, interval, number, with_error
+from fieldsid.rounding import MANY, RADIANS, Angles, in_unit, interval, number, with_error
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -62,7 +62,7 @@ def parameter_block(model: Model) -> Block:
     rows = []
     for e in estimates(model):
         value, _, error = with_error(e.value, e.std_error).partition(BETWEEN)
-        rows.append((e.name, value, error or "-", interval(*e.interval95), e.unit))
+        rows.append((e.name, value, error or "-", interval(*e.interval95), in_unit(e.unit)))
     at = f" at {model.law.reference:.2f} m/s" if isfinite(model.law.reference) else ""
     return Block(f"Parameters{at}", tuple(rows), ("", "value", "std error", "95 % interval", "unit"))
 
@@ -75,19 +75,6 @@ def parameter_rows(model: Model) -> list[dict[str, Any]]:
         {"parameter": e.name, "value": e.value, "std_error": e.std_error, "low95": low, "high95": high, "unit": e.unit}
         for e in estimates(model)
         for low, high in [e.interval95]
-    ]
-
-
-def error_facts(m: GoodnessOfFit, floor: Noise) -> list[tuple[str, str]]:
-    """Return the free-run error of angle and rate against the noise, nothing of a channel that was not measured."""
-    channels = (
-        ("angle error", "rad", m.angle_rms, floor.angle, m.angle_fit),
-        ("rate error", "rad/s", m.rate_rms, floor.rate, m.rate_fit),
-    )
-    return [
-        (name, f"rms {number(rms, 3)} {unit} (noise {number(noise, 3)}), fit {number(fit, 3)} %")
-        for name, unit, rms, noise, fit in channels
-        if isfinite(rms)
     ]
 
 

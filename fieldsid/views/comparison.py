@@ -2,43 +2,58 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import Figures, Frames, View
 from fieldsid.figures.kinds import sketch
-from fieldsid.page import Block, Page, cut, facts
+from fieldsid.page import Block, Page, Whole, cut, facts
 from fieldsid.records.keys import body_of
-from fieldsid.rounding import number, p_value, times_noise
-from fieldsid.views._words import error_facts, percent, speed_words, table, warned, where_block, where_rows
+from fieldsid.rounding import RADIANS, Angles, number, p_value, times_noise
+from fieldsid.views._words import percent, speed_words, table, warned, where_block, where_rows
 
 if TYPE_CHECKING:
     from fieldsid.comparison.compare import Comparison
 
+MOST_PLACES = 6
+
 
 def line(found: Comparison) -> str:
     """Return the run, fit and error of the channel furthest above its noise, and where that fails most."""
-    channel, m = found.leading, found.merit
-    fit = m.rate_fit if channel.name == "rate" else m.angle_fit
+    channel = found.leading
     worst = f", worst at {channel.where[0].condition}" if found.failing and channel.where else ""
-    return f"{cut(found.run, 60)}: {channel.name} fit {fit:.1f} %, error {times_noise(found.over_noise)}{worst}"
+    return f"{cut(found.run, 60)}: {channel.name} fit {channel.fit:.1f} %, error {times_noise(found.over_noise)}{worst}"
 
 
-def page(found: Comparison) -> Page:
+def page(found: Comparison, angles: Angles = RADIANS) -> Page:
     """Return errors, metrics and the places of the error."""
-    m = found.leading.metrics
+    from fieldsid.comparison.compare import errors_in_words
+
+    m, errors = found.leading.metrics, errors_in_words(found.merit, found.floor, angles, 3)
     known = facts(
         "Statistics",
         (
             ("speed", speed_words(found.shown.record.speed)),
-            *error_facts(found.merit, found.floor),
+            *((f"{name} error", said) for name, said in errors),
             ("judged by", f"the {found.leading.name}: Theil {number(m.theil, 3)}, R^2 {number(m.r2, 3)}"),
             ("whiteness", p_value(m.whiteness_p)),
         ),
     )
-    failing = tuple(where_block(f"Where the {channel.name} fails", channel.where) for channel in found.failing)
-    companions = tuple((c.signal, percent(c.explained)) for c in found.moves_with[:3] if found.failing)
-    blocks = (known, *failing, Block("The missing moment moves with", companions))
-    return Page(f"Comparison with {cut(found.run, 60)}", warned(found.shown.notes), blocks)
+    return Page(f"Comparison with {cut(found.run, 60)}", warned(found.shown.notes), (known, *blocks_of(found, angles)))
+
+
+def blocks_of(found: Comparison, angles: Angles = RADIANS, top: int = MOST_PLACES) -> Iterator[Block | str]:
+    """Yield where each channel fails, the worse one first, which are down to their noise, and what the missing moment follows."""
+    from fieldsid.comparison.compare import left_in_words
+
+    for c in found.failing:
+        yield where_block(f"{found.run}: where the {c.name} fails, {left_in_words(c.over_floor, c.fit)}", c.where, angles, top)
+    quiet = [f"{c.name} {c.over_floor:.2f} x" for c in found.channels if c not in found.failing]
+    pooled = "" if found.failing else f", {found.over_noise:.2f} x"
+    said = f"{found.run}: down to the noise{pooled}: {', '.join(quiet)}" if quiet else ""
+    yield Whole(said if found.failing or not said else f"\n{said}")
+    told = ", ".join(f"{c.signal} ({percent(c.explained)})" for c in found.moves_with[:3])
+    yield f"the missing moment moves with {told}" if found.failing and told else ""
 
 
 def frames(found: Comparison) -> Frames:

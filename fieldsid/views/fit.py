@@ -10,10 +10,9 @@ from fieldsid.display import Figures, Frames, View
 from fieldsid.figures.kinds import sketch
 from fieldsid.page import Block, Page, facts, listed
 from fieldsid.records.keys import body_of
-from fieldsid.rounding import number, p_value
+from fieldsid.rounding import RADIANS, number, p_value
 from fieldsid.views._words import (
     base_words,
-    error_facts,
     joined,
     parameter_block,
     parameter_rows,
@@ -45,6 +44,7 @@ def line(fit: Fit) -> str:
 
 def page(fit: Fit) -> Page:
     """Return the blocks of a fit's report."""
+    from fieldsid.comparison.compare import errors_in_words
     from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
 
     model, records = fit.model, [p.record for p in fit.predictions]
@@ -58,7 +58,7 @@ def page(fit: Fit) -> Page:
             ("runs", listed(model.runs)),
             ("samples", f"{sum(len(r) for r in records)} in {seconds:.1f} s"),
             ("estimated", some(len(model.free), "parameter")),
-            *error_facts(goodness_of_fit(fit.predictions), fit.floor),
+            *((f"{n} error", e) for n, e in errors_in_words(goodness_of_fit(fit.predictions), fit.floor, RADIANS, 3)),
             ("whiteness", "" if whiteness is None else p_value(whiteness)),
         ),
     )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from fieldsid.display import Figures, Frames, View
 from fieldsid.figures.kinds import sketch
 from fieldsid.page import Page, cut, facts
+from fieldsid.records.keys import body_of
 from fieldsid.rounding import interval, number, with_error
 from fieldsid.views._words import speed_words, table
 
@@ -42,17 +43,7 @@ def page(turn: MeasuredTurn) -> Page:
 
 def frames(turn: MeasuredTurn) -> Frames:
     """Return the circle in one row, and the track."""
-    circle = turn.circle
-    row = {
-        "run": turn.run,
-        "side": turn.side,
-        "radius_m": circle.radius,
-        "radius_std_error_m": circle.radius_std_error,
-        "fin_rad": turn.fin,
-        "entry_speed_m_s": turn.entry_speed,
-        "path_speed_m_s": turn.path_speed,
-    }
-    return {"circle": lambda: table([row], "run"), "track": lambda: _track(turn)}
+    return {"circle": lambda: table([body_of(turn)], "run"), "track": lambda: _track(turn)}
 
 
 def _track(turn: MeasuredTurn) -> DataFrame:

@@ -13,13 +13,13 @@ from fieldsid.views._words import joined, some, speed_words, warned
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from fieldsid.logs import Run
+    from fieldsid.logs import Note, Run
 
 
 def line(run: Run) -> str:
-    """Return name, samples, rate, speed and signals."""
+    """Return name, samples, rate, speed, how many notes warn, and signals."""
     measured = [n for n in run.signals if run.has(n)]
-    words = joined(f"{len(run)} samples", _span(run), speed_words(_speed(run)), some(len(run.notes), "note"))
+    words = joined(f"{len(run)} samples", _span(run), speed_words(_speed(run)), some(len(_findings(run)), "note"))
     return f"{cut(run.name, 60)}: {words}; {listed(measured, 5)}"
 
 
@@ -27,7 +27,7 @@ def page(run: Run) -> Page:
     """Return the findings, the run's length and rate, and each signal's count and range."""
     import numpy as np
 
-    from fieldsid.logs.run import COLUMNS, EXPLAINING
+    from fieldsid.logs.run import COLUMNS
 
     rows = []
     for name, values in run.signals.items():
@@ -44,8 +44,16 @@ def page(run: Run) -> Page:
         ),
     )
     signals = Block("Signals", tuple(rows), ("", "unit", "measured", "least", "largest"), left=2)
-    quiet = tuple(n.message for n in run.notes if n.code in EXPLAINING)
-    return Page(f"Run {cut(run.name, 60)}", warned(n for n in run.notes if n.code not in EXPLAINING), (known, signals), quiet)
+    found = _findings(run)
+    quiet = tuple(n.message for n in run.notes if n not in found)
+    return Page(f"Run {cut(run.name, 60)}", warned(found), (known, signals), quiet)
+
+
+def _findings(run: Run) -> list[Note]:
+    """Return the notes that warn."""
+    from fieldsid.logs.run import EXPLAINING
+
+    return [n for n in run.notes if n.code not in EXPLAINING]
 
 
 def frames(run: Run) -> Frames:

@@ -53,21 +53,21 @@ def blocks_of(schedule: Schedule, angles: Angles = RADIANS, lost: Iterable[str] 
         (
             number(r.speed, 3),
             number(r.gains.kp),
-            *(number(v, 3) for v in (r.gains.ki, r.gains.kd, angles.factor * r.feed_forward, angles.factor * r.fin_limit)),
-            *((number(r.depth_gain, 3),) if schedule.depth else ()),
-            f"{r.fin_use:.0%}",
+            *(number(v, 3) for v in (r.gains.ki, r.gains.kd, *((r.depth_gain,) if schedule.depth else ()))),
             f"{r.phase_margin_deg:.0f}",
             f"{r.settling:.1f}" if isfinite(r.settling) else "never",
-            f"{r.draws_held:.0%}",
             "yes" if r.supported else "no",
+            f"{r.draws_held:.0%}",
+            *(number(angles.factor * v, 3) for v in (r.feed_forward, r.fin_limit)),
+            f"{r.fin_use:.0%}",
         )
         for r in schedule.rows
     )
     depth, known = ("kz",) if schedule.depth else (), schedule.provenance
-    heads = ("m/s", "kp", "ki", "kd", "forward", "fin", *depth, "asks", "phase", "settle s", "held", "data")
+    heads = ("m/s", "kp", "ki", "kd", *depth, "phase", "settle s", "data", "held", "forward", "fin", "asks")
     title = f"{schedule.axis.value}, {schedule.kind}: gains per speed, forward and fin in {angles.unit}"
     yield Block(title, rows, heads, left=0)
-    yield f"signs: {known['sign_convention']}" if "sign_convention" in known else ""
+    yield f"in the file: {known['sign_convention']}" if "sign_convention" in known else ""
     yield f"counted with: {'; '.join((fin_of(schedule.actuator), *(str(v) for v in [known.get('speed_lost')] if v), *lost))}"
     for binds in dict.fromkeys(r.binds for r in schedule.rows):
         yield f"bound by {binds}: {', '.join(number(r.speed, 3) for r in schedule.rows if r.binds == binds)} m/s"

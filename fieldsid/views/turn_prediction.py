@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import degrees
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import Figures, Frames, View
 from fieldsid.figures.kinds import sketch
@@ -30,35 +31,43 @@ def line(found: TurnPrediction) -> str:
 
 def page(found: TurnPrediction, angles: Angles = RADIANS) -> Page:
     """Return a row for each speed and side, the measured circles, why rows are extrapolated, and what would settle it."""
-    from fieldsid.turning.known_radius import BRACKETED, radius_cell
-    from fieldsid.turning.prediction import found_by
-
-    rows = tuple(
-        (
-            r.side,
-            number(r.speed, 3),
-            radius_cell(r.radius, r.interval95),
-            f"{number(r.interval95[0], 3)} .. {number(r.interval95[1], 3)}",
-            number(r.of_model, 3),
-            number(degrees(r.yaw_rate_max), 3),
-            number(r.u_turn_time, 3),
-            r.trust,
-        )
-        for r in found.rows
-    )
-    heads = ("side", "m/s", "radius m", "95 %", "model's", "deg/s", "u-turn s", "trust")
-    rudder = f"rudder {angles.factor * found.rudder_max:.4g} {angles.unit}, {found_by(r.method for r in found.rows)}"
-    because = [b for r in found.rows for b in r.because]
-    shares = {b: "" if because.count(b) == len(rows) else f" ({because.count(b)} of {len(rows)} turns)" for b in because}
+    turns, bracketed = turns_of(body_of(found), angles)
+    because, count = [b for r in found.rows for b in r.because], len(found.rows)
+    shares = {b: "" if because.count(b) == count else f" ({because.count(b)} of {count} turns)" for b in because}
     blocks: tuple[Block | str, ...] = (
-        Block(rudder, rows, heads),
-        BRACKETED if any(r.band_only for r in found.rows) else "",
+        turns,
+        bracketed,
         _circles(found, angles),
         *(f"extrapolated{share}: {b}" for b, share in shares.items()),
         *(f"what would settle it: {settling}" for settling in found.settling),
         *(f"tightest at higher speed, {s}: {b.radius:.2f} m at {b.speed:.2f} m/s" for s, b in found.minimum.items() if b),
     )
-    return Page(f"Turns with {rudder}", warned(found.notes), blocks)
+    return Page(f"Turns with {turns.title}", warned(found.notes), blocks)
+
+
+def turns_of(body: Mapping[str, Any], angles: Angles) -> tuple[Block, str]:
+    """Return a row for each speed and side, of the JSON that a file of it holds too, and what its brackets are."""
+    from fieldsid.turning.known_radius import BRACKETED, is_band_only, radius_cell
+    from fieldsid.turning.prediction import found_by
+
+    rows = tuple(
+        (
+            r["side"],
+            number(r["speed_m_s"], 3),
+            radius_cell(r["radius_m"], r["interval95"]),
+            f"{number(r['interval95'][0], 3)} .. {number(r['interval95'][1], 3)}",
+            r["trust"],
+            number(r.get("model_radius_m"), 3),
+            number(degrees(r["yaw_rate_max_rad_s"]), 3),
+            number(r.get("u_turn_time_s"), 3),
+        )
+        for r in body["rows"]
+    )
+    rudder = f"rudder {angles.factor * body['rudder_max_rad']:.4g} {angles.unit}" if "rudder_max_rad" in body else ""
+    found = found_by(r["method"] for r in body["rows"] if "method" in r)
+    bracketed = any(is_band_only(r["radius_m"], r["interval95"]) for r in body["rows"])
+    heads = ("side", "m/s", "radius m", "95 %", "trust", "model's", "deg/s", "u-turn s")
+    return Block(", ".join(filter(None, (rudder, found))), rows, heads), BRACKETED if bracketed else ""
 
 
 def _circles(found: TurnPrediction, angles: Angles) -> Block:

@@ -54,7 +54,8 @@ def blocks_of(found: Verification) -> Iterator[Block | str]:
     )  # fmt: skip
     rows = tuple(_row(a, b) for a, b in zip(checks, found.constant, strict=True))
     yield Block("deg, dB, s of margin; overshoot %; s to settle by step in deg", rows, heads, left=0)
-    yield Whole(against_constant(found))
+    if len(found.schedule.rows) > 1:  # the gains of one speed are constant
+        yield Whole(against_constant(found))
     bent, unknown = max(abs(c.bent_error) for c in checks), max(abs(c.bent_error_unknown) for c in checks)
     yield f"a fin 3 deg off: steady error {degrees(bent):.2f} deg with the feed-forward, {degrees(unknown):.2f} deg without"
     if found.spread:

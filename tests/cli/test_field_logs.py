@@ -1,6 +1,7 @@
 """Logs as the field has them: what inspect proposes is imported and identified without an edit."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -78,6 +79,11 @@ def test_a_table_without_names_is_known_by_its_numbers_and_says_why(run_cli, tmp
     assert {"x_m": 1, "y_m": 2, "yaw_rad": 4, "surge_m_s": 5, "yaw_rate_rad_s": 7, "rudder_rad": 8}.items() <= columns.items()
     assert any("derivative of column 4" in m for m in findings(record, "evidence"))
     assert any("explains" in m for m in findings(record, "evidence"))
+    said = run_cli("inspect", record["path"]).out
+    counted = re.search(r"; (\d+) finding", said)
+    listed = [line for line in said.partition("\nfindings\n")[2].splitlines() if line.startswith("- ") and line != "- none"]
+    assert len(listed) == (int(counted[1]) if counted else 0)
+    assert "\nwhy these\n- " in said
 
 
 def test_the_scale_of_counts_makes_them_angles_and_the_note_goes(run_cli, tmp_path):

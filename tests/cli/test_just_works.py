@@ -1,8 +1,14 @@
 """A log without a mapping is read where nothing an axis needs is in doubt, and it is said how; else a mapping is asked for."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from look_alikes import A22, B2, truth, write_table
+
+import fieldsid as fs
+from fieldsid.face.arguments import runs_behind
+from fieldsid.plant.parameter_source import load_parameter_source
 
 TRUTH = truth(seconds=100.0)
 DEG = np.pi / 180.0
@@ -79,6 +85,22 @@ def test_the_other_commands_read_it_too(run_cli, tmp_path, command):
     more = {"live": ("--speed", "0"), "batch": ("-o", tmp_path / "out", "--no-diagnose", "--workers", "1")}.get(command, ())
     done = run_cli(command, written(tmp_path), "--axis", "yaw", *more, "--json")
     assert done.code == 0, done.err
+
+
+def test_what_is_made_of_its_model_reads_it_again(run_cli, tmp_path, monkeypatch):
+    log = written(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    models = tmp_path / "models"
+    assert run_cli("identify", log, "--axis", "yaw", "--effects", "servo_lag", "-o", models, "--no-figures").code == 0
+    model = str(next(models.glob("*.yaml")))
+    (run,) = runs_behind(load_parameter_source([Path(model)]), pytest.fail)
+    assert run.has("surge_m_s")
+    (again,) = fs.identify(log, "yaw", effects="servo_lag")
+    assert again.model.values["a22"] == pytest.approx(fs.load_model(model).values["a22"])
+    turned = run_cli("turn-radius", model, "--method", "simulated")
+    assert turned.code == 0, turned.err
+    assert "cannot be read again" not in turned.err
+    assert run_cli("report", tmp_path, "-o", tmp_path / "r.html", "--json").json["runs"] == [log.stem]
 
 
 def test_what_no_axis_needs_and_has_no_unit_is_left_out_and_said(run_cli, tmp_path):

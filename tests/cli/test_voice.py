@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import io
+from itertools import pairwise
 
 import pytest
 from cli import trial
 from rich.console import Console
 
-from fieldsid.cli.console import folded, shows_progress, table
+from fieldsid.cli.console import alike, print_page, shortened, shows_progress, table
 from fieldsid.cli.voice import Voice, take, voice
-from fieldsid.page import Block
+from fieldsid.logs.run import Note
+from fieldsid.page import Block, Page, dense, folded, html_of, text_of
 
 LONG = "run7: " + "the fin was at its limit for a long time, which says less of the authority; " * 3 + "[saturated]"
 
@@ -81,16 +83,16 @@ def test_errors_are_said_however_quiet_it_is(run_cli, tmp_path):
 
 def test_a_warning_has_one_line_and_keeps_its_code():
     take(["identify"])
-    assert len(folded(LONG, 80)) <= 80 - len("warning: ")
-    assert folded(LONG, 80).endswith("[saturated] -v")
-    assert folded("short [code]", 80) == "short [code]"
+    assert len(shortened(LONG, 80)) <= 80 - len("warning: ")
+    assert shortened(LONG, 80).endswith("[saturated] -v")
+    assert shortened("short [code]", 80) == "short [code]"
 
 
 def test_with_v_it_is_whole():
     assert take(["demo", "-v"]) == ["demo", "-v"]
     assert take(["identify", "-v", "run.csv"]) == ["identify", "run.csv"]
     assert voice().is_verbose
-    assert folded(LONG, 80) == LONG
+    assert shortened(LONG, 80) == LONG
 
 
 def test_what_follows_two_dashes_is_no_option():
@@ -147,3 +149,33 @@ def test_a_column_of_words_behind_the_first_is_folded_and_the_numbers_beside_it_
     lines = on_a_terminal_of(60, table(Block("", tuple(rows), ("run", "samples", "signals")))).splitlines()
     assert lines[0].split() == ["run", "samples", "signals"]
     assert any(line.startswith("run7") and "2400" in line for line in lines)
+
+
+@pytest.mark.parametrize("width", range(12, 60))
+def test_a_sentence_is_folded_but_never_between_a_number_and_its_unit_or_its_error(width):
+    said = "limits: heading 60 deg (1.05 rad); C0 to +/- 0.0024 rad/s^2 of 5 .. 9 deg, 1.2 +/- 0.3 1/s and 8 % at 1.8 m/s"
+    lines = folded(said, width, rest="").split("\n")
+    assert " ".join(lines) == said
+    for end, begin in pairwise(lines):
+        assert not begin.startswith(("..", "+/-", "%", "deg", "m/s", "rad", "1/s"))
+        assert not end.endswith(("..", "+/-"))
+
+
+def test_a_page_on_a_terminal_is_folded_like_any_other_text():
+    to = Console(file=io.StringIO(), width=40)
+    print_page(to, Page("", blocks=("the longest of all these sentences: 60 deg",)))
+    assert to.file.getvalue() == "the longest of all these sentences:\n60 deg\n"
+
+
+def test_a_column_that_nothing_stands_in_is_left_out_wherever_a_table_is_shown():
+    block = Block("", (("a", "", "1"), ("b", "", "2")), ("run", "unseen", "fitted"), left=2)
+    assert dense(block) == Block("", (("a", "1"), ("b", "2")), ("run", "fitted"))
+    page = Page("", blocks=(block,))
+    to = Console(file=io.StringIO(), width=80)
+    print_page(to, page)
+    assert all("unseen" not in shown for shown in (to.file.getvalue(), text_of(page), html_of(page)))
+
+
+def test_a_warning_that_names_its_run_is_not_told_whose_it_is():
+    notes = [("a", "run7", Note("speed_changing", "run 'run7': the speed changes")), ("b", "run7", Note("short", "too short"))]
+    assert [n.message for n in alike(notes)] == ["run 'run7': the speed changes", "run7: too short"]

@@ -16,7 +16,7 @@ from fieldsid.errors import UsageError
 from fieldsid.figures.kinds import sketch
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import own_kind
-from fieldsid.page import Block, Page, Whole, written
+from fieldsid.page import Block, Page, Whole, counted, written
 from fieldsid.records.keys import body_of
 from fieldsid.views.change import blocks_of
 
@@ -60,30 +60,28 @@ def before_after(old: Path, new: Path, output: Path | None, *, force: bool, as_j
         AxisChange(c, tuple(tuple(map(str, s.files[c.axis.value])) for s in sides), f, _next(c, sides))
         for c, f in zip(found, drawn, strict=True)
     )
-    body = body_of(BeforeAfter(str(old), str(new), told))
-    changes = body["changes"]
     notes = [Note(n.code, f"{c.axis.value}: {n.message}", n.data) for c in found for n in c.notes]
     if twice:
         said = f"both sides were fitted to {', '.join(twice)}: a difference is one of the models alone"
         notes.append(Note("shared_runs", said, {}))
     page = Page("", blocks=tuple(b for t in told for b in _blocks(t, title=t.change.axis.value if len(told) > 1 else "")))
-    return emit(body, as_json=as_json, render=page, headline=_headline(found, changes), notes=notes)
+    body = body_of(BeforeAfter(str(old), str(new), told))
+    return emit(body, as_json=as_json, render=page, headline=_headline(told), notes=notes)
 
 
-def _headline(found: Sequence[Change], changes: Sequence[Mapping[str, Any]]) -> Headline:
+def _headline(told: Sequence[AxisChange]) -> Headline:
     """Return what has changed, axis by axis, and what to do about the first change that asks for something."""
-    by_axis = [f"{c.axis.value}: {c.line}" if len(found) > 1 else c.line for c in found]
-    rests = [_rests_on(c, body) for c, body in zip(found, changes, strict=True)]
-    drawn = all(body["figure"] for body in changes)
-    then = next((str(body["next"]) for body in changes if body["next"]), "" if drawn else typed_with("-o", "figures/"))
-    return Headline("; ".join(by_axis), "; ".join(rests), then)
+    by_axis = [f"{t.change.axis.value}: {t.change.line}" if len(told) > 1 else t.change.line for t in told]
+    drawn = all(t.figure for t in told)
+    then = next((t.next for t in told if t.next), "" if drawn else typed_with("-o", "figures/"))
+    return Headline("; ".join(by_axis), "; ".join(map(_rests_on, told)), then)
 
 
-def _rests_on(found: Change, body: Mapping[str, Any]) -> str:
-    count = [len(names) for names in body["models"]]
-    speeds = ", ".join(f"{s:.2f}" for s in found.speeds)
-    tests = sum(1 + (len(p.speeds) if len(p.speeds) > 1 else 0) for p in found.parameters)
-    return f"{count[0]} model file{'s' * (count[0] > 1)} before, {count[1]} after, at {speeds} m/s; {tests} tests at once"
+def _rests_on(told: AxisChange) -> str:
+    before, after = map(len, told.models)
+    speeds = ", ".join(f"{s:.2f}" for s in told.change.speeds)
+    tests = sum(1 + (len(p.speeds) if len(p.speeds) > 1 else 0) for p in told.change.parameters)
+    return f"{counted(before, 'model file')} before, {after} after, at {speeds} m/s; {tests} tests at once"
 
 
 def _side(path: Path) -> Side:

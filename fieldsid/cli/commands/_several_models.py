@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from fieldsid.results.comparisons import ComparedSeveral
 
 MOST_PLACES = 3
-CLOSE = 1.05
-"""A ratio of two models' errors up to which neither is called the better."""
 
 
 def several_models(
@@ -85,14 +83,13 @@ def several_models(
         figures=figures,
         skipped_runs=tuple(skips.records),
     )
-    body = body_of(told)
     from fieldsid.cli.headlines.models import of_several
     from fieldsid.cli.inputs import files_of
     from fieldsid.records.named_inputs import inputs_of
 
-    headline = of_several(body, names, files_of(logs), inputs_of(Path(str(body["best"]))), close=CLOSE)
+    headline = of_several(told, names, models[least], files_of(logs), inputs_of(paths[least]))
     notes = left_out(logs, models[0].axis)
-    result = emit(body, as_json=as_json, render=_page(told, found_of, names), headline=headline, notes=notes)
+    result = emit(body_of(told), as_json=as_json, render=_page(told, found_of, names), headline=headline, notes=notes)
     skips.end(len(found_of[0]))
     return result
 

@@ -23,7 +23,8 @@ from fieldsid.rounding import number, with_error
 
 if TYPE_CHECKING:
     from fieldsid.batch.archive import Work
-    from fieldsid.results.trial import NotUsed
+    from fieldsid.batch.trend import Trend
+    from fieldsid.results.trial import Batch, NotUsed
 
 
 MOST_REASONS = 8
@@ -83,26 +84,24 @@ def command(
     plot = sketch("trend", trends, axis.value)
     drawn = drawn_at(place if trends else None, plot, force=force or figure is None)
     unusable = [row for row in rows if row["status"] != "done"]
-    body = body_of(
-        Batch(
-            axis=axis,
-            logs=len(tasks),
-            known_logs=known,
-            runs=len(rows) - len(unusable),
-            table=str(parquet),
-            csv=str(table),
-            where=where,
-            seconds=time.monotonic() - begin,
-            verdicts=dict(Counter(r["verdict"] for r in rows if r.get("verdict")).most_common()),
-            effects=dict(Counter(r["effects"] for r in rows if r.get("effects")).most_common()),
-            skipped_runs=tuple(_not_used(r) for r in unusable),
-            trend=trends,
-            figure=drawn,
-        )
+    told = Batch(
+        axis=axis,
+        logs=len(tasks),
+        known_logs=known,
+        runs=len(rows) - len(unusable),
+        table=str(parquet),
+        csv=str(table),
+        where=where,
+        seconds=time.monotonic() - begin,
+        verdicts=dict(Counter(r["verdict"] for r in rows if r.get("verdict")).most_common()),
+        effects=dict(Counter(r["effects"] for r in rows if r.get("effects")).most_common()),
+        skipped_runs=tuple(_not_used(r) for r in unusable),
+        trend=trends,
+        figure=drawn,
     )
     from fieldsid.cli.headlines.trial import of_batch
 
-    result = emit(body, as_json=as_json, render=_page(body), headline=of_batch(body, trend=trend))
+    result = emit(body_of(told), as_json=as_json, render=_page(told), headline=of_batch(told, trend=trend))
     if (trend or figure is not None) and not trends:
         say(f"no trend: fewer than 6 runs of different dates know a parameter of {axis.value}")
     if trends and (dated := sum(row.get("time_from") == "file" for row in rows)):
@@ -146,23 +145,23 @@ def _not_used(row: Mapping[str, Any]) -> NotUsed:
     return NotUsed(row["run"], row["log"], what, found, hint, row["status"])
 
 
-def _page(body: Mapping[str, Any]) -> Page:
+def _page(told: Batch) -> Page:
     why: dict[str, list[str]] = {}  # what was said, by that without the names of file and run
-    for row in body["skipped_runs"]:
-        why.setdefault(row["what"].replace(row["file"], "").replace(row["run"], ""), []).append(row["what"])
-    told = [line for t in body["trend"] for line in _trend(t)]
+    for row in told.skipped_runs:
+        why.setdefault(row.what.replace(row.file, "").replace(row.run, ""), []).append(row.what)
+    lines = [line for t in told.trend for line in _trend(t)]
     shown = [(said[0], len(said) - 1) for said in list(why.values())[:MOST_REASONS]]
-    told += [f"not used: {said}" + (f"; the same of {more} more" if more else "") for said, more in shown]
+    lines += [f"not used: {said}" + (f"; the same of {more} more" if more else "") for said, more in shown]
     if len(why) > MOST_REASONS:
-        told.append(f"and for {len(why) - MOST_REASONS} other reasons: see the column `what`")
-    return Page("", closing=(*told, *written(table=f"{body['table']} and {body['csv']}", figure=body["figure"])))
+        lines.append(f"and for {len(why) - MOST_REASONS} other reasons: see the column `what`")
+    return Page("", closing=(*lines, *written(table=f"{told.table} and {told.csv}", figure=told.figure)))
 
 
-def _trend(trend: Mapping[str, Any]) -> Iterator[str]:
-    for c in trend["changes"]:
-        by = f"{number(c['after'] - c['before'], 2)} {trend['parameter']}"
-        if c["before"]:
-            by = f"{with_error(100.0 * c['share'], 100.0 * c['std_error'] / abs(c['before']))} %"
-        yield f"{trend['parameter']} changed by {by} on {c['start_utc'][:10]}, from `{c['run']}` on"
-    if not trend["changes"]:
-        yield f"{trend['parameter']}: no change beyond errors and scatter in {trend['runs']} runs"
+def _trend(trend: Trend) -> Iterator[str]:
+    for c in trend.changes:
+        by = f"{number(c.after - c.before, 2)} {trend.name}"
+        if c.before:
+            by = f"{with_error(100.0 * c.share, 100.0 * c.std_error / abs(c.before))} %"
+        yield f"{trend.name} changed by {by} on {c.start_utc[:10]}, from `{c.run}` on"
+    if not trend.changes:
+        yield f"{trend.name}: no change beyond errors and scatter in {trend.runs} runs"

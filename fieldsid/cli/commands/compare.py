@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,15 +17,15 @@ from fieldsid.cli.session import drawn_in
 from fieldsid.cli.voice import angles
 from fieldsid.errors import UsageError
 from fieldsid.figures.kinds import sketch
-from fieldsid.page import Block, Page, Whole, paragraph, written
+from fieldsid.page import Block, Page, Whole, written
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import number
-from fieldsid.views._words import merit_blocks, where_block
+from fieldsid.views._words import merit_blocks
+from fieldsid.views.comparison import MOST_PLACES, blocks_of
 
 if TYPE_CHECKING:
+    from fieldsid.comparison.compare import Comparison
     from fieldsid.results.comparisons import ComparedRun
-
-MOST_SHOWN = 6
 
 
 def command(
@@ -39,7 +39,7 @@ def command(
     min_fit: Annotated[
         float | None, option("--min-fit", "PERCENT", "Gate: exit 1 when a run's angle or rate fit is below this.")
     ] = None,
-    top: Annotated[int, option("--top", "", "Conditions to show for each run.", min=1)] = MOST_SHOWN,
+    top: Annotated[int, option("--top", "", "Conditions to show for each run.", min=1)] = MOST_PLACES,
     output: FigurePlace = None,
     figures: Figures = True,
     force: Force = False,
@@ -108,14 +108,14 @@ def command(
     fitted = fitted_to(model, known, logs)
     compared = tuple(compared_run(c, file, fitted) for c, file in zip(found, drawn, strict=True))
     notes = left_out(logs, known.axis)
-    body = body_of(Compared(model=str(model), axis=known.axis, runs=compared, warnings=notes, skipped_runs=tuple(skips.records)))
+    told = Compared(model=str(model), axis=known.axis, runs=compared, warnings=notes, skipped_runs=tuple(skips.records))
     from fieldsid.cli.headlines.models import of_compare
     from fieldsid.cli.inputs import files_of
     from fieldsid.records.named_inputs import inputs_of
 
-    headline = of_compare(body, files_of(logs), inputs_of(model))
-    result = emit(body, as_json=as_json, render=_page(compared, top), headline=headline, notes=notes)
-    _gate(body["runs"], min_fit)
+    headline = of_compare(told, known, files_of(logs), inputs_of(model))
+    result = emit(body_of(told), as_json=as_json, render=_page(found, compared, top), headline=headline, notes=notes)
+    _gate(result["runs"], min_fit)
     skips.end(len(compared))
     return result
 
@@ -129,30 +129,12 @@ def _gate(entries: Sequence[Mapping[str, Any]], least: float | None) -> None:
         raise typer.Exit(1)
 
 
-def _page(runs: Sequence[ComparedRun], top: int) -> Page:
+def _page(found: Sequence[Comparison], runs: Sequence[ComparedRun], top: int) -> Page:
     units = angles()
     blocks: list[Block | str] = list(merit_blocks(((r.run, r.speed_m_s, r.merit, r.noise_floor) for r in runs), units))
     for r in runs:
         for flown in filter(None, (r.command_times, r.own_speed)):
             angle, rate = (number(units.factor * v, 2) for v in (flown.as_logged.angle_rms_rad, flown.as_logged.rate_rms_rad_s))
             blocks.append(Whole(f"{flown.says}; angle rms {angle}, rate rms {rate} as logged"))
-    blocks += [block for r in runs for block in _where(r, top)]
+    blocks += [block for c in found for block in blocks_of(c, units, top)]
     return Page("", blocks=tuple(blocks), closing=written(figure=[r.figure for r in runs if r.figure]))
-
-
-def _where(r: ComparedRun, top: int) -> Iterator[Block | str]:
-    """Yield where each channel fails, the worse one first, and which are down to their noise."""
-    from fieldsid.comparison.compare import left_in_words
-
-    for c in r.failing:
-        how = left_in_words(c.over_floor, c.fit)
-        yield where_block(f"{r.run}: where the {c.name} fails, {how}", c.where, angles(), top)
-    failing = {c.name for c in r.failing}
-    quiet = [f"{name} {ratio:.2f} x" for name, ratio in r.over_floor.items() if name not in failing]
-    if quiet:
-        pooled = "" if failing else f", {r.over_noise:.2f} x"
-        said = f"{r.run}: down to the noise{pooled}: {', '.join(quiet)}"
-        yield from [Whole(said)] if failing else paragraph([said], Whole)
-    if r.moves_with:
-        said = ", ".join(f"{m.signal} ({100 * m.explained:.0f} %)" for m in r.moves_with[:3])
-        yield f"the missing moment moves with {said}"

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext, redirect_stderr, redirect_stdout
 from pathlib import Path
-from textwrap import fill
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,7 +18,8 @@ from fieldsid.cli.progress import compiling
 from fieldsid.cli.session import Session
 from fieldsid.cli.voice import voice
 from fieldsid.errors import ArtifactError
-from fieldsid.page import Page, written
+from fieldsid.page import Page, folded, written
+from fieldsid.records.keys import body_of
 from fieldsid.runtime.background_tasks import BackgroundTasks
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from fieldsid.demo.trial import Trial
     from fieldsid.fitting.jit_warmup import Warmup
     from fieldsid.planning.design.leg import Leg
+    from fieldsid.results.trial import Demo
     from fieldsid.results.trial import Step as Taken
 
 HIDDEN = "servo_lag"
@@ -62,20 +63,19 @@ def command(
     began = perf_counter()
     told = SILENT if as_json or voice().is_quiet else VERBOSE if verbose else BRIEF
     with compiling(_compile_loops) as warmup:
-        body = _tour(effect, output, began, warmup, force=force, told=told)
+        tour = _tour(effect, output, began, warmup, force=force, told=told)
     if told != SILENT:
         sys.stdout.write("\n")
-    figures = written(figure=[f for f in body["files"] if verbose and f.endswith(".png")])
+    figures = written(figure=[f for f in tour.files if verbose and f.endswith(".png")])
     page = Page("", closing=(*figures, "`sysid --help` lists every command."))
-    return emit(body, as_json=as_json, render=page, headline=of_demo(body))
+    return emit(body_of(tour), as_json=as_json, render=page, headline=of_demo(tour))
 
 
-def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, force: bool, told: str) -> dict[str, Any]:
+def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, force: bool, told: str) -> Demo:
     from fieldsid.demo.steps import PLAN, STEPS, places
     from fieldsid.demo.trial import make_trial
     from fieldsid.demo.vehicle import hidden_vehicle
     from fieldsid.planning.output.plan_file import load_plan
-    from fieldsid.records.keys import body_of
     from fieldsid.results.trial import Demo, Hidden
 
     folder = _folder(output, force=force)
@@ -93,15 +93,13 @@ def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, for
             if step.possible(known):
                 done.append(_taken(len(done) + 1, step, known, session, force=force, told=told))
                 known |= step.learns(done[-1].result or {})
-    return body_of(
-        Demo(
-            folder=str(folder),
-            hidden=Hidden(effect, vehicle.axis, vehicle.values),
-            named=tuple(known["effects"].split(",")) if "effects" in known else (),
-            steps=tuple(done),
-            files=tuple(sorted(str(p) for p in folder.rglob("*") if p.is_file())),
-            seconds=perf_counter() - began,
-        )
+    return Demo(
+        folder=str(folder),
+        hidden=Hidden(effect, vehicle.axis, vehicle.values),
+        named=tuple(known["effects"].split(",")) if "effects" in known else (),
+        steps=tuple(done),
+        files=tuple(sorted(str(p) for p in folder.rglob("*") if p.is_file())),
+        seconds=perf_counter() - began,
     )
 
 
@@ -140,10 +138,10 @@ def _taken(place: int, step: Step, known: Mapping[str, str], session: Session, *
     meaning = step.means(result)
     if told == BRIEF:
         said = f"{place:2d}. {step.title}{'' if step.title.endswith('?') else ':'} {step.brief(result)}"
-        sys.stdout.write(f"{fill(said, WIDTH, subsequent_indent='    ', break_on_hyphens=False)}\n")
+        sys.stdout.write(f"{folded(said, WIDTH, rest='    ')}\n")
         sys.stdout.flush()
     if told == VERBOSE:
-        sys.stdout.write(f"\n{fill(meaning, WIDTH, initial_indent='=> ', subsequent_indent='   ', break_on_hyphens=False)}\n")
+        sys.stdout.write(f"\n{folded(meaning, WIDTH, first='=> ', rest='   ')}\n")
         sys.stdout.flush()
     return Taken("sysid " + " ".join(words), perf_counter() - began, meaning, result)
 
@@ -156,7 +154,7 @@ def _silence() -> Iterator[None]:
 
 def _told(text: str, told: str) -> None:
     if told != SILENT:
-        sys.stdout.write(f"\n{fill(text, WIDTH, break_on_hyphens=False)}\n" + ("\n" if told == BRIEF else ""))
+        sys.stdout.write(f"\n{folded(text, WIDTH, rest='')}\n" + ("\n" if told == BRIEF else ""))
         sys.stdout.flush()
 
 

@@ -32,9 +32,10 @@ from fieldsid.views._words import times
 
 if TYPE_CHECKING:
     from fieldsid.diagnosis import Diagnosis
+    from fieldsid.diagnosis.records import Pair
     from fieldsid.logs.run import Run
     from fieldsid.models.axis import Axis
-    from fieldsid.models.model import Model
+    from fieldsid.models.model import Model, Noise
     from fieldsid.results.diagnoses import Applied, Diagnosed
 
 
@@ -93,11 +94,10 @@ def command(
     told = replace(told, file=_saved(told, output, inputs, force=force), figure=drawn_at(figure, found.plot, force=force))
     if apply:
         told = replace(told, applied=_applied(found, (known, model), training, unseen, force=force))
-    body = body_of(told)
     from fieldsid.cli.headlines.missing import Searched, of_diagnosis
 
-    headline = of_diagnosis(body, Searched(files_of(training), files_of(unseen), model, thorough))
-    result = emit(body, as_json=as_json, render=_page(found, body), headline=headline, notes=found.notes)
+    headline = of_diagnosis(told, Searched(files_of(training), files_of(unseen), model, thorough))
+    result = emit(body_of(told), as_json=as_json, render=_page(told), headline=headline, notes=found.notes)
     skips.end(len(training) + len(unseen))
     return result
 
@@ -153,20 +153,16 @@ def _applied(
     )
 
 
-def _page(found: Diagnosis, body: Mapping[str, Any]) -> Page:
+def _page(told: Diagnosed) -> Page:
     """Return the page of the diagnosis, with the error before the first addition and after each where effects were added."""
-    applied = body["applied"]
-    models = [step["model"] for step in applied]
-    closing = (*written(model=models), *written(file=body["file"], figure=body["figure"]))
-    return Page("", blocks=(*page_of(found, angles()).blocks, _steps(applied)), closing=closing)
+    closing = written(model=[step.model for step in told.applied], file=told.file, figure=told.figure)
+    return Page("", blocks=(*page_of(told.found, angles()).blocks, _steps(told.applied)), closing=closing)
 
 
-def _steps(applied: Sequence[Mapping[str, Any]]) -> Block:
-    from fieldsid.comparison.sufficient import over_noise
+def _steps(applied: Sequence[Applied]) -> Block:
+    def row(name: str, errors: Pair, floor: Noise) -> tuple[str, ...]:
+        return (name, *(times(side.over(floor)) for side in (errors.train, errors.validation)))
 
-    def row(name: str, errors: Mapping[str, Any], floor: Mapping[str, Any]) -> tuple[str, ...]:
-        return (name, *(times(over_noise(errors[side], floor)) for side in ("train", "validation")))
-
-    rows = [row("as it is", step["before"], step["noise_floor"]) for step in applied[:1]]
-    rows += [row(f"+ {step['effect']}", step["after"], step["noise_floor"]) for step in applied]
+    rows = [row("as it is", step.gain.before, step.gain.noise_floor) for step in applied[:1]]
+    rows += [row(f"+ {step.effect}", step.gain.after, step.gain.noise_floor) for step in applied]
     return Block("the error step by step, over the noise floor", tuple(rows), ("", "fitted", "unseen"))

@@ -39,9 +39,9 @@ def list_(
     from fieldsid.effects import all_effects
     from fieldsid.results.effects import Catalogue, Described
 
-    known = all_effects(axis).values()
+    known = tuple(all_effects(axis).values())
     body = body_of(Catalogue(axis, tuple(map(Described, known))))
-    return emit(body, as_json=as_json, render=_list_page(known), headline=of_catalogue(body))
+    return emit(body, as_json=as_json, render=_list_page(known), headline=of_catalogue(known))
 
 
 @command.command("show", short_help="Show all that is known of one effect.")
@@ -57,7 +57,7 @@ def show(
 
     effect = pick_effect(name)
     body = body_of(ShownEffect(Described(effect)))
-    return emit(body, as_json=as_json, render=_page(effect), headline=of_effect(body))
+    return emit(body, as_json=as_json, render=_page(effect), headline=of_effect(effect))
 
 
 @command.command("new", short_help="Start an effect of your own.")
@@ -82,9 +82,9 @@ def new(
     refuse_existing(path, force=force)
     write_text(path, _started(name, axis, path), force=force)
     load_own_effects()  # what was broken in a file that is replaced is so no more
-    body = body_of(NewEffect(name, axis, str(path)))
-    page = Page("", closing=written(effect=str(path)))
-    return emit(body, as_json=as_json, render=page, headline=of_new_effect(body, _look_at(path, name)))
+    told = NewEffect(name, axis, str(path))
+    page = Page("", closing=written(effect=told.file))
+    return emit(body_of(told), as_json=as_json, render=page, headline=of_new_effect(told, _look_at(path, name)))
 
 
 def _refuse_name(name: str, path: Path) -> None:

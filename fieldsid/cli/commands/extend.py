@@ -102,8 +102,7 @@ def command(
         next=next_,
         skipped_runs=tuple(skips.records),
     )
-    body = body_of(told)
-    result = emit(body, as_json=as_json, render=_page(told, body), headline=of_extension(body), notes=told.notes)
+    result = emit(body_of(told), as_json=as_json, render=_page(told), headline=of_extension(told), notes=told.notes)
     skips.end(len(runs) + len(validate) - len(skips.records))
     return result
 
@@ -178,12 +177,11 @@ def _undone(path: Path, output: Path | None, *, force: bool, as_json: bool) -> M
     undone = Undone(
         gain=step.gain if step else None, undone=str(path), model=str(back), effects=load_model(back).effects, parent=parent
     )
-    body = body_of(undone)
     page = Page("", closing=(f"model: {back}; {path} stays where it is",))
-    return emit(body, as_json=as_json, render=page, headline=of_undoing(body))
+    return emit(body_of(undone), as_json=as_json, render=page, headline=of_undoing(undone))
 
 
-def _page(told: Extended, body: Mapping[str, Any]) -> Page:
+def _page(told: Extended) -> Page:
     from fieldsid.views.extension import errors
 
     found = tuple(
@@ -192,15 +190,16 @@ def _page(told: Extended, body: Mapping[str, Any]) -> Page:
         for factor, unit in [angles().of(c.unit)]
     )
     coefficients = Block("", found, ("coefficient", "value", "unit"), left=2)
-    says = paragraph([_verdict(body), left_says(body)])
+    says = paragraph([_verdict(told), left_says(told.left)])
     return Page("", blocks=(errors(told.gain, angles()), coefficients, *says), closing=written(model=told.model))
 
 
-def _verdict(body: Mapping[str, Any]) -> str:
-    if body["pays"]:
-        return "kept: it predicts better what it has not seen" if body["unseen"] else "kept: the evidence pays for it"
-    data = "unseen data" if body["unseen"] else "the evidence"
-    if body["kept"]:
+def _verdict(told: Extended) -> str:
+    unseen = told.gain.unseen
+    if told.pays:
+        return f"kept: {'it predicts better what it has not seen' if unseen else 'the evidence pays for it'}"
+    data = "unseen data" if unseen else "the evidence"
+    if told.kept:
         return f"kept because of --keep: on {data} it does not pay"
     return f"not kept: on {data} it does not pay; nothing was written, --keep overrules"
 

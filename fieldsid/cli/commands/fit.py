@@ -49,7 +49,7 @@ def command(
         there = [p for p in source.paths if p.is_file()]
         file = str(save_laws(laws, output, models=there if source.models else (), inputs=there, force=force))
     drawn = drawn_at(figure, laws.plot, force=force)
-    body = body_of(FittedLaws(laws=laws, file=file, figure=drawn))
+    told = FittedLaws(laws=laws, file=file, figure=drawn)
     notes = (*source.notes, *law_notes(laws))
     page = Page("", blocks=tuple(blocks_of(laws)), closing=written(file=file, figure=drawn))
-    return emit(body, as_json=as_json, render=page, headline=of_fit(body), notes=notes)
+    return emit(body_of(told), as_json=as_json, render=page, headline=of_fit(told), notes=notes)

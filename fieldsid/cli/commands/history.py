@@ -20,6 +20,7 @@ from fieldsid.views.extension import channels_of
 
 if TYPE_CHECKING:
     from fieldsid.extension import Gain, Generation, Step
+    from fieldsid.results.extensions import History
 
 KEPT = {"unseen": "unseen data are predicted better", "evidence": "the evidence pays for it", "--keep": "kept because of --keep"}
 
@@ -43,20 +44,18 @@ def command(model: ModelFile, figure: FigureFile = None, force: Force = False, a
     if figure is not None and not steps:
         say("nothing was added yet: there is no figure to draw")
     plot = sketch("history", line, model.name)
-    body = body_of(
-        History(
-            model=str(model),
-            axis=known.axis,
-            generations=line,
-            intact=all(g.state == "intact" and not (g.step and g.step.changed_data) for g in line),
-            figure=drawn_at(figure if steps else None, plot, force=force),
-        )
+    told = History(
+        model=str(model),
+        axis=known.axis,
+        generations=line,
+        intact=all(g.state == "intact" and not (g.step and g.step.changed_data) for g in line),
+        figure=drawn_at(figure if steps else None, plot, force=force),
     )
     from fieldsid.cli.headlines.models import of_history
     from fieldsid.records.named_inputs import inputs_of
 
-    headline = of_history(body, inputs_of(model))
-    return emit(body, as_json=as_json, render=_page(line, steps, body), headline=headline, notes=_notes(line))
+    headline = of_history(told, inputs_of(model))
+    return emit(body_of(told), as_json=as_json, render=_page(told, steps), headline=headline, notes=_notes(line))
 
 
 def _notes(line: Sequence[Generation]) -> list[Note]:
@@ -71,8 +70,8 @@ def _notes(line: Sequence[Generation]) -> list[Note]:
     return found
 
 
-def _page(line: Sequence[Generation], steps: Sequence[Step], body: Mapping[str, Any]) -> Page:
-    first = line[0]
+def _page(told: History, steps: Sequence[Step]) -> Page:
+    first = told.generations[0]
     added = [row for step in steps for row in _rows(step.gain)]
     kept = []
     for step in steps:
@@ -83,7 +82,7 @@ def _page(line: Sequence[Generation], steps: Sequence[Step], body: Mapping[str, 
         Block("", tuple(added), ("added", "error of", "before", "after", "noise", "x floor"), left=2),
         *paragraph(kept, Whole),
     )
-    return Page("", blocks=blocks, closing=written(model=body["model"], figure=body["figure"]))
+    return Page("", blocks=blocks, closing=written(model=told.model, figure=told.figure))
 
 
 def _rows(gain: Gain) -> Iterator[tuple[str, ...]]:

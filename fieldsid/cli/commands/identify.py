@@ -103,11 +103,11 @@ def command(
     models = _written(fits, files, output, force=force)
     drawn_in(output if figures else None, {k: v for fit in fits for k, v in _plots(fit).items()}, force=force)
     entries = tuple(fitted_model(fit, model, of) for fit, model, of in zip(fits, models, groups, strict=True))
-    body = body_of(Identified(axis=axis, fits=entries, skipped_runs=tuple(skips.records)))
+    told = Identified(axis=axis, fits=entries, skipped_runs=tuple(skips.records))
     from fieldsid.cli.headlines.models import of_identify
 
-    headline = of_identify(body, files)
-    result = emit(body, as_json=as_json, render=_page(entries, figures=figures), headline=headline, notes=_warnings(entries))
+    page, headline = _page(entries, figures=figures), of_identify(told, files)
+    result = emit(body_of(told), as_json=as_json, render=page, headline=headline, notes=_warnings(entries))
     skips.end(len(used))
     return result
 
@@ -135,10 +135,10 @@ def _plots(fit: Fit) -> dict[str, Callable[[], Any]]:
 
 def _drawn(fit: Fit) -> list[int]:
     """Return the places of the runs that are drawn: all of a few, of many those that the model follows least."""
-    from fieldsid.comparison.sufficient import over_noise
     from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
+    from fieldsid.results.fits import over_noise_of
 
-    over = [over_noise(body_of(goodness_of_fit([p])), body_of(fit.floor)) for p in fit.predictions]
+    over = [over_noise_of(goodness_of_fit([p]), fit.floor) for p in fit.predictions]
     least = sorted(range(len(over)), key=lambda i: (isnan(over[i]), -over[i]))
     return sorted(least[:MOST_DRAWN])
 

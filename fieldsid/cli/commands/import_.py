@@ -72,15 +72,15 @@ def command(
     for _, place in placed:
         check_output(place, force=force)
     done = [importer.write(run, place, force=force) for run, place in placed]
-    body = body_of(Import(runs=tuple(done), already_imported=tuple(map(str, there)), skipped_runs=tuple(skips.records)))
+    told = Import(runs=tuple(done), already_imported=tuple(map(str, there)), skipped_runs=tuple(skips.records))
     from fieldsid.cli.headlines.logs import of_import
     from fieldsid.logs.segments import plane_of
 
     notes = alike(((n.code, n.data.get("signal")), item.run.name, n) for item in done for n in item.warnings)
-    headline = of_import(body, plane_of([d.run for d in done]))
+    headline = of_import(told, plane_of([d.run for d in done]))
     rows = tuple((d.file, str(d.samples), f"{d.duration_s:.2f}", f"{d.rate_hz:.4g}", str(len(d.signals))) for d in done)
     page = Page("", blocks=(Block("", rows, ("run", "samples", "s", "Hz", "signals")),))
-    result = emit(body, as_json=as_json, render=page, headline=headline, notes=notes)
+    result = emit(body_of(told), as_json=as_json, render=page, headline=headline, notes=notes)
     if as_json:  # a run is used for long: what is odd about it is said however it is asked for
         warn(notes)
     skips.end(len(done))

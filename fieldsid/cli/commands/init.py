@@ -36,5 +36,5 @@ def command(
     verdict = f"a trial folder for a {template} vehicle"
     append(folder, Entry(time, words, 0, 0.0, verdict, (), tuple(hashes.stamp(f) for f in files)))
     files = [*files, folder / JOURNAL]
-    body = body_of(Init(name, template, tuple(map(str, files))))
-    emit(body, as_json=as_json, render=Page("", closing=tuple(map(str, files))), headline=of_trial(body))
+    told = Init(name, template, tuple(map(str, files)))
+    emit(body_of(told), as_json=as_json, render=Page("", closing=told.files), headline=of_trial(told))

@@ -42,20 +42,23 @@ def command(
         found = inspect_log(path, mapping=mapping, msg_path=msg_path, joined=joined, progress=on_share)
     written = write_proposal(found, write_mapping, force=force) if write_mapping is not None else None
     result = inspected(found, written)
-    body = body_of(result)
-    emit(body, as_json=as_json, render=lambda to: _render(found, result, to), headline=of_inspection(body, mapping))
+    headline = of_inspection(result, mapping)
+    emit(body_of(result), as_json=as_json, render=lambda to: _render(found, result, to), headline=headline)
 
 
 def _render(found: Inspection, result: Inspected, to: Console) -> None:
     from fieldsid.cli.console import table, words
+    from fieldsid.cli.headlines.logs import PROOF
 
     rows = tuple((c.name, c.type, str(c.count), c.rate, c.holds) for c in result.shown)
     to.print(table(Block("", rows, ("channel", "type", "samples", "Hz", "holds"), left=2)))
     if result.more_channels:
         to.print(f"and {result.more_channels} more channels")
     kind = "canonical names, none is needed" if found.needs_none else "proposed"
-    findings = [f"- {note.message} [{note.code}]" for note in found.notes] or ["- none"]
-    for title, lines in ((f"mapping ({kind})", found.yaml().rstrip().split("\n")), ("findings", findings)):
+    parts = [(f"mapping ({kind})", found.yaml().rstrip().split("\n"))]
+    parts += [("why these", lines)] if (lines := [f"- {n.message}" for n in found.notes if n.code == PROOF]) else []
+    parts += [("findings", [f"- {n.message} [{n.code}]" for n in found.notes if n.code != PROOF] or ["- none"])]
+    for title, lines in parts:
         to.print()
         to.print(words(title, "bold"))
         for line in lines:

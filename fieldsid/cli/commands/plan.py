@@ -138,10 +138,11 @@ def command(
     if made.found:
         best = max(made.found, key=lambda s: s.expected_log_odds)
         told = {"separation": best, "separations": made.found, "says": tuple(line for s in made.found for line in s.says())}
-    body = body_of(Planned(made.plan, tuple(map(str, files)), **told))
+    result = Planned(made.plan, tuple(map(str, files)), **told)
     from fieldsid.cli.headlines.trial import of_plan
 
-    return emit(body, as_json=as_json, render=_page(made.plan, told.get("says", ())), headline=of_plan(body, model))
+    page = _page(made.plan, told.get("says", ()))
+    return emit(body_of(result), as_json=as_json, render=page, headline=of_plan(result, model))
 
 
 def _check_write(write: str | None, output: Path | None) -> None:

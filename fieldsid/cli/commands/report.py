@@ -47,22 +47,20 @@ def command(
     check_report(path, force=force)
     get_ready()
     context, text = written(state, path, force=force)
-    body = body_of(
-        Report(
-            file=str(path),
-            bytes=path.stat().st_size,
-            verdicts=tuple(ReportVerdict(v["what"], v["says"]) for v in context["verdicts"]),
-            runs=tuple(r["name"] for r in context["runs"]),
-            models=tuple(m["path"] for a in context["axes"] for m in a["models"]),
-            figures=text.count('<svg class="chart"') + text.count('<svg class="bars"'),
-            skipped=tuple(context["skipped"]),
-        )
+    told = Report(
+        file=str(path),
+        bytes=path.stat().st_size,
+        verdicts=tuple(ReportVerdict(v["what"], v["says"]) for v in context["verdicts"]),
+        runs=tuple(r["name"] for r in context["runs"]),
+        models=tuple(context["models"]),
+        figures=text.count('<svg class="chart"') + text.count('<svg class="bars"'),
+        skipped=tuple(context["skipped"]),
     )
     from fieldsid.cli.headlines.trial import of_report
 
-    notes = [Note("not_in_report", line, {}) for line in context["skipped"]]
-    page = Page("", closing=tuple(f"{v['what']}: {v['says']}" for v in context["verdicts"][1:]))
-    return emit(body, as_json=as_json, render=page, headline=of_report(body, state.folder), notes=notes)
+    notes = [Note("not_in_report", line, {}) for line in told.skipped]
+    page = Page("", closing=tuple(f"{v.what}: {v.says}" for v in told.verdicts[1:]))
+    return emit(body_of(told), as_json=as_json, render=page, headline=of_report(told, state.folder), notes=notes)
 
 
 def _state(given: Sequence[Path]) -> FolderState:

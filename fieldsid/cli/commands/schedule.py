@@ -24,6 +24,7 @@ from fieldsid.views.verification import blocks_of as verify_blocks
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from fieldsid.results.gains import Exported
     from fieldsid.schedule.record import Schedule
 
 command = typer.Typer(
@@ -141,10 +142,10 @@ def design(
     )
     inputs = [p for p in source.paths if p.is_file()]
     written_to = None if output is None else str(save_schedule(schedule, output, inputs=inputs, force=force))
-    body = body_of(Design(schedule, written_to))
-    headline = of_design(body, models, caveat(source.models, models))
+    told = Design(schedule, written_to)
+    headline = of_design(told, models, caveat(source.models, models))
     page = Page("", blocks=tuple(design_blocks(schedule, angles(), lost(source))), closing=written(schedule=written_to))
-    return emit(body, as_json=as_json, render=page, headline=headline, notes=schedule.notes)
+    return emit(body_of(told), as_json=as_json, render=page, headline=headline, notes=schedule.notes)
 
 
 @command.command("verify", short_help="Margins and steps over the identified set.")
@@ -198,28 +199,25 @@ def verify(
     wanted = (least, gain, delay, most)
     gates = gates_of(checked, dict(zip(checked.worst, wanted, strict=True)))
     verdict, says = verdict_of(checked, known, gates)
-    body = body_of(
-        Verified(
-            verdict=verdict,
-            says=says,
-            rests_on=rests_on(checked, known, source),
-            against_constant=against_constant(checked),
-            constant_gains=checked.constant_row.gains,
-            axis=known.axis,
-            controller=known.kind,
-            worst=checked.worst,
-            scheduled=checked.scheduled,
-            constant=checked.constant,
-            gates=gates,
-            figure=drawn_at(output, sketch("schedule", known, checked), force=force),
-        )
+    told = Verified(
+        verdict=verdict,
+        says=says,
+        rests_on=rests_on(checked, known, source),
+        against_constant=against_constant(checked),
+        constant_gains=checked.constant_row.gains,
+        axis=known.axis,
+        controller=known.kind,
+        worst=checked.worst,
+        scheduled=checked.scheduled,
+        constant=checked.constant,
+        gates=gates,
+        figure=drawn_at(output, sketch("schedule", known, checked), force=force),
     )
-    headline = of_verification(body, schedule, models or source.paths)
-    passed = [g for g in body["gates"] if g["passed"] and not body["passed"]]
-    gates_said = (f"passed: {g['gate']} {g['found']:.3g}, wanted {g['wanted']:.3g}" for g in passed)
-    page = Page("", blocks=(*verify_blocks(checked), *gates_said), closing=written(figure=body["figure"]))
-    result = emit(body, as_json=as_json, render=page, headline=headline)
-    if not body["passed"]:
+    headline = of_verification(told, schedule, models or source.paths)
+    gates_said = (f"passed: {g.name} {g.found:.3g}, wanted {g.wanted:.3g}" for g in gates if g.passed and not told.passed)
+    page = Page("", blocks=(*verify_blocks(checked), *gates_said), closing=written(figure=told.figure))
+    result = emit(body_of(told), as_json=as_json, render=page, headline=headline)
+    if not told.passed:
         raise typer.Exit(1)
     return result
 
@@ -258,9 +256,9 @@ def export(
         return _export_into(known, schedule, into, key, write=write, as_json=as_json)
     target = pick_target(to)
     text = target.render(known, node or target.node, template)
-    body = body_of(Exported(target.name, text, *(() if output is None else _written(output, text, force=force))))
-    headline, is_file = of_export(body, schedule), body["file"] is None
-    return emit(body, as_json=as_json, render=lambda out: _render_export(out, body), headline=headline, is_file=is_file)
+    told = Exported(target.name, text, *(() if output is None else _written(output, text, force=force)))
+    headline, is_file = of_export(told, schedule), told.file is None
+    return emit(body_of(told), as_json=as_json, render=lambda out: _render_export(out, told), headline=headline, is_file=is_file)
 
 
 def _written(output: Path, text: str, *, force: bool) -> tuple[str, str, str | None]:
@@ -282,8 +280,8 @@ def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write
 
     patch = patch_yaml(into, key, columns_of(known))
     backup = str(write_patch(patch)) if write else None
-    body = body_of(Patched(patch.difference, str(into), backup))
-    headline = of_patch(body, schedule, key)
+    told = Patched(patch.difference, str(into), backup)
+    headline, body = of_patch(told, schedule, key), body_of(told)
     return emit(body, as_json=as_json, render=lambda out: print_file(out, patch.difference), headline=headline, is_file=not write)
 
 
@@ -293,8 +291,8 @@ def _time(text: str | None, option: str, example: str = "0.1s") -> float | None:
     return None if text is None else parse_time(text, option, example)
 
 
-def _render_export(to: Console, body: Mapping[str, Any]) -> None:
+def _render_export(to: Console, told: Exported) -> None:
     """Print the file written, or the text where there is none."""
-    print_file(to, body["difference"] if body["file"] else body["text"])
-    if body["file"]:
-        to.print(f"exported: {body['file']}" + (f"; as it was: {body['backup']}" if body["backup"] else ""), soft_wrap=True)
+    print_file(to, told.difference if told.file else told.text)
+    if told.file:
+        to.print(f"exported: {told.file}" + (f"; as it was: {told.backup}" if told.backup else ""), soft_wrap=True)

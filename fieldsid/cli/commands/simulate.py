@@ -17,6 +17,7 @@ from fieldsid.rounding import number
 if TYPE_CHECKING:
     from fieldsid.logs.run import Run
     from fieldsid.models.model import Model
+    from fieldsid.results.logs import Simulation
 
 
 def command(
@@ -65,18 +66,16 @@ def command(
         made = replace(made, name=Path(output.name.removesuffix(".gz")).stem, notes=(*made.notes, note))
         save_run(made, output, force=force)
     signals = {n: SignalRange(float(v.min()), float(v.max()), float(v[-1])) for n, v in made.signals.items()}
-    body = body_of(
-        Simulation(
-            model=str(model),
-            run=made.name,
-            file=None if output is None else str(output),
-            samples=len(made),
-            seconds=float(made.time[-1] - made.time[0]),
-            signals=signals,
-        )
+    told = Simulation(
+        model=str(model),
+        run=made.name,
+        file=None if output is None else str(output),
+        samples=len(made),
+        seconds=float(made.time[-1] - made.time[0]),
+        signals=signals,
     )
-    headline = of_simulation(body, known.axis.value, maneuver, run)
-    return emit(body, as_json=as_json, render=_page(body), headline=headline)
+    headline = of_simulation(told, known.axis.value, maneuver, run)
+    return emit(body_of(told), as_json=as_json, render=_page(told), headline=headline)
 
 
 def _flown(model: Model, spec: str, speed: float | None, fin_max: str, rate: float) -> Run:
@@ -106,12 +105,12 @@ def _replayed(model: Model, path: Path, mapping: Path | None, speed: float | Non
     return replayed(model, record, simulate(model, record))
 
 
-def _page(body: Mapping[str, Any]) -> Page:
+def _page(told: Simulation) -> Page:
     from fieldsid.logs.run import COLUMNS
 
     rows = tuple(
-        (name, *(number(factor * v[k]) for k in ("low", "high", "end")), unit)
-        for name, v in body["signals"].items()
+        (name, *(number(factor * end) for end in (v.low, v.high, v.end)), unit)
+        for name, v in told.signals.items()
         for factor, unit in [angles().of(COLUMNS[name])]
     )
-    return Page("", blocks=(Block("", rows, ("signal", "low", "high", "end", "unit")),), closing=written(run=body["file"]))
+    return Page("", blocks=(Block("", rows, ("signal", "low", "high", "end", "unit")),), closing=written(run=told.file))

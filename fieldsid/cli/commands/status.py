@@ -62,19 +62,17 @@ def command(
     why, line = next_step(state)
     if line and folder.resolve() != Path.cwd():
         line = f"cd {shlex.quote(str(folder))} && {line}"
-    body = body_of(
-        Status(
-            folder=str(folder),
-            verdict=_verdict(state),
-            files=state.items,
-            stale=tuple(i.path for i in state.items if i.stale),
-            journal=state.entries,
-            unreadable_journal_lines=state.broken_lines,
-            warnings=tuple(notes),
-            next=NextStep(why, line),
-        )
+    told = Status(
+        folder=str(folder),
+        verdict=_verdict(state),
+        files=state.items,
+        stale=tuple(i.path for i in state.items if i.stale),
+        journal=state.entries,
+        unreadable_journal_lines=state.broken_lines,
+        warnings=tuple(notes),
+        next=NextStep(why, line),
     )
-    return emit(body, as_json=as_json, render=_page(state), headline=of_status(body), notes=notes)
+    return emit(body_of(told), as_json=as_json, render=_page(state), headline=of_status(told), notes=notes)
 
 
 def _verdict(state: FolderState) -> str:
@@ -109,5 +107,5 @@ def _row(item: Item) -> tuple[str, ...]:
     said = ", ".join(names) if len(names) <= MOST_SOURCES else f"{names[0]} and {len(names) - 1} more"
     what = NAMES[item.kind]
     effects = len((item.body or {}).get("effects", ())) if item.kind == "model" else 0
-    state = f"stale: {item.stale}" if item.stale else f"not there: {', '.join(item.missing)}" if item.missing else ""
-    return item.path, f"{what}, {counted(effects, 'effect')}" if effects else what, said, state
+    told = f"{what}, {counted(effects, 'effect')}" if effects else what
+    return item.path, told, said.replace("+", " +"), item.standing  # a line ends between effects

@@ -93,10 +93,9 @@ def command(
         plots = {"turn_radius": sketch("turn", prediction)}
         plots |= {f"circle_{m.turn.run}": sketch("turn", m.turn, draw="track_figure") for m in prediction.measured}
         found = replace(found, figures=tuple(drawn_in(output if figures else None, plots, force=force)))
-    body = body_of(found)
-    headline, notes = of_turn(body, models, caveat(source.models, models)), prediction.notes
+    headline, notes = of_turn(prediction, models, caveat(source.models, models)), prediction.notes
     page = Page("", blocks=page_of(prediction, angles()).blocks, closing=written(figure=found.figures))
-    result = emit(body, as_json=as_json, render=page, headline=headline, notes=notes)
+    result = emit(body_of(found), as_json=as_json, render=page, headline=headline, notes=notes)
     skips.end(len(runs or []) + len(measured or []) - len(skips.records))
     return result
 
@@ -122,7 +121,7 @@ def _runs(given: Sequence[Path] | None, source: ParameterSource, mapping: Path |
     if given:
         return read_runs(given, mapping=mapping, refused=skips.skip)
     chosen = mapping_of(mapping)
-    outcomes = {path: attempt(lambda p: load_run(p, chosen), path) for path in run_files(source, say)}
+    outcomes = {path: attempt(lambda p: load_run(p, chosen, recognise=True), path) for path in run_files(source, say)}
     lost = [f"`{path}`" for path, outcome in outcomes.items() if not isinstance(outcome, Run)]
     if lost:
         say(

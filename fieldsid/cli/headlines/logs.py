@@ -2,55 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, typed_with
-from fieldsid.cli.headlines.words import Body, named
-from fieldsid.logs.run import EXPLAINING
+from fieldsid.cli.headlines.words import named
 from fieldsid.page import counted
 from fieldsid.trial_folder.journal import is_trial
 from fieldsid.trial_folder.make import LOGS, MAPPING
+
+if TYPE_CHECKING:
+    from fieldsid.results.logs import Import, Inspected
 
 PROOF = "evidence"
 """Code of a finding that says why a column was taken for a signal: nothing is wrong there."""
 
 
-def of_inspection(body: Body, mapping: Path | None) -> Headline:
+def of_inspection(told: Inspected, mapping: Path | None) -> Headline:
     """Return what a log holds, and how it becomes a run."""
-    log, signals, findings = (
-        " + ".join([body["path"], *body["joined"]]),
-        body["signals"],
-        [f for f in body["findings"] if f["code"] != PROOF],
-    )
-    said = counted(len(findings), "finding") if findings else "nothing found that would spoil an identification"
-    if not signals:
-        says = (
-            f"{log} is no run yet: {'none of its names says what its numbers are' if not body['problem'] else 'see the findings'}"
-        )
+    log, findings = " + ".join([told.path, *told.joined]), sum(f.code != PROOF for f in told.findings)
+    said = counted(findings, "finding") if findings else "nothing found that would spoil an identification"
+    if told.signals:
+        says = f"{log} holds {counted(len(told.signals), 'signal')} for {told.span}; {said}"
     else:
-        says = f"{log} holds {counted(len(signals), 'signal')} for {body['span']}; {said}"
-    how = (
-        "its own names"
-        if not body["mapping_needed"]
-        else f"`{mapping}`"
-        if mapping
-        else "a proposed mapping: check units and signs"
-    )
-    return Headline(says, f"{body['format']}, {counted(len(body['channels']), 'channel')}, by {how}", _after(body, mapping))
+        says = f"{log} is no run yet: {'see the findings' if told.problem else 'none of its names says what its numbers are'}"
+    proposed = f"`{mapping}`" if mapping else "a proposed mapping: check units and signs"
+    how = proposed if told.mapping_needed else "its own names"
+    return Headline(says, f"{told.format}, {counted(len(told.channels), 'channel')}, by {how}", _after(told, mapping))
 
 
-def _after(body: Body, mapping: Path | None) -> str:
-    known = body["mapping_file"] or mapping
-    if body["mapping_needed"] and known is None:
+def _after(told: Inspected, mapping: Path | None) -> str:
+    known = told.mapping_file or mapping
+    if told.mapping_needed and known is None:
         return typed_with("--write-mapping", MAPPING, *(("--force",) if Path(MAPPING).exists() else ()))
-    if not body["signals"]:  # an import is refused until somebody has said what the columns are
+    if not told.signals:  # an import is refused until somebody has said what the columns are
         return pasted("guide", "trial")
-    if _is_taken(Path(body["path"]), known) and not body["import_options"] and not body["joined"]:
+    if _is_taken(Path(told.path), known) and not told.import_options and not told.joined:
         return pasted("import")
-    files = [*(["--join"] if body["joined"] else []), body["path"], *body["joined"]]
-    return pasted("import", *files, *(("--mapping", known) if known else ()), *body["import_options"], "-o", "runs/")
+    files = [*(["--join"] if told.joined else []), told.path, *told.joined]
+    return pasted("import", *files, *(("--mapping", known) if known else ()), *told.import_options, "-o", "runs/")
 
 
 def _is_taken(log: Path, mapping: str | Path | None) -> bool:
@@ -59,22 +50,17 @@ def _is_taken(log: Path, mapping: str | Path | None) -> bool:
     return is_here and (mapping is None or Path(mapping).resolve() == Path(MAPPING).resolve())
 
 
-def of_import(body: Body, axis: str) -> Headline:
+def of_import(told: Import, axis: str) -> Headline:
     """Return how many runs there are now, and the first fit of them, in the plane that they excite."""
-    runs, there = body["runs"], body["already_imported"]
+    runs, there = told.runs, told.already_imported
     if not runs and there:
         return Headline(f"already imported: {counted(len(there), 'log')}, as they are", named(there), pasted("status"))
-    seconds = sum(float(r["duration_s"]) for r in runs)
-    files = [r["file"] for r in runs]
+    files, noted = [r.file for r in runs], sum(len(r.warnings) for r in runs)
     joint = ("--joint",) if len(files) > 1 else ()
-    noted = sum(n["code"] not in EXPLAINING for r in runs for n in r["notes"])
-    says = f"{counted(len(runs), 'run')}, {seconds:.0f} s, " + (counted(noted, "note") if noted else "nothing to note")
+    says = f"{counted(len(runs), 'run')}, {sum(r.duration_s for r in runs):.0f} s, "
+    logs = list(dict.fromkeys(Path(r.log).resolve().name for r in runs if r.log is not None))
     return Headline(
-        says,
-        f"{named(_logs(runs))}: SI and radians, one clock, gaps left as gaps",
+        says + (counted(noted, "note") if noted else "nothing to note"),
+        f"{named(logs)}: SI and radians, one clock, gaps left as gaps",
         pasted("identify", files, "--axis", axis, *joint, "-o", "models/") if files else "",
     )
-
-
-def _logs(runs: Sequence[Body]) -> list[str]:
-    return list(dict.fromkeys(Path(r["log"]).resolve().name for r in runs))

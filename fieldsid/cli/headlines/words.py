@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from fieldsid.cli.headlines.typed import pasted
 
-Body = Mapping[str, Any]
 USE = {"yaw": ("turn-radius",), "pitch": ("schedule", "design")}
 """What a model is for once it leaves no more than the noise."""
 MOST_NAMED = 3

@@ -167,8 +167,9 @@ def diagnosed(flown: Run | Mapping[str, Any], axis: Axis) -> LiveDiagnosis:
 
     own_effects()
     run = _read(flown)
-    found = body_of(diagnose([run], axis))
-    kept = {key: found[key] for key in ("verdict", "effects", "left", "base", "final", "noise_floor", "next_maneuver")}
+    found = diagnose([run], axis)
+    names, body = ("verdict", "effects", "left", "base", "final", "noise_floor", "next_maneuver"), body_of(found)
+    kept = {key: body[key] for key in names}
     return LiveDiagnosis(time=float(run.time[-1]), says=first_line(found), **kept)
 
 

@@ -49,7 +49,7 @@ def _may_show(place: Path, _written_ns: int, axis: Axis) -> bool:
     from fieldsid.logs.segments import may_show
 
     try:
-        return may_show(load_run(place), axis)
+        return may_show(load_run(place, recognise=True), axis)
     except FieldsidError:
         return True
 
@@ -157,7 +157,7 @@ def _circles(state: FolderState) -> list[str]:
     found = []
     for item in state.of_kind(RUN):
         try:
-            run = load_run(state.place(item))
+            run = load_run(state.place(item), recognise=True)
         except FieldsidError:
             continue
         if is_circle(run):

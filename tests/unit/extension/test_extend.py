@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 
 import hidden_lag
 import numpy as np
@@ -12,6 +13,7 @@ from cli.trial import vehicle
 from fieldsid.errors import DataError, UsageError
 from fieldsid.extension import extend_in_steps, whole_of
 from fieldsid.fitting.predict.predict import predict
+from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
 
@@ -40,6 +42,13 @@ def test_the_true_effect_brings_the_error_on_unseen_runs_down_to_the_floor(lagge
     assert after == pytest.approx(1.0, abs=0.06)
     assert lagged.pays
     assert lagged.evidence > 100.0
+
+
+def test_a_whole_says_the_forms_of_all_its_steps_and_how_the_runs_were_flown_by_its_last(lagged):
+    flown = [Note("own_speed", f"flown {share} % slower") for share in (0.5, 0.7)]
+    formed = [Note("form_taken", f"`{name}` in another form") for name in ("servo_lag", "quadratic_damping")]
+    steps = [replace(lagged, notes=(form, by)) for form, by in zip(formed, flown, strict=True)]
+    assert whole_of(steps).notes == (formed[0], formed[1], flown[1])
 
 
 def test_the_truth_lies_within_the_extended_models_errors(lagged):

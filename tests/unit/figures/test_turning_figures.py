@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from truth.paper import YAW
@@ -63,8 +65,8 @@ def test_track_figure_draws_the_circle_with_its_radius():
 
 def test_schedule_figure_has_hollow_rows_where_data_do_not_support_them(source):
     made = design_schedule(source, 0.26, speeds=[0.7, 1.4, 2.0])
-    figure = schedule.figure(made, verify_schedule(made, source, draws=5))
-    gains, forward, margins, leg, small, usual, large, fin = axes_of(figure)
+    verified = verify_schedule(made, source, draws=5)
+    gains, forward, margins, small, usual, large, fin = axes_of(schedule.figure(made, verified))
     faces = [line.get_markerfacecolor() for line in gains.lines if line.get_marker() == "o"]
     assert faces[0] == "white"
     assert "white" not in faces[1:]
@@ -72,8 +74,9 @@ def test_schedule_figure_has_hollow_rows_where_data_do_not_support_them(source):
     assert margins.get_ylim()[0] == 0.0
     assert [len(ax.lines) for ax in (small, usual, large)] == [10, 10, 10]
     assert [ax.get_ylabel() for ax in (small, usual, large)] == [f"{d}° step, deg" for d in (5, 20, 90)]
+    leg = axes_of(schedule.figure(made, replace(verified, disturbance=0.01)))[3]  # none where the runs had no disturbance
     assert len(leg.lines) == 5
-    assert "no disturbance" in leg.get_title(loc="left")
+    assert "as the runs had, up to 0.01 rad/s²" in leg.get_title(loc="left")
     assert "asked" in {t.get_text() for t in margins.get_legend().get_texts()}
     assert {float(line.get_ydata()[0]) for line in margins.lines} >= {45.0, 22.5}
     low, high = forward.get_ylim()
