@@ -15,10 +15,10 @@ from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.diagnosis.data.heading_span import shown_by_headings
 from fieldsid.diagnosis.data.holdout_split import holdout_split
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
-from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
+from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit, fit_output_error
 from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
-from fieldsid.diagnosis.evidence.scored_model import ScoredModel
-from fieldsid.diagnosis.records import Candidate, Diagnosis, Pair
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel, with_free_run
+from fieldsid.diagnosis.records import Candidate, Diagnosis
 from fieldsid.diagnosis.report.final_model import final_model
 from fieldsid.diagnosis.report.next_maneuver import next_maneuver
 from fieldsid.diagnosis.report.report_text import apart_from_the_hulls_own, evidence, headline
@@ -101,7 +101,7 @@ class _SearchResult:
     """The final model of a search, its verdict, and what is reported with it.
 
     `ml_fit` is the final model under the noise that its residuals are tested with; `models` are those of the base and of the
-    final model for the file, each with notes on the validation runs; `errors` belong to the first of the `leading` models.
+    final model for the file, each with notes on the validation runs; the errors of the first `leading` models are worked out.
     """
 
     work: Search
@@ -112,7 +112,6 @@ class _SearchResult:
     models: tuple[FinalModel, FinalModel]
     places: tuple[tuple[Place, ...], tuple[Note, ...]]
     leading: Sequence[ScoredModel]
-    errors: Sequence[Pair]
 
 
 def _best_result(work: Search) -> _SearchResult:
@@ -122,7 +121,15 @@ def _best_result(work: Search) -> _SearchResult:
 
 def _search_result(work: Search, found: ScoredModel, ml_fit: LikelihoodFit, verdict: Verdict | None = None) -> _SearchResult:
     """Return the final model of a search with its residual tests, its models for the file, and its verdict unless given."""
-    base, shown = work.base(), _leading(work, found)
+    base, ranked = work.base(), _leading(work, found)
+    shown, beyond = ranked[:MAX_CANDIDATES], ranked[MAX_CANDIDATES:]
+
+    def flown(h: ScoredModel) -> ScoredModel:
+        """Return a model as it is shown: its error is how near its free run can come, whatever a disturbance adds to that."""
+        fitted = h.likelihood_fit.fitted
+        if h is found or h.output_error_fit is not None:
+            return h.evaluate_errors()
+        return with_free_run(h, fit_output_error(fitted.problem, fitted.x, fitted.weights), work.floor).evaluate_errors()
 
     def refitted(h: ScoredModel) -> FinalModel:
         model = final_model(h)
@@ -133,14 +140,14 @@ def _search_result(work: Search, found: ScoredModel, ml_fit: LikelihoodFit, verd
         partial(refitted, found),
         partial(residual_tests, ml_fit),
         partial(where_of, base, work.validation or work.records),
-        *(partial(getattr, h, "errors") for h in shown[:MAX_CANDIDATES]),
+        *(partial(flown, h) for h in shown),
         *([partial(refitted, base)] if found is not base else []),
     ]
     done = work.parallel.map(lambda part: part(), parts)
     own, left, places = done[:3]
-    errors, of_base = done[3 : 3 + len(shown[:MAX_CANDIDATES])], own if found is base else done[-1]
+    leading, of_base = (*done[3 : 3 + len(shown)], *beyond), own if found is base else done[-1]
     verdict = verdict or verdict_of(work, found, left, ml_fit)
-    return _SearchResult(work, found, ml_fit, left, verdict, (of_base, own), places, shown, errors)
+    return _SearchResult(work, found, ml_fit, left, verdict, (of_base, own), places, leading)
 
 
 def _diagnosis(
@@ -214,14 +221,14 @@ def _candidates(end: _SearchResult, floor: Noise, left: float) -> tuple[Candidat
             effects=added_effects(work, h),
             probability=p.get(frozenset(h.names), 0.0),
             parameters=dict(h.model.values),
-            errors=pair,
+            errors=h.errors,
             explained=excess_explained(work, h, floor),
             score=gain(h),
-            evidence=evidence(work, h, pair, floor, gain(h)),
+            evidence=evidence(work, h, h.errors, floor, gain(h)),
             confusable_with=confusable(work, h, end.leading, p, floor),
             worse=worsens(work, h, floor),
         )
-        for h, pair in zip(end.leading, end.errors, strict=False)
+        for h in end.leading[:MAX_CANDIDATES]
     )
 
 

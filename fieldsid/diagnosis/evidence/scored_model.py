@@ -51,8 +51,8 @@ class ScoredModel:
     `own_moment` (rad/s^2) is the standard deviation of the moment that each run, of training and validation, has of its own, the
     mean of its disturbance in it.
     `settled_residuals` [(2, n)] are those of the validation runs at the parameters that all runs leave together.
-    `output_error_fit` is a fit by output error that is reported in its place: of a base model whose free run is nearer to the
-    validation runs so, and of every model of a log without noise.
+    `output_error_fit` is a fit by output error that is reported in its place where its free run is nearer to the validation runs:
+    of the base model, of what was not found but is shown, and of every model of a log without noise.
     """
 
     likelihood_fit: LikelihoodFit
@@ -266,7 +266,7 @@ def free_run_residual(problem: Problem, x: FloatArray, run: int = 0) -> FloatArr
 
 
 def with_free_run(h: ScoredModel, fitted: FittedProblem, floor: Noise) -> ScoredModel:
-    """Return a base model with an output-error fit to be reported, where its free run is nearer to the validation runs.
+    """Return a model with an output-error fit to be reported, where the free run of that is nearer to the validation runs.
 
     Generalised least squares is efficient for a model that is right, and may have the worse free run for one that is not.
     """
