@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldsid.comparison.compare import Channel, Comparison
+from fieldsid.comparison.left_by import left_by_addition
 from fieldsid.comparison.sufficient import SUFFICIENT_ERROR_RATIO, is_noise, over_noise, pooled
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.extension.extend import Gain
 from fieldsid.models.model import Noise
-from fieldsid.trial_folder.next_step import left_by
 
 RATIO = st.floats(0.5, 3.0)
 NAN = float("nan")
@@ -32,9 +32,15 @@ def test_compare_extend_diagnose_and_status_come_to_one_verdict(angle_noise, rat
     noise = {"angle_rad": angle_noise, "rate_rad_s": rate_noise}
     both = Pair(errors, errors)
     gain = Gain(("servo_lag",), both, both, floor, unseen=True, learned_on=("a",), judged_on=("b",))
-    kept = {"info": {"extension": {"noise_floor": noise, "after": {"train": record, "validation": record}}}}
+    info = {"extension": {"noise_floor": noise, "after": {"train": record, "validation": record}}}
     found = compared(floor, angle, rate)
-    overs = [errors.over(floor), over_noise(record, noise), found.over_noise, *gain.left(kept=True), left_by(kept)]
+    overs = [
+        errors.over(floor),
+        over_noise(record, noise),
+        found.over_noise,
+        *gain.left(kept=True),
+        left_by_addition(info),
+    ]
     assert overs == pytest.approx([overs[0]] * len(overs))
     if abs(overs[0] - SUFFICIENT_ERROR_RATIO) > 1e-6:
         assert len({is_noise(over) for over in overs}) == 1
