@@ -129,14 +129,18 @@ class Problem:
     def simulate(self, x: FloatArray, run: int) -> tuple[Motion, Base]:
         """Return one run's free run as the sensors would show it."""
         self.evaluations.add()
-        record, effects = self.counted[run], self.layout.effects
-        values = self.values_of(x, run)
+        record = self.counted[run]
+        values, base, start, arrays = self._inputs(x, run)
+        out = integrate_record(record, arrays, start)
+        return measured(Motion(out[:, 0], out[:, 1]), record, self.layout.effects, values), base
+
+    def _inputs(self, x: FloatArray, run: int) -> tuple[dict[str, float], Base, FloatArray, KernelInputs]:
+        """Return what a run is simulated with: its coefficients, its base, its initial state (3,) and the kernel's inputs."""
+        record, values = self.counted[run], self.values_of(x, run)
         base = self._base(values, run)
         arrays = self._arrays(record, base, values, run)
         start = _start_of(values, arrays.core)
-        arrays = with_moments(record, arrays, effects, values, start)
-        out = integrate_record(record, arrays, start)
-        return measured(Motion(out[:, 0], out[:, 1]), record, effects, values), base
+        return values, base, start, with_moments(record, arrays, self.layout.effects, values, start)
 
     def residual(self, x: FloatArray, run: int) -> tuple[FloatArray, Base]:
         """Return measured minus simulated, (2, n), zero where nothing was measured; and the run's base."""
@@ -168,13 +172,9 @@ class Problem:
 
     def _sensitivities(self, x: FloatArray, run: int, free: Sequence[int] | None) -> tuple[tuple[int, ...], Sensitivities]:
         record, layout = self.counted[run], self.layout
-        values = self.values_of(x, run)
-        base = self._base(values, run)
         wanted = range(len(x)) if free is None else set(free)
         slots = tuple(i for i in (*self._shared_of(run), *layout.nuisances_of(run)) if i in wanted)
-        arrays = self._arrays(record, base, values, run)
-        start = _start_of(values, arrays.core)
-        arrays = with_moments(record, arrays, layout.effects, values, start)
+        values, base, start, arrays = self._inputs(x, run)
         return slots, Sensitivities(record, layout, self.scales[run], self.authority_of(run), base, values, start, arrays)
 
     def authority_of(self, run: int) -> str:
