@@ -15,7 +15,7 @@ from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.diagnosis.data.heading_span import shown_by_headings
 from fieldsid.diagnosis.data.holdout_split import holdout_split
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
-from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit, fit_output_error
+from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
 from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, with_free_run
 from fieldsid.diagnosis.records import Candidate, Diagnosis
@@ -126,10 +126,9 @@ def _search_result(work: Search, found: ScoredModel, ml_fit: LikelihoodFit, verd
 
     def flown(h: ScoredModel) -> ScoredModel:
         """Return a model as it is shown: its error is how near its free run can come, whatever a disturbance adds to that."""
-        fitted = h.likelihood_fit.fitted
         if h is found or h.output_error_fit is not None:
             return h.evaluate_errors()
-        return with_free_run(h, fit_output_error(fitted.problem, fitted.x, fitted.weights), work.floor).evaluate_errors()
+        return with_free_run(h, h.likelihood_fit.fitted.by_output_error(), work.floor).evaluate_errors()
 
     def refitted(h: ScoredModel) -> FinalModel:
         model = final_model(h)

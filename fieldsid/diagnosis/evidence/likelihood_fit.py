@@ -52,6 +52,10 @@ class FittedProblem:
         """Its parameters, as `carry_parameters` takes them."""
         return self.problem.layout, self.x
 
+    def by_output_error(self) -> FittedProblem:
+        """Return the output-error fit that a descent from here comes to."""
+        return fit_output_error(self.problem, self.x, self.weights)
+
     @property
     def effects(self) -> tuple[Effect, ...]:
         """The effects of the model, in the order they were added."""

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, LikelihoodFit, fit_output_error
+from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, LikelihoodFit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, price_of_runs
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS
@@ -232,8 +232,7 @@ def _starts_apart(screened: ScreenResult, x: FloatArray) -> bool:
 
 
 def _output_error_linearisation(parent: ScoredModel) -> Linearisation:
-    fitted = parent.likelihood_fit.fitted
-    free_run = parent.output_error_fit or fit_output_error(fitted.problem, fitted.x, fitted.weights)
+    free_run = parent.output_error_fit or parent.likelihood_fit.fitted.by_output_error()
     return linearise_at(free_run.problem, free_run.x, free_run.weights)
 
 

@@ -25,7 +25,6 @@ from fieldsid.diagnosis.evidence.acceptance import (
     leaves_error,
     worst_error,
 )
-from fieldsid.diagnosis.evidence.likelihood_fit import fit_output_error
 from fieldsid.diagnosis.evidence.noise_kind import fit_base, sensor_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, score_model, with_free_run
 from fieldsid.diagnosis.moves.archive import Archive, Names
@@ -202,8 +201,7 @@ class Search:
             h = score_model(ml_fit, self.validation).evaluate_errors()
             own, other = with_free_run(h, fitted, self.floor), other_speed_law(h, self.grounds)
             if other is not None:
-                at = other.likelihood_fit.fitted
-                other = with_free_run(other, fit_output_error(at.problem, at.x, at.weights), self.floor)
+                other = with_free_run(other, other.likelihood_fit.fitted.by_output_error(), self.floor)
             self.tried[self.root] = own if other is None or not keeps_error(own, other) else other.evaluate_errors()
             try_variants([VariantRequest(self.tried[self.root])], self.tried, self.grounds)
             if self.given is not None:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit, fit_output_error
+from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.moves.add_effect import likelihood_linearisation
 from fieldsid.diagnosis.moves.archive import Archive
@@ -43,7 +43,7 @@ def whole_hull(base: ScoredModel, effects: Sequence[Effect], tried: Archive, gro
 def _fit_from_the_free_run(h: ScoredModel, grounds: Grounds) -> LikelihoodFit:
     """Return the fit of a model from its output-error fit, which no disturbance can lead to an optimum where it does the work."""
     fitted = h.likelihood_fit.fitted
-    return grounds.fit(fitted.problem, fit_output_error(fitted.problem, fitted.x, fitted.weights).x, h.likelihood_fit.noise)
+    return grounds.fit(fitted.problem, fitted.by_output_error().x, h.likelihood_fit.noise)
 
 
 def _fits_with(h: ScoredModel, effect: Effect, grounds: Grounds) -> list[LikelihoodFit]:
