@@ -1,7 +1,7 @@
 """What each stage of a diagnosis earns: the second bank, answered with and without it.
 
     python ../shared/bank/generate.py --out DIR --seed 1 --scale 0.5 --hard --forms
-    python tests/benchmarks/ablation.py DIR [DIR ...] [--stages whole_hull laws] [--cases 54]
+    python tests/benchmarks/ablation.py DIR [DIR ...] [--stages whole_hull drop] [--cases 54]
 
 Each stage is a function of the search; without it that function does nothing. The table counts the right effect first, both of
 two, an effect named where there is none and where no catalogue has the cause, and processor time.
@@ -35,8 +35,6 @@ STAGES = {
     "nothing left out": [],
     "whole_hull": [(f"{SEARCH}.search", "whole_hull", lambda base, *_of: base)],
     "variants": [(f"{SEARCH}.search", "try_variants", lambda *_of: None), (f"{MOVES}.grow", "try_variants", lambda *_of: None)],
-    "laws": [(f"{MOVES}.grow", "under_other_law", lambda *_of: None)],
-    "unseen_screen": [(f"{MOVES}.grow", "moves_of_all_runs", lambda *_of: [])],
     "refit": [(f"{SEARCH}.search", "refit_from_parts", lambda *_of: False)],
     "drop": [(f"{SEARCH}.search", "drop_each", lambda *_of: False)],
 }

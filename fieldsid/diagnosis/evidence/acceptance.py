@@ -18,7 +18,6 @@ from fieldsid.diagnosis.thresholds import (
     LEAST_EXPLAINED_SHARE,
     MAIN_EXPLAINED_SHARE,
     MAX_ERROR_RATIO,
-    MAX_VALIDATION_ERROR_RATIO,
     MIN_TRAINING_GAIN,
     RIVAL_LOG_ODDS,
     SUFFICIENT_ERROR_RATIO,
@@ -190,12 +189,6 @@ def settles_error(without: ScoredModel, with_: ScoredModel, floor: Noise) -> boo
 def gains_any_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
     """Whether an addition gains log evidence on the training runs alone or over all runs."""
     return gains_training_evidence(without, with_) or gains_evidence(without, with_)
-
-
-def only_validation_shows(h: ScoredModel, floor: Noise) -> bool:
-    """Whether a model fits the training runs to the noise but not the validation runs, or fits the latter far worse."""
-    followed = h.train.over(floor) <= SUFFICIENT_ERROR_RATIO < h.validation_errors.over(floor)
-    return validation_error_ratio(h, floor) > MAX_VALIDATION_ERROR_RATIO or (bool(h.validation) and followed)
 
 
 def validation_error_ratio(h: ScoredModel, floor: Noise) -> float:

@@ -64,21 +64,20 @@ MAX_TIME_SHIFTS, TIME_SHIFT_ITERATIONS = 3, 12
 class Addition:
     """A request to add one of some effects to a model: the `most` best of each screen, and all their starts where that is None.
 
-    `flown`: the parent's free run is screened too; near the noise its likelihood shows as much. `anew`: time shifts are iterated
-    too, because a base model that lacks one has biased parameters (see `_iterate_time_shift`).
+    `is_base`: of the base, which may be far from the measurement, the free run is screened too, and time shifts are iterated,
+    because a model that lacks one has biased parameters (see `_iterate_time_shift`).
     """
 
     parent: ScoredModel
     effects: Sequence[Effect]
     most: int | None = None
-    flown: bool = False
-    anew: bool = False
+    is_base: bool = False
 
     def screens(self) -> list[_Screen]:
         """Return the screens of its effects; none for a parent that diverges, which cannot be linearised."""
         if not np.isfinite(self.parent.likelihood_fit.log_likelihood):
             return []
-        flown = [_Screen(self, _output_error_linearisation(self.parent), by_output_error=True)] if self.flown else []
+        flown = [_Screen(self, _output_error_linearisation(self.parent), by_output_error=True)] if self.is_base else []
         return [*flown, _Screen(self, likelihood_linearisation(self.parent), by_output_error=False)]
 
 
@@ -126,7 +125,7 @@ class _Screen:
             ranked = [p for p in first if self.linearisation.cost - p[0].predicted_cost > self._least_fall(p[0].effect)]
         way = iterate_points if follows else _backtracked
         steps = [_PendingMove(self, follows, partial(way, self.linearisation, p)) for p in ranked]
-        if self.by_output_error and self.asked.anew:
+        if self.by_output_error:
             shifts = [e for e in mechanisms(self.asked.effects) if shifts_time(e)]
             steps += [_PendingMove(self, False, partial(_iterate_time_shift, self.linearisation, e)) for e in shifts]
         return steps

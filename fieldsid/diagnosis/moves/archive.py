@@ -71,6 +71,11 @@ class Archive(MutableMapping[Names, ScoredModel]):
         less = ((w, w.likelihood_fit.fitted.problem.layout) for _, w in self.without_each(h))
         return [w for w, layout in less if names > set(layout.names) and all(e in h.effects for e in layout.effects)]
 
+    def is_varied(self, h: ScoredModel) -> bool:
+        """Whether all effects of a model were tried in other variants at an evidence that it has hardly exceeded since."""
+        names = frozenset(h.names)
+        return h.log_evidence <= self.varied.get((names, names), -np.inf) + MIN_LIKELIHOOD_GAIN
+
     def is_thinned(self, h: ScoredModel) -> bool:
         """Whether a model was fitted without each of its effects at an evidence that it has hardly exceeded since."""
         return h.log_evidence <= self.thinned.get(frozenset(h.names), -np.inf) + MIN_LIKELIHOOD_GAIN

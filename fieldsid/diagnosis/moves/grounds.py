@@ -47,6 +47,11 @@ class Grounds:
         x = carry_parameters(here.problem.layout, there.vector, here.vector)
         return self.fit(here.problem, x, other.likelihood_fit.noise)
 
+    def fit_from_the_free_run(self, h: ScoredModel) -> LikelihoodFit:
+        """Fit a model from its output-error fit, which no disturbance can lead to an optimum where it does the work."""
+        fitted = h.likelihood_fit.fitted
+        return self.fit(fitted.problem, fitted.by_output_error().x, h.likelihood_fit.noise)
+
     def better(self, known: ScoredModel | None, ml_fit: LikelihoodFit) -> ScoredModel:
         """Return the model of a fit, or the one known of the same effects where that has more evidence.
 

@@ -1,4 +1,4 @@
-"""The move that adds an effect: screen all effects, fit those that promise most, refine the best in variants and speed laws."""
+"""The move that adds an effect: screen all effects, fit those that promise most, and the best of them in other variants."""
 
 from __future__ import annotations
 
@@ -12,16 +12,14 @@ from fieldsid.diagnosis.evidence.acceptance import (
     gains_any_evidence,
     gains_evidence,
     leaves_error,
-    only_validation_shows,
     worst_error,
 )
 from fieldsid.diagnosis.evidence.likelihood_fit import (
-    MIN_LIKELIHOOD_GAIN,
     LikelihoodFit,
     fit_output_error,
     prefer_smaller_equivalent,
 )
-from fieldsid.diagnosis.evidence.scored_model import ScoredModel, score_model, with_free_run
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.moves.add_effect import (
     FOREMOST_EFFECTS,
     MAX_EFFECTS_AT_BASE,
@@ -35,8 +33,6 @@ from fieldsid.diagnosis.moves.add_effect import (
 )
 from fieldsid.diagnosis.moves.archive import Archive, Names
 from fieldsid.diagnosis.moves.grounds import Grounds
-from fieldsid.diagnosis.moves.speed_law_search import under_other_law
-from fieldsid.diagnosis.moves.unseen_screen import moves_of_all_runs
 from fieldsid.diagnosis.moves.variant_search import VariantRequest, try_variants
 from fieldsid.diagnosis.thresholds import (
     MAIN_EXPLAINED_SHARE,
@@ -48,7 +44,7 @@ from fieldsid.diagnosis.thresholds import (
 from fieldsid.models.effect import Effect
 
 LEADING_CHILDREN = 3
-"""Best children whose left-out moves are evaluated too, and which are fitted again where their parent has a better optimum."""
+"""Best children that are tried in other variants."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,62 +66,53 @@ class Growth:
 
     def grow(self) -> None:
         """Put into the archive the parent with each effect that passes the screens."""
-        is_root, tried, floor = self.key == self.tried.known, self.tried, self.grounds.floor
+        is_root, tried = self.key == self.tried.known, self.tried
         tried.expanded.add(self.key)
-        flown = is_root or worst_error(self.parent, floor) >= MISSING_ERROR_RATIO
         most = None if self.forced else MAX_EFFECTS_AT_BASE if is_root else MAX_EFFECTS_LATER
-        found = screen_addition(Addition(self.parent, self.effects, most, flown, anew=is_root), self.grounds.parallel)
-        groups = by_effects(found)
-        later = self.evaluate(groups) if self.forced else self._evaluate_foremost(groups)
-        if only_validation_shows(self.parent, floor):
-            untried = [e for e in self.effects if self.key | {e.name} not in tried]
-            self.evaluate(by_effects(moves_of_all_runs(self.parent, untried, self.grounds.parallel)), every=True)
-        leading = {n for h in tried.children(self.key)[:LEADING_CHILDREN] for n in h.names if n not in self.key}
-        self.evaluate(by_effects([move for move in later if move.screened.effect.name in leading]), every=True)
-        self._refit_parent()
+        groups = by_effects(screen_addition(Addition(self.parent, self.effects, most, is_base=is_root), self.grounds.parallel))
+        if self.forced:
+            self.evaluate(groups)
+        else:
+            self._evaluate_foremost(groups)
         if is_root and self._is_lost(tried.children(self.key)):
             rest = [e for e in self.effects if e.variants and self.key | {e.name} not in tried]
             self.evaluate(by_effects(screen_addition(Addition(self.parent, rest), self.grounds.parallel)))
         if self.may_refine():
-            self._try_laws_and_variants(self._leading())
+            self._try_variants(self._leading())
 
-    def _evaluate_foremost(self, groups: Sequence[Sequence[SearchMove]]) -> list[SearchMove]:
-        """Fit the effects that promise most, then the others; return the starts that were left out.
+    def _evaluate_foremost(self, groups: Sequence[Sequence[SearchMove]]) -> None:
+        """Fit the effects that promise most, then the others.
 
         Where the best child already leaves no visible error, only effects that may be mistaken for its own are fitted after it.
         """
         first = foremost(groups, FOREMOST_EFFECTS)
-        later = self.evaluate(first)
+        self.evaluate(first)
         best = self.tried.children(self.key)[:1]
         explained = [h for h in best if worst_error(h, self.grounds.floor) <= SUFFICIENT_ERROR_RATIO]
         alike = {n for h in explained for e in h.effects if e.name not in self.key for n in e.mistaken_for}
         others = [group for group in groups if group not in first]
-        return later + self.evaluate([g for g in others if not explained or g[0].screened.effect.name in alike])
+        self.evaluate([g for g in others if not explained or g[0].screened.effect.name in alike])
 
-    def evaluate(self, groups: Sequence[Sequence[SearchMove]], *, every: bool = False) -> list[SearchMove]:
-        """Fit the moves to each set of effects; return the moves skipped because an earlier start reached their predicted cost.
+    def evaluate(self, groups: Sequence[Sequence[SearchMove]]) -> None:
+        """Fit the moves to each set of effects, but those whose predicted cost an earlier start has reached.
 
-        `every` skips none. All moves are compared with the same rival, so that the result does not depend on their order.
+        All are compared with the same rival, so that the result does not depend on their order.
         """
         rival = max((h.log_likelihood for h in self.tried.children(self.key)), default=-np.inf)
 
-        def evaluate_all(group: Sequence[SearchMove]) -> tuple[ScoredModel | None, list[int]]:
-            found, later = self.tried.get(group[0].names), list[int]()
+        def evaluate_all(group: Sequence[SearchMove]) -> ScoredModel | None:
+            found = self.tried.get(group[0].names)
             fits = [] if found is None else [found.likelihood_fit]
-            for i, move in enumerate(group):
-                if not every and fits and is_redundant_start(move, max(fits, key=lambda f: f.log_likelihood)):
-                    later.append(i)
+            for move in group:
+                if fits and is_redundant_start(move, max(fits, key=lambda f: f.log_likelihood)):
                     continue
                 fits.append(self._fitted(move, rival))
                 found = self.grounds.better(found, fits[-1])
-            return found and found.evaluate_errors(), later
+            return found and found.evaluate_errors()
 
-        left = []
-        for group, (found, later) in zip(groups, self.grounds.parallel.map(evaluate_all, groups), strict=True):
+        for group, found in zip(groups, self.grounds.parallel.map(evaluate_all, groups), strict=True):
             if found is not None:
                 self.tried[group[0].names] = found
-            left += [group[i] for i in later]
-        return left
 
     def _fitted(self, move: SearchMove, rival: float) -> LikelihoodFit:
         """Fit the model of a move by maximum likelihood, and from the equivalent solution with the same response at one speed.
@@ -140,30 +127,10 @@ class Growth:
         ml_fit = self.grounds.fit(screened.problem, start, of_parent.noise, rival=rival)
         return prefer_smaller_equivalent(ml_fit, screened.effect)
 
-    def _refit_parent(self) -> None:
-        """Keep the parent fitted again from its best child's parameters where that has more evidence, and its children with it.
-
-        The cost may have several local minima. The leading children are then fitted again from the new parameters.
-        """
-        parent, leading = self.tried[self.key], self.tried.children(self.key)[:LEADING_CHILDREN]
-        if not leading:
-            return
-        again = self.grounds.fit_from(parent, leading[0])
-        if again.log_likelihood <= parent.log_likelihood + MIN_LIKELIHOOD_GAIN:
-            return
-        better = score_model(again, self.grounds.validation)
-        if parent.output_error_fit is not None:
-            better = with_free_run(better, parent.output_error_fit, self.grounds.floor)
-        if better.log_evidence <= parent.log_evidence:
-            return
-        self.tried[self.key] = better
-        fits = self.grounds.parallel.map(lambda child: self.grounds.fit_from(child, better), leading)
-        self.tried.update({frozenset(h.names): self.grounds.better(h, fit) for h, fit in zip(leading, fits, strict=True)})
-
     def _leading(self) -> list[Names]:
         """Return the children worth refining: the best few, and the one with most evidence on the training runs.
 
-        The latter may rank low only because a wrong speed law spoils it on the validation runs.
+        The latter may rank low only because the validation runs are far from its textbook variant.
         """
         children = self.tried.children(self.key)
         best = sorted(children, key=lambda h: -h.training_evidence)[:1]
@@ -182,7 +149,7 @@ class Growth:
         return leaves_error(best, self.grounds.floor) and errs_less(h, best, MAX_ERROR_RATIO)
 
     def _is_worth_refining(self, h: ScoredModel, best: ScoredModel) -> bool:
-        """Whether a child may overtake its best sibling in another variant or under another speed law.
+        """Whether a child may overtake its best sibling in another variant.
 
         Any child may while the sibling leaves a visible error. Otherwise a child that explains less than half of the parent's
         error is not the missing effect in any variant.
@@ -196,8 +163,8 @@ class Growth:
         large = self.grounds.error_ratio(self.tried[self.key]) > MISSING_ERROR_RATIO
         return large and not any(gains_evidence(self.tried[self.key], child) for child in children)
 
-    def _try_laws_and_variants(self, names: Sequence[Names]) -> None:
-        """Try some children under another speed law and with other variants; keep what has more evidence.
+    def _try_variants(self, names: Sequence[Names]) -> None:
+        """Try some children in other variants of the effect added; keep what has more evidence.
 
         Where no child gains evidence over all runs and the parent's error is large, all children are tried.
         """
@@ -205,5 +172,4 @@ class Growth:
         lost = self._is_lost([tried[n] for n in names])
         names = [frozenset(c.names) for c in tried.children(self.key)] if lost else names
         helping = [n for n in names if lost or gains_any_evidence(parent, tried[n])]
-        under_other_law(names, tried, self.grounds)
         try_variants([VariantRequest(tried[n], n - self.key) for n in helping], tried, self.grounds)

@@ -10,7 +10,7 @@ import numpy as np
 from fieldsid.diagnosis.evidence.acceptance import keeps_error, leaves_error
 from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, fit_output_error
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, score_model
-from fieldsid.diagnosis.moves.archive import Archive, Names
+from fieldsid.diagnosis.moves.archive import Archive
 from fieldsid.diagnosis.moves.grounds import Grounds
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS
 from fieldsid.fitting.initial.effect_screen import (
@@ -78,17 +78,10 @@ def error_product(fitted: FittedProblem, axis: Axis) -> float:
     return fitted.weights.angle * fitted.weights.rate * usual
 
 
-def under_other_law(names: Sequence[Names], tried: Archive, grounds: Grounds) -> None:
-    """Fit models under another speed law, and keep that where it has more evidence."""
-    others = grounds.parallel.map(lambda key: other_law(tried[key], grounds), names)
-    tried.update({key: found for key, found in zip(names, others, strict=True) if found is not None})
-
-
-def other_law(h: ScoredModel, grounds: Grounds) -> ScoredModel | None:
-    """Return a model under another law of the speed, of the trim, or both, where that has more evidence; None elsewhere."""
-    found = other_speed_law(h, grounds)
-    trimmed = _other_trim_law(h if found is None else found, grounds)
-    return found if trimmed is None else trimmed
+def under_other_law(h: ScoredModel, tried: Archive, grounds: Grounds) -> None:
+    """Keep a model under another law of the speed, of the trim, or both, where that has more evidence."""
+    found = other_speed_law(h, grounds) or h
+    tried[frozenset(h.names)] = _other_trim_law(found, grounds) or found
 
 
 def _other_trim_law(h: ScoredModel, grounds: Grounds) -> ScoredModel | None:

@@ -45,8 +45,8 @@ class VariantRequest:
         return frozenset(self.model.names), frozenset(self.model.names if self.effects is None else self.effects)
 
 
-def try_variants(asked: Sequence[VariantRequest], tried: Archive, grounds: Grounds) -> None:
-    """Keep the models with their effects in the best variants, changed one by one as long as a change is accepted.
+def try_variants(asked: Sequence[VariantRequest], tried: Archive, grounds: Grounds) -> bool:
+    """Keep models with their effects in the best variants, changed one by one while a change is accepted; return whether any was.
 
     It is accepted where it gains evidence and does not raise the validation error. All are fitted in one parallel map, as the
     models have different numbers of variants. What was tried before at the same evidence is not tried again.
@@ -64,6 +64,7 @@ def try_variants(asked: Sequence[VariantRequest], tried: Archive, grounds: Groun
         left = [i for i, variant in taken.items() if leaves_error(variant, grounds.floor)]
     for request, found in zip(new, asked, strict=True):
         tried[frozenset(found.model.names)], varied[request.key] = found.model, found.model.log_evidence
+    return any(found.model is not request.model for request, found in zip(new, asked, strict=True))
 
 
 def _best_variants(asked: Sequence[VariantRequest], grounds: Grounds) -> list[ScoredModel | None]:

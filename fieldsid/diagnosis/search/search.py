@@ -1,13 +1,14 @@
 """The search over sets of effects: one best-first queue over one archive, entered from the bare model and from the whole hull.
 
-A model taken from the queue is expanded in three moves. Each effect of the catalogue is added to it; the best of these models are
-fitted with other variants of their effects and under other speed laws; and the model with the most evidence is then fitted
-without each of its effects. The search enters from below, at the bare model, and from above, at the whole hull. Both ways lead to
-the same sets of effects, and of each set the better optimum is kept, whichever way found it.
+A model taken from the queue is expanded: each effect of the catalogue is added to it; the most evident model is then fitted
+without each of its effects, from its free run, under other laws of speed and trim, and with other variants of its effects. The
+search enters from below, at the bare model, and from above, at the whole hull: first beside the effects that were found from
+below and, where that leaves a visible error, without them. Both ways lead to the same sets of effects, and of each set the better
+optimum is kept, whichever way found it. At the end the set found is fitted without each of its effects, until each is needed.
 
-Where one effect alone comes near the noise, the queue takes one step from below before the whole hull is fitted. Otherwise a
+Where one effect alone comes near the noise, the queue takes one more step from below before the whole hull is fitted. Otherwise a
 servo lag, which gains much evidence and lowers the error little, would hide that effect, and the free cross state of the hull
-would fit it. At the end the set found is fitted without each of its effects, until every effect in it is needed.
+would fit it.
 """
 
 from __future__ import annotations
@@ -32,7 +33,13 @@ from fieldsid.diagnosis.moves.drop_effect import drop_each
 from fieldsid.diagnosis.moves.grounds import Grounds
 from fieldsid.diagnosis.moves.grow import Growth
 from fieldsid.diagnosis.moves.refit import refit_from_parts
-from fieldsid.diagnosis.moves.speed_law_search import error_product, fit_base_output_error, other_speed_law, speed_laws
+from fieldsid.diagnosis.moves.speed_law_search import (
+    error_product,
+    fit_base_output_error,
+    other_speed_law,
+    speed_laws,
+    under_other_law,
+)
 from fieldsid.diagnosis.moves.variant_search import VariantRequest, try_variants
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.search.accepted_sets import AcceptedSets, core_of
@@ -95,38 +102,43 @@ class Search:
         self.expand(self.base())
         if self.leaves_visible_error() and self._nears_from_below() and (leading := self._next_to_expand()) is not None:
             self.expand(leading)
-        if self.leaves_visible_error():
-            hull = whole_hull(self.base(), self.catalogue, self.tried, self.grounds)
-            drop_each(hull, self.tried, self.grounds)
-            self.share_own_moments()
+        for h in dict.fromkeys((frozenset(self.best_admissible().names), self.root)):
+            if self.leaves_visible_error():
+                self.enter_from_above(self.tried[h])
         while (leading := self._next_to_expand()) is not None:
             self.expand(leading)
         while self._eliminate(found := self.best_admissible()):
             self.share_own_moments()
         return found
 
+    def enter_from_above(self, h: ScoredModel) -> None:
+        """Fit a model with the whole hull beside its effects, then without each of them."""
+        hull = self.refined(whole_hull(h, self.catalogue, self.tried, self.grounds))
+        drop_each(hull, self.tried, self.grounds)
+        self.share_own_moments()
+
     def _nears_from_below(self) -> bool:
         """Whether some model with one effect comes near the noise: that effect may be all that is missing beside a small one."""
         return any(worst_error(h, self.floor) <= MISSING_ERROR_RATIO for h in self.tried.children(self.root))
 
     def _eliminate(self, found: ScoredModel) -> bool:
-        """Fit the set found without each of its effects; return whether any model was fitted.
+        """Refine the set found, and fit it without each of its effects; return whether any model was fitted or became better.
 
         An effect may be mistaken for a variant of another, as a dead time for the inertia of a servo. So each remaining set is
         also tried with the variants of the effects that the removed one may be mistaken for, in the set or in place of the
         removed one.
         """
-        if drop_each(found, self.tried, self.grounds):
-            asked = []
-            for gone, without in self.tried.without_each(found):
-                alike = self._mistaken_for(gone)
-                own = {e.name for e in without.effects if e.name in alike and e.variants}
-                asked += [VariantRequest(without, own)] if own else []
-                swapped = {n: self.tried.get(frozenset((*without.names, n))) for n in alike - set(found.names)}
-                asked += [VariantRequest(h, {name}) for name, h in swapped.items() if h is not None]
-            try_variants(asked, self.tried, self.grounds)
+        if self.refined(found) is not found:
             return True
-        return self._refit_leading()
+        dropped, asked = drop_each(found, self.tried, self.grounds), list[VariantRequest]()
+        for gone, without in self.tried.without_each(found):
+            alike = self._mistaken_for(gone)
+            own = {e.name for e in without.effects if e.name in alike and e.variants}
+            asked += [VariantRequest(without, own)] if own else []
+            swapped = {n: self.tried.get(frozenset((*without.names, n))) for n in alike - set(found.names)}
+            asked += [VariantRequest(h, {name}) for name, h in swapped.items() if h is not None]
+        varied = try_variants(asked, self.tried, self.grounds)
+        return dropped or varied or self._refit_leading()
 
     def _mistaken_for(self, name: str) -> set[str]:
         """Return the effects that one of the catalogue may be mistaken for."""
@@ -138,13 +150,21 @@ class Search:
         return refit_from_parts(list({frozenset(h.names): h for h in leading}.values()), self.tried, self.grounds)
 
     def expand(self, h: ScoredModel) -> None:
-        """Add each effect to a model; fit the model with the most evidence without each of its effects and in other variants."""
+        """Add each effect to a model; fit the most evident one without each of its effects, in other variants and laws."""
         self.grow(h)
         drop_each(self.tried.most_evident(), self.tried, self.grounds)
         if self.may_go_on():
-            try_variants([VariantRequest(self.tried.most_evident())], self.tried, self.grounds)
+            self.refined(self.tried.most_evident())
         self.share_own_moments()
         self.lower_floor(self.best_admissible())
+
+    def refined(self, h: ScoredModel) -> ScoredModel:
+        """Return a model fitted from its free run, under another law, in other variants, each where that gains evidence."""
+        if not self.tried.is_varied(h):
+            h = self.tried[frozenset(h.names)] = self.grounds.better(h, self.grounds.fit_from_the_free_run(h))
+            under_other_law(h, self.tried, self.grounds)
+            try_variants([VariantRequest(self.tried[frozenset(h.names)])], self.tried, self.grounds)
+        return self.tried[frozenset(h.names)]
 
     def grow(self, h: ScoredModel, *, forced: bool = False) -> list[ScoredModel]:
         """Return the models with one effect more, sorted by log evidence; `forced` fits every effect, not only those screened."""

@@ -2,8 +2,8 @@
 
 Every real hull has a cross state (sway or heave), a servo lag, drag that grows with the square of the rate, and loses speed in a
 turn. Steps from the bare model go astray among the four, because each effect alone fits a part of the others. So all four are
-added one after another, whatever each gains alone, each from its few most promising scan points at the fit before it. The whole
-hull is then fitted from its free run too and tried with other variants, and what the data do not show of it is dropped again.
+added one after another, whatever each gains alone, each from its few most promising scan points at the fit before it.
+What the data do not show of it is dropped again.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.moves.add_effect import likelihood_linearisation
 from fieldsid.diagnosis.moves.archive import Archive
 from fieldsid.diagnosis.moves.grounds import Grounds
-from fieldsid.diagnosis.moves.variant_search import VariantRequest, try_variants
 from fieldsid.fitting.initial.effect_screen import ScreenResult, backtrack, screen_points
 from fieldsid.models.effect import Effect
 
@@ -30,20 +29,13 @@ STARTS = 3
 def whole_hull(base: ScoredModel, effects: Sequence[Effect], tried: Archive, grounds: Grounds) -> ScoredModel:
     """Return the base with the effects of HULLS_OWN that are among some effects; every set on the way is kept in the archive."""
     h = base
-    for effect in sorted((e for e in effects if e.name in HULLS_OWN), key=lambda e: HULLS_OWN.index(e.name)):
+    own = (e for e in effects if e.name in HULLS_OWN and e.name not in base.names)
+    for effect in sorted(own, key=lambda e: HULLS_OWN.index(e.name)):
         fits = [fit for fit in _fits_with(h, effect, grounds) if np.isfinite(fit.log_likelihood)]
         if fits:
             key = frozenset((*h.names, effect.name))
             h = tried[key] = grounds.better(tried.get(key), max(fits, key=lambda fit: fit.log_likelihood))
-    h = tried[frozenset(h.names)] = grounds.better(h, _fit_from_the_free_run(h, grounds))
-    try_variants([VariantRequest(h)], tried, grounds)
-    return tried[frozenset(h.names)]
-
-
-def _fit_from_the_free_run(h: ScoredModel, grounds: Grounds) -> LikelihoodFit:
-    """Return the fit of a model from its output-error fit, which no disturbance can lead to an optimum where it does the work."""
-    fitted = h.likelihood_fit.fitted
-    return grounds.fit(fitted.problem, fitted.by_output_error().x, h.likelihood_fit.noise)
+    return h
 
 
 def _fits_with(h: ScoredModel, effect: Effect, grounds: Grounds) -> list[LikelihoodFit]:

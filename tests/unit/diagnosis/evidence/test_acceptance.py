@@ -17,7 +17,6 @@ from fieldsid.diagnosis.evidence.acceptance import (
     keeps_error,
     leaves_error,
     lowers_error,
-    only_validation_shows,
     settles_error,
 )
 from fieldsid.diagnosis.records import Errors
@@ -75,15 +74,6 @@ def test_an_unseen_run_that_stays_at_the_noise_speaks_against_nothing_that_a_vis
     found = hypothesis("backlash", gain=50.0, over=over, train=1.02)
     assert lowers_error(base, found, FLOOR) == named
     assert not lowers_error(base, found)
-
-
-@pytest.mark.parametrize(
-    ("train", "unseen", "shown"), [(1.02, 1.4, True), (1.02, 1.1, False), (1.4, 1.6, False), (1.4, 3.0, True)]
-)
-def test_what_the_unseen_runs_alone_show(train, unseen, shown):
-    errors = [Errors(FLOOR.angle * e, FLOOR.rate * e) for e in (train, unseen)]
-    h = SimpleNamespace(train=errors[0], validation_errors=errors[1], validation=(None,))
-    assert only_validation_shows(h, FLOOR) == shown
 
 
 @pytest.mark.parametrize(("over", "kept"), [(1.1, True), (1.22, True), (1.3, False)])

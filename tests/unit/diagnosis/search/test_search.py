@@ -113,6 +113,16 @@ def test_the_whole_hull_has_its_effects_and_every_set_on_the_way():
     assert hull.train.over(made.floor) < 1.05
 
 
+def test_the_whole_hull_is_fitted_beside_the_effects_that_a_model_has():
+    made = search_for("servo_lag", "quadratic_damping", "gyro_bias")
+    made.grow(made.base(), forced=True)
+    hull = whole_hull(made.tried[LAG], made.catalogue, made.tried, made.grounds)
+    assert hull.names == ("servo_lag", "quadratic_damping")
+    beside = whole_hull(made.tried[frozenset({"gyro_bias"})], made.catalogue, made.tried, made.grounds)
+    assert beside.names == ("gyro_bias", "servo_lag", "quadratic_damping")
+    assert beside.log_likelihood > hull.log_likelihood - 1.0
+
+
 def test_an_effect_pays_its_prior_odds_at_the_temperature_of_the_evidence():
     made, alone, (lag,) = grown("servo_lag")
     paid = lag.complexity_penalty - alone.complexity_penalty
