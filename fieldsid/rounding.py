@@ -56,6 +56,11 @@ def with_error(value: float, error: float, *, sign: str = "+/-") -> str:
     return f"{round(value, decimals) + 0.0:.{shown}f} {sign} {round(error, decimals):.{shown}f}"
 
 
+def at_its_bound(value: float) -> str:
+    """Return `20.00 (at its bound)`: what stands on a bound has no error."""
+    return f"{number(value)} (at its bound)"
+
+
 def interval(low: float, high: float) -> str:
     """Return `2.256 .. 2.306`, both ends to one digit more than the half width's own rounding shows."""
     half = 0.5 * (high - low)
@@ -110,9 +115,13 @@ class Angles:
         power = above.count("rad") + above.count("rad^2") - below.count("rad") - below.count("rad^2")
         return self.factor**power, unit.replace("rad", self.unit)
 
-    def estimate(self, value: float, std_error: float, interval95: Sequence[float], unit: str) -> tuple[str, str, str]:
-        """Return an estimate as the cells of a table: value with its error, unit, 95 % interval."""
+    def estimate(
+        self, value: float, std_error: float, interval95: Sequence[float], unit: str, *, at_bound: bool = False
+    ) -> tuple[str, str, str]:
+        """Return an estimate as the cells of a table: value with its error, unit, 95 % interval; on a bound the value alone."""
         factor, unit = self.of(unit)
+        if at_bound:
+            return at_its_bound(factor * value), unit, "-"
         low, high = interval95
         return with_error(factor * value, factor * std_error), unit, interval(factor * low, factor * high)
 

@@ -169,7 +169,11 @@ def _label(entry: FittedModel) -> str:
 
 def _page(entries: Sequence[FittedModel], *, figures: bool) -> Page:
     rows = tuple(
-        (_label(e) if i == 0 else "", p.shown, *angles().estimate(v.value, v.std_error, v.interval95, v.unit))
+        (
+            _label(e) if i == 0 else "",
+            p.shown,
+            *angles().estimate(v.value, v.std_error, v.interval95, v.unit, at_bound=p.at_bound),
+        )
         for e in entries
         for i, (p, v) in enumerate((p, p.estimate) for p in e.parameters.values())
     )
