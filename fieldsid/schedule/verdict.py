@@ -215,4 +215,5 @@ def lost(source: ParameterSource) -> tuple[str, ...]:
         return ("a table carries no effects",)
     left = not_counted(source.models)
     unsure = [f"left out, its fin's sign not known: {', '.join(source.left_out)}"] if source.left_out else []
-    return (*([f"not counted in full: {', '.join(left)}"] if left else []), *unsure)
+    parts = ", ".join(f"{effect}'s {' and '.join(names)}" for effect, names in left.items())
+    return (*([f"not counted: {parts}"] if left else []), *unsure)
