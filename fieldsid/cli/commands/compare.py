@@ -17,6 +17,7 @@ from fieldsid.cli.session import drawn_in
 from fieldsid.cli.voice import angles
 from fieldsid.errors import UsageError
 from fieldsid.figures.kinds import sketch
+from fieldsid.logs.several.run_names import short_names
 from fieldsid.page import Block, Page, Whole, written
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import number
@@ -130,8 +131,9 @@ def _gate(entries: Sequence[Mapping[str, Any]], least: float | None) -> None:
 
 
 def _page(found: Sequence[Comparison], runs: Sequence[ComparedRun], top: int) -> Page:
-    units = angles()
-    blocks: list[Block | str] = list(merit_blocks(((r.run, r.speed_m_s, r.merit, r.noise_floor) for r in runs), units))
+    units, short = angles(), short_names([r.run for r in runs])
+    followed = ((short.of(r.run), r.speed_m_s, r.merit, r.noise_floor) for r in runs)
+    blocks: list[Block | str] = [*merit_blocks(followed, units), Whole(short.says)]
     for r in runs:
         for flown in filter(None, (r.command_times, r.own_speed)):
             angle, rate = (number(units.factor * v, 2) for v in (flown.as_logged.angle_rms_rad, flown.as_logged.rate_rms_rad_s))

@@ -31,6 +31,7 @@ from fieldsid.cli.session import drawn_in
 from fieldsid.cli.voice import angles
 from fieldsid.figures.kinds import sketch
 from fieldsid.logs.run import Note
+from fieldsid.logs.several.run_names import ShortNames, short_names
 from fieldsid.page import Block, Page, Whole, paragraph, written
 from fieldsid.records.keys import body_of
 from fieldsid.views._words import merit_blocks
@@ -162,26 +163,29 @@ def _reasons(entries: Sequence[FittedModel]) -> Iterator[str]:
         yield Whole(f"{_label(first)}: {first.method_reason}{more}")
 
 
-def _label(entry: FittedModel) -> str:
-    """Return the run's name, or how many runs a joint fit has."""
-    return entry.run if len(entry.runs) == 1 else f"{len(entry.runs)} runs"
+def _label(entry: FittedModel, short: ShortNames | None = None) -> str:
+    """Return the run's name, shortened if asked, or how many runs a joint fit has."""
+    name = entry.run if short is None else short.of(entry.run)
+    return name if len(entry.runs) == 1 else f"{len(entry.runs)} runs"
 
 
 def _page(entries: Sequence[FittedModel], *, figures: bool) -> Page:
+    short = short_names([r.run for e in entries for r in e.runs])
     rows = tuple(
         (
-            _label(e) if i == 0 else "",
+            _label(e, short) if i == 0 else "",
             p.shown,
             *angles().estimate(v.value, v.std_error, v.interval95, v.unit, at_bound=p.at_bound),
         )
         for e in entries
         for i, (p, v) in enumerate((p, p.estimate) for p in e.parameters.values())
     )
-    runs = ((r.run, r.speed_m_s, r.merit, e.noise_floor) for e in entries for r in e.runs)
+    runs = ((short.of(r.run), r.speed_m_s, r.merit, e.noise_floor) for e in entries for r in e.runs)
     merits, units = merit_blocks(runs, angles())
     methods = ", ".join(sorted({e.method for e in entries}))
     parameters = Block("", rows, ("run", "parameter", "value", "unit", "95 % interval"), left=2)
-    blocks: tuple[Block | str, ...] = (parameters, merits, *paragraph([f"method: {methods}; {units}"]), *_reasons(entries))
+    said = paragraph([f"method: {methods}; {units}"])
+    blocks: tuple[Block | str, ...] = (parameters, merits, *said, Whole(short.says), *_reasons(entries))
     closing: list[str] = []
     for e in (e for e in entries if e.model):
         closing += written(model=e.model)
