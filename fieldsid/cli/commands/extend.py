@@ -83,7 +83,7 @@ def command(
     training, unseen = skips.left_of(training), skips.left_of(unseen)
     kept = found.pays or keep
     if kept:
-        save_steps(steps, targets, path, (training, unseen), force=force)
+        save_steps(steps, targets, path, (training, unseen), mapping=mapping, force=force)
     now = targets[-1] if kept else path
     left, next_ = _left(found, now, known, runs, validate, kept=kept)
     told = Extended(

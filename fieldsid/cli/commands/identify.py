@@ -101,7 +101,7 @@ def command(
     used = skips.left_of(known)
     groups = [used] if joint else [[run] for run in used]
     files = [files_of(group) for group in groups]
-    models = _written(fits, files, output, force=force)
+    models = _written(fits, files, mapping, output, force=force)
     drawn_in(output if figures else None, {k: v for fit in fits for k, v in _plots(fit).items()}, force=force)
     entries = tuple(fitted_model(fit, model, of) for fit, model, of in zip(fits, models, groups, strict=True))
     told = Identified(axis=axis, fits=entries, skipped_runs=tuple(skips.records))
@@ -113,13 +113,17 @@ def command(
     return result
 
 
-def _written(fits: Sequence[Fit], sources: Sequence[list[Path]], folder: Path | None, *, force: bool) -> Sequence[Path | None]:
+def _written(
+    fits: Sequence[Fit], sources: Sequence[list[Path]], mapping: Path | None, folder: Path | None, *, force: bool
+) -> Sequence[Path | None]:
     if folder is None:
         return [None] * len(fits)
     from fieldsid.models.model import save_model
 
     pairs = zip(fits, sources, strict=True)
-    return [save_model(fit.model, folder / f"{_stem(fit)}.yaml", inputs=inputs, force=force) for fit, inputs in pairs]
+    return [
+        save_model(fit.model, folder / f"{_stem(fit)}.yaml", inputs=inputs, mapping=mapping, force=force) for fit, inputs in pairs
+    ]
 
 
 def _plots(fit: Fit) -> dict[str, Callable[[], Any]]:
