@@ -15,6 +15,8 @@ MANY = 100.0
 """Times its noise from which on an error is of a log with none to speak of, as of a towing tank or a simulation."""
 ROUNDED_SHARE = 1e-12
 """Share of a value below which its error is what computing with doubles left."""
+MOST_DIGITS = 9
+"""Digits of a number beyond those that the order of a sum leaves open."""
 TWO_SIDED_95 = 1.96
 """Quantile 0.975 of the normal distribution: standard errors to either side that 95 of 100 lie within."""
 
@@ -80,6 +82,15 @@ def number(value: float | None, digits: int = 4) -> str:
     if -5 <= exponent < 7:
         return f"{value:.{max(digits - 1 - exponent, 0)}f}"
     return f"{value:.{digits - 1}e}"
+
+
+def beside(value: float, limit: float, digits: int = 3) -> str:
+    """Return a number to so many significant digits, or as many more as show on which side of a limit it is."""
+    for more in range(digits, MOST_DIGITS):
+        shown = number(value, more)
+        if not math.isfinite(value) or value == limit or (float(shown) - limit) * (value - limit) > 0.0:
+            return shown
+    return number(value, MOST_DIGITS)
 
 
 def probability(p: float) -> str:

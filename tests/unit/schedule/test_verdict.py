@@ -8,7 +8,7 @@ import pytest
 
 from fieldsid.plant.parameter_source import load_parameter_source
 from fieldsid.schedule.make import design_schedule
-from fieldsid.schedule.verdict import against_constant, verdict_of
+from fieldsid.schedule.verdict import Gate, against_constant, verdict_of
 from fieldsid.schedule.verify import verify_schedule
 from fieldsid.schedule.wish import Wish
 
@@ -43,3 +43,9 @@ def test_a_small_step_that_stays_off_is_no_schedule_that_holds(tmp_path):
     verdict, says = verdict_of(checked, schedule, ())
     assert verdict == "does not hold"
     assert re.match(r"at 1\.45 m/s a 2 deg step is not within 5 % after \d+ s: it is still 0\.\d+ deg off", says)
+
+
+def test_a_gate_that_fails_by_little_shows_that_it_does():
+    gate = Gate("phase_margin_deg", 45.0, 44.98, 1.4, at_least=True)
+    assert not gate.passed
+    assert gate.says == "phase_margin_deg 44.98 at 1.40 m/s, wanted at least 45"
