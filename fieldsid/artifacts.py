@@ -125,14 +125,19 @@ def save_record(
     body: Mapping[str, Any],
     *,
     inputs: Sequence[Path] = (),
+    mapping: Path | None = None,
     parent: Path | None = None,
     force: bool = False,
 ) -> Path:
-    """Write a record as YAML under a head of schema, version, input hashes and parent; raises ArtifactError."""
+    """Write a record as YAML under a head of schema, version, input hashes and parent; raises ArtifactError.
+
+    mapping: the file that the inputs were read with, where they are not read without it.
+    """
     head: dict[str, Any] = {
         "schema": schema,
         "tool": f"fieldsid {__version__}",
         "inputs": [{"path": str(p), "sha256": sha256_of(p)} for p in inputs],
+        **({} if mapping is None else {"mapping": {"path": str(mapping), "sha256": sha256_of(mapping)}}),
         "parent": None if parent is None else {"path": str(parent), "sha256": sha256_of(parent)},
     }
     return write_text(path, to_yaml({**head, **body}), force=force)

@@ -15,6 +15,8 @@ MANY = 100.0
 """Times its noise from which on an error is of a log with none to speak of, as of a towing tank or a simulation."""
 ROUNDED_SHARE = 1e-12
 """Share of a value below which its error is what computing with doubles left."""
+MOST_DIGITS = 9
+"""Digits of a number beyond those that the order of a sum leaves open."""
 TWO_SIDED_95 = 1.96
 """Quantile 0.975 of the normal distribution: standard errors to either side that 95 of 100 lie within."""
 
@@ -56,6 +58,11 @@ def with_error(value: float, error: float, *, sign: str = "+/-") -> str:
     return f"{round(value, decimals) + 0.0:.{shown}f} {sign} {round(error, decimals):.{shown}f}"
 
 
+def at_its_bound(value: float) -> str:
+    """Return `20.00 (at its bound)`: what stands on a bound has no error."""
+    return f"{number(value)} (at its bound)"
+
+
 def interval(low: float, high: float) -> str:
     """Return `2.256 .. 2.306`, both ends to one digit more than the half width's own rounding shows."""
     half = 0.5 * (high - low)
@@ -75,6 +82,15 @@ def number(value: float | None, digits: int = 4) -> str:
     if -5 <= exponent < 7:
         return f"{value:.{max(digits - 1 - exponent, 0)}f}"
     return f"{value:.{digits - 1}e}"
+
+
+def beside(value: float, limit: float, digits: int = 3) -> str:
+    """Return a number to so many significant digits, or as many more as show on which side of a limit it is."""
+    for more in range(digits, MOST_DIGITS):
+        shown = number(value, more)
+        if not math.isfinite(value) or value == limit or (float(shown) - limit) * (value - limit) > 0.0:
+            return shown
+    return number(value, MOST_DIGITS)
 
 
 def probability(p: float) -> str:
@@ -110,9 +126,13 @@ class Angles:
         power = above.count("rad") + above.count("rad^2") - below.count("rad") - below.count("rad^2")
         return self.factor**power, unit.replace("rad", self.unit)
 
-    def estimate(self, value: float, std_error: float, interval95: Sequence[float], unit: str) -> tuple[str, str, str]:
-        """Return an estimate as the cells of a table: value with its error, unit, 95 % interval."""
+    def estimate(
+        self, value: float, std_error: float, interval95: Sequence[float], unit: str, *, at_bound: bool = False
+    ) -> tuple[str, str, str]:
+        """Return an estimate as the cells of a table: value with its error, unit, 95 % interval; on a bound the value alone."""
         factor, unit = self.of(unit)
+        if at_bound:
+            return at_its_bound(factor * value), unit, "-"
         low, high = interval95
         return with_error(factor * value, factor * std_error), unit, interval(factor * low, factor * high)
 

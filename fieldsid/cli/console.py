@@ -19,7 +19,7 @@ from rich.console import Console, ConsoleOptions, Group, JustifyMethod, Renderab
 from rich.measure import Measurement
 from rich.progress import BarColumn, Progress, ProgressColumn, TaskID, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.segment import Segment
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 from fieldsid.artifacts import plain
@@ -136,7 +136,7 @@ def print_page(to: Console, page: Page) -> None:
         if i and (isinstance(block, Block) or block.startswith("\n")):
             to.print()
         if isinstance(block, Block):
-            to.print(table(block))
+            to.print(table(block), crop=False)
             continue
         said = one_line(block.removeprefix("\n"))
         for line in [said] if isinstance(block, Whole) else folded(said, to.width, rest="").split("\n"):
@@ -146,32 +146,43 @@ def print_page(to: Console, page: Page) -> None:
 
 
 class Rows(Table):
-    """A table that is shown row by row, a line for each cell, where its numbers do not fit: folded, a number cannot be read."""
+    """A table that is shown row by row, a line for each cell, where its numbers or names do not fit: no line ends within one."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """Yield the table where it fits, if with one blank between columns, or on a page not narrow with its words folded."""
-        far = options.update(max_width=FAR)
-        wanted = Measurement.get(console, far, self).maximum
+        for line in folded(one_line(str(self.title)), options.max_width, rest="").split("\n") if self.title else ():
+            yield _whole(words(line, "bold"))
+        shown, far = copy(self), options.update(max_width=FAR)
+        shown.title = None
+        wanted = Measurement.get(console, far, shown).maximum
         blanks = len(self.columns) - 1
-        widths = [(Measurement.get(console, far, Group(c.header, *c.cells)).maximum, c.no_wrap) for c in self.columns]
-        least = sum(width if whole else min(width, LEAST_WORDS) for width, whole in widths) + 2 * blanks
+        least = sum(self._least(console, far, column) for column in self.columns) + 2 * blanks
         if wanted - blanks <= options.max_width or (options.max_width >= NARROW and least <= options.max_width):
-            shown = copy(self)
             if wanted - blanks <= options.max_width < wanted:
                 shown.padding = (0, 1, 0, 0)
             yield from Table.__rich_console__(shown, console, options)
             return
-        if self.title:
-            yield words(str(self.title), "bold")
+        heads = [str(column.header) for column in self.columns]
+        wide = max(map(len, heads)) + 2
         for row in zip(*(column.cells for column in self.columns), strict=True):
-            block = Table.grid(padding=(0, 2, 0, 0))
-            block.add_column(style="dim")
-            block.add_column(overflow="fold")
-            for column, cell in zip(self.columns, row, strict=True):
-                if cell:
-                    block.add_row(column.header, cell)
-            yield block
+            for head, cell in zip(heads, map(str, row), strict=True):
+                for i, line in enumerate(folded(one_line(cell), options.max_width - wide, rest="").split("\n") if cell else ()):
+                    yield _whole(words(f"{'' if i else head:<{wide}}", "dim").append_text(words(line)))
             yield ""
+
+    @staticmethod
+    def _least(console: Console, far: ConsoleOptions, column: Column) -> int:
+        """Return the columns of a terminal that one of the table takes at least: all of a number, a word or a name of words."""
+        cells = Measurement.get(console, far, Group(column.header, *column.cells))
+        if column.width is not None:
+            return column.width
+        return cells.maximum if column.no_wrap else max(cells.minimum, min(cells.maximum, LEAST_WORDS))
+
+
+def _whole(line: Text) -> Text:
+    """Return a line that no page cuts or folds."""
+    line.no_wrap, line.overflow = True, "ignore"
+    return line
 
 
 def table(block: Block) -> Table:

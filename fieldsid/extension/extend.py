@@ -99,8 +99,6 @@ class Extension(Plotted):
     gain: Gain
     evidence: float
     notes: tuple[Note, ...] = ()
-    on_bound: tuple[str, ...] = ()
-    """The parameters that ended on a bound, which for a rate of the hull is what the runs can show."""
 
     @property
     def pays(self) -> bool:
@@ -196,10 +194,9 @@ def _extension(
         learned_on=tuple(r.name for r in learned),
         judged_on=tuple(r.name for r in (judged or learned)),
     )
-    model, ended = final_model(after), after.reported_fit
-    on_bound = tuple(p.name for p in ended.problem.layout.on_bound(ended.x))
+    model = final_model(after)
     notes = (*notes, *forms_taken(model, new), *as_flown(model, judged))
-    return Extension(model, gain, after.log_evidence - before.log_evidence, notes, on_bound)
+    return Extension(model, gain, after.log_evidence - before.log_evidence, notes)
 
 
 def forms_taken(model: Model, new: Sequence[Effect]) -> tuple[Note, ...]:

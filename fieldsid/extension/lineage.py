@@ -71,6 +71,7 @@ def save_extension(
     parent: Path,
     training: Sequence[Run] = (),
     validation: Sequence[Run] = (),
+    mapping: Path | None = None,
     force: bool = False,
 ) -> Path:
     """Write the extended model with its parent, errors before and after, and the hashes of the data; raises ArtifactError."""
@@ -83,16 +84,20 @@ def save_extension(
         "data": [{"run": n, "role": role, "path": str(p), "sha256": sha256_of(p)} for role, n, p in files],
     }
     model = replace(extension.model, info={**extension.model.info, "extension": body})
-    return save_model(model, path, inputs=[p for _, _, p in files], parent=parent, force=force)
+    return save_model(model, path, inputs=[p for _, _, p in files], mapping=mapping, parent=parent, force=force)
 
 
 def save_steps(
-    steps: Sequence[Extension], files: Sequence[Path], parent: Path, data: tuple[Sequence[Run], Sequence[Run]], *, force: bool
-) -> None:
-    """Write each step's model with the one before it as its parent; data: training and unseen runs. Raises ArtifactError."""
+    steps: Sequence[Extension], files: Sequence[Path], parent: Path, data: tuple[Sequence[Run], Sequence[Run]], *,
+    mapping: Path | None = None, force: bool,
+) -> None:  # fmt: skip
+    """Write each step's model with the one before it as its parent; data: training and unseen runs, by a mapping if any.
+
+    Raises ArtifactError.
+    """
     training, unseen = data
     for step, file, before in zip(steps, files, [parent, *files], strict=False):
-        save_extension(step, file, parent=before, training=training, validation=unseen, force=force)
+        save_extension(step, file, parent=before, training=training, validation=unseen, mapping=mapping, force=force)
 
 
 def parent_of(path: Path) -> Parent | None:

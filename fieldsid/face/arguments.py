@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
@@ -18,7 +17,9 @@ from fieldsid.registry import near
 from fieldsid.vehicle import Vehicle, find_vehicle, load_vehicle
 
 if TYPE_CHECKING:
+    from fieldsid.logs.channels import ChannelMap
     from fieldsid.logs.run import Run
+    from fieldsid.plant.parameter_source import NamedLog
     from fieldsid.schedule import Schedule
     from fieldsid.turning import ParameterSource
 
@@ -96,7 +97,14 @@ def fin_limit_of(vehicle: Vehicle | None, source: ParameterSource, say: Callable
     return max(fins)
 
 
-def run_files(source: ParameterSource, say: Callable[[str], None]) -> list[Path]:
+def read_again(log: NamedLog, mapping: ChannelMap | None = None) -> Run:
+    """Return the run of a log that a model names, by a mapping, else by that of then; raises as `load_run` does."""
+    from fieldsid.logs import load_run
+
+    return load_run(str(log.now), log.mapping if mapping is None else mapping, recognise=True)
+
+
+def run_files(source: ParameterSource, say: Callable[[str], None]) -> list[NamedLog]:
     """Return the logs that the model files of a source name, where they still are; say is called where some are not.
 
     Models without effects go by a formula, which needs none.
@@ -106,7 +114,7 @@ def run_files(source: ParameterSource, say: Callable[[str], None]) -> list[Path]
     if not any(m.effects for m in source.models):
         return []
     named = logs_of(source.paths)
-    there = [p for _, p in named if p is not None]
+    there = [log for log in named if log.now is not None]
     if len(there) < len(named):
         say("some runs of the models are not where they were: name them with `--runs` for the loss of speed")
     return there
@@ -114,7 +122,6 @@ def run_files(source: ParameterSource, say: Callable[[str], None]) -> list[Path]
 
 def runs_behind(source: ParameterSource, say: Callable[[str], None]) -> list[Run]:
     """Return the runs that the models of a yaw source came from, where they still are: they have the speed lost in a turn."""
-    from fieldsid.logs import load_run
     from fieldsid.logs.several.sifting import attempt
     from fieldsid.plant.parameter_source import logs_of
     from fieldsid.runtime.parallel_map import parallel_map
@@ -122,8 +129,8 @@ def runs_behind(source: ParameterSource, say: Callable[[str], None]) -> list[Run
     if not source.models or not source.paths or source.axis is not Axis.YAW:
         return []
     named = logs_of(source.paths)
-    there, read = [p for _, p in named if p is not None], partial(load_run, recognise=True)
-    runs = [run for run in parallel_map(lambda path: attempt(read, path), there) if not isinstance(run, FieldsidError)]
+    there = [log for log in named if log.now is not None]
+    runs = [run for run in parallel_map(lambda log: attempt(read_again, log), there) if not isinstance(run, FieldsidError)]
     if len(runs) < len(named):
         lost = f"{len(named) - len(runs)} of {len(named)} runs of the models"
         say(f"{lost} are gone, closed or outside of this folder: the speed lost in a turn is not measured in them")

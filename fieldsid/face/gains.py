@@ -24,7 +24,8 @@ from fieldsid.face.runs import Logs, runs_mapped
 from fieldsid.face.speeds import speeds_of
 
 if TYPE_CHECKING:
-    from fieldsid.logs import ChannelMap
+    from fieldsid.logs import ChannelMap, Run
+    from fieldsid.plant.parameter_source import ParameterSource
     from fieldsid.schedule import Schedule, Verification
     from fieldsid.turning import Laws, TurnPrediction
     from fieldsid.vehicle import Vehicle
@@ -72,12 +73,18 @@ def turn_radius(
         source,
         speeds_of(speeds) or source.knots,
         fin_limit_of(known, source, _say, "rudder") if rudder_max is None else rudder_max,
-        runs=runs_mapped(run_files(source, _say) if runs is None else runs, mapping),
+        runs=_runs_named(source, mapping) if runs is None else runs_mapped(runs, mapping),
         measured=runs_mapped(measured, mapping),
         method=method,
         fin_zero=fin_zero,
         length=length_of(known),
     )
+
+
+def _runs_named(source: ParameterSource, mapping: ChannelMap | File | None) -> list[Run]:
+    """Return the runs that the models name, each by a mapping, or else by that which it was read with then."""
+    named = run_files(source, _say)
+    return [run for log in named for run in runs_mapped(str(log.now), log.mapping if mapping is None else mapping)]
 
 
 def design_schedule(

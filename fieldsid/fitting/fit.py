@@ -145,10 +145,11 @@ def check_signals(records: Sequence[Record], effects: Sequence[str]) -> tuple[Ef
     parts = tuple(effect_named(name) for name in dict.fromkeys(effects))
     for i, part in enumerate(parts):
         refuse_clash(part, parts[:i])
-    missing = [f"{e.name} needs {role} ({r.name})" for e in parts for r in records for role in e.needs if role not in r.signals]
+    lacking = ((e.name, r, role) for e in parts for r in records for role in e.needs if role not in r.signals)
+    missing = [f"{name} needs {role}, {r.why_without(role)} ({r.name})" for name, r, role in lacking]
     if missing:
         raise DataError(
-            "an effect needs a signal the log lacks",
+            "an effect needs a signal that there is not",
             found="; ".join(missing),
             hint="map the signal on import, where the log has it, or leave the effect out",
         )

@@ -96,10 +96,19 @@ class Model(InControl, Displayed):
         return out
 
 
-def save_model(model: Model, path: Path, *, inputs: Sequence[Path] = (), parent: Path | None = None, force: bool = False) -> Path:
+def save_model(
+    model: Model,
+    path: Path,
+    *,
+    inputs: Sequence[Path] = (),
+    mapping: Path | None = None,
+    parent: Path | None = None,
+    force: bool = False,
+) -> Path:
     """Write a model as YAML, with the definitions of its effects that are not built in; raises ArtifactError.
 
-    Raises EffectError for an effect that is not known.
+    inputs: the logs it was fitted to; mapping: the file they were read with, where one was named. Raises EffectError for an
+    effect that is not known.
     """
     own = definitions_of(effect_held(name, model.own) for name in model.effects)
     body = {
@@ -125,7 +134,7 @@ def save_model(model: Model, path: Path, *, inputs: Sequence[Path] = (), parent:
         "trained": dict(model.trained),
         "info": dict(model.info),
     }
-    return save_record(path, f"{KIND}/1", body, inputs=inputs, parent=parent, force=force)
+    return save_record(path, f"{KIND}/1", body, inputs=inputs, mapping=mapping, parent=parent, force=force)
 
 
 def load_model(path: Path) -> Model:

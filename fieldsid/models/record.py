@@ -22,6 +22,7 @@ from fieldsid.models.fin_path import FinPath
 from fieldsid.models.helpers.surge import causes_of, surge_behind
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.gcv_smoother import gcv_smooth
+from fieldsid.rounding import beside
 
 SPEED_LIMITS_M_S = (0.05, 50.0)
 """Speeds between which a vehicle goes through water: below no fin steers, above is another unit."""
@@ -63,6 +64,8 @@ class Record(Brief):
     """How long before the sample it is first seen at each held command was given, (n,) s, within the steps about it."""
     fin_line: FloatArray | None = None
     """Start and end of the fin's line over the interval that each sample begins, (2, n) rad, NaN where it is not known."""
+    refused: Mapping[str, str] = field(default_factory=dict)
+    """Why signals that the log has are not taken, by role."""
     goal: FloatArray | None = None
     """The angle that an autopilot was told to hold, (n,) rad, where the log has it."""
     steps: FloatArray = field(init=False)
@@ -132,6 +135,10 @@ class Record(Brief):
         for name in self.__slots__:
             object.__setattr__(other, name, changes[name] if name in changes else getattr(self, name))
         return other
+
+    def why_without(self, role: str) -> str:
+        """Return why there is no helper signal of a role, as the end of a sentence that says it is needed."""
+        return f"and {self.refused[role]}" if role in self.refused else "which the log lacks"
 
     def __getitem__(self, role: str) -> FloatArray:
         """Return a helper signal (n,); raises EffectError when the log has none."""
@@ -243,6 +250,7 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
         cross=np.where(cross_ok, cross, 0.0),
         cross_ok=cross_ok,
         signals=MappingProxyType(signals),
+        refused=MappingProxyType({"surge": why} if (why := speed_refused(run)) else {}),
         thrust_column=thrust_column,
         fin_line=np.stack([run[line] for line in STEP_LINES[column]]) if run.has(STEP_LINES[column][0]) else None,
         goal=_held_fin(run.signals[names.goal]) if run.has(names.goal) else None,
@@ -266,6 +274,15 @@ def knows_speed(run: Run) -> bool:
     """Whether a run's surge is that of a vehicle under way: sensors that are not fitted are logged as zero."""
     low, high = SPEED_LIMITS_M_S
     return run.has(ROLES["surge"]) and low < float(np.nanmedian(run[ROLES["surge"]])) < high
+
+
+def speed_refused(run: Run) -> str:
+    """Return why a run's surge is not taken for its speed, in words; empty where it is, and where there is none."""
+    if not run.has(ROLES["surge"]) or knows_speed(run):
+        return ""
+    middle, (low, high) = float(np.nanmedian(run[ROLES["surge"]])), SPEED_LIMITS_M_S
+    limit = f"above the {high:g} m/s of any vehicle in water" if middle >= high else f"below the {low:g} m/s of one under way"
+    return f"surge_m_s is {beside(middle, high if middle >= high else low)} m/s in the middle, {limit}"
 
 
 def _measured(run: Run, name: str) -> tuple[FloatArray, npt.NDArray[np.bool_]]:

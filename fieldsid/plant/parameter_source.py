@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,7 +33,7 @@ from fieldsid.plant.points import (
 )
 from fieldsid.plant.table import read_table
 from fieldsid.plant.yaw_plant import EXPONENT
-from fieldsid.records.named_inputs import where_now
+from fieldsid.records.named_inputs import mapping_in, where_now
 from fieldsid.records.reading import read_yaml
 from fieldsid.rounding import nine_digits
 
@@ -354,11 +354,20 @@ def _is_fit(body: Mapping[str, Any]) -> bool:
     return str(body.get("schema", "")).startswith(f"{FIT_KIND}/")
 
 
-def logs_of(paths: Sequence[Path]) -> tuple[tuple[str, Path | None], ...]:
-    """Return the logs that model files, or a fit file's models, name as what they were made from, and where each is now."""
+class NamedLog(NamedTuple):
+    """A log that a model names as what it was made from: its path then, where it is now, and the mapping it was read with."""
+
+    named: str
+    now: Path | None
+    mapping: Path | None = None
+
+
+def logs_of(paths: Sequence[Path]) -> tuple[NamedLog, ...]:
+    """Return the logs that model files, or a fit file's models, name as what they were made from."""
     bodies = [(p, read_yaml(p)) for p in paths]
     records = [(p, r) for p, b in bodies for r in ([m["record"] for m in b["models"]] if _is_fit(b) else [b])]
-    return tuple(dict.fromkeys((str(i["path"]), where_now(i, p)) for p, r in records for i in r.get("inputs") or ()))
+    named = (NamedLog(str(i["path"]), where_now(i, p), mapping_in(r, p)) for p, r in records for i in r.get("inputs") or ())
+    return tuple({log[:2]: log for log in named}.values())
 
 
 def _with_laws(

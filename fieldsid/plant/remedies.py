@@ -26,7 +26,7 @@ def wider_fin(option: str, needed: float, source: ParameterSource) -> str:
     if needed <= FIN:
         return f"trim the fin: a limit has to be above {needed:.4g} rad, {degrees(needed):.1f} deg"
     names, logs = NAMES[source.axis], logs_of(source.paths) if source.models else ()
-    runs = " ".join(quote(str(now or named)) for named, now in logs)
+    runs = " ".join(quote(str(now or named)) for named, now, _ in logs)
     if not source.models:
         return f"no fin is trimmed that far: check unit and sign of `{names.trim}` and `{names.authority}` in the table"
     return (

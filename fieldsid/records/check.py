@@ -158,7 +158,7 @@ def _wrong(value: object, place: str, wanted: str) -> ShapeError:
 
 SOURCE: Shape = {"path": text, "sha256": text}
 """A file that a record was made from."""
-HEAD: Shape = {"inputs?": maybe([SOURCE]), "parent?": maybe(SOURCE)}
+HEAD: Shape = {"inputs?": maybe([SOURCE]), "mapping?": maybe(SOURCE), "parent?": maybe(SOURCE)}
 """What the head of every record holds beside its schema."""
 ERRORS: Shape = {"angle_rms_rad": maybe(number(0.0)), "rate_rms_rad_s": maybe(number(0.0))}
 """The error of a free run; nothing where a channel was not measured."""

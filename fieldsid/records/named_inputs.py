@@ -79,6 +79,12 @@ def inputs_in(body: Mapping[str, Any], record: Path) -> tuple[Path, ...]:
     return tuple(dict.fromkeys(p for p in found if p is not None))
 
 
+def mapping_in(body: Mapping[str, Any], record: Path) -> Path | None:
+    """Return the mapping that a record's body says its logs were read with, where it still is; None where none was named."""
+    entry = body.get("mapping")
+    return where_now(entry, record) if isinstance(entry, Mapping) else None
+
+
 def where_now(entry: Mapping[str, Any], record: Path) -> Path | None:
     """Return the path of a file that a record names with its SHA-256, as seen from the working folder; None where it is nowhere.
 

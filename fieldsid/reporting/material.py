@@ -91,13 +91,14 @@ def _runs(state: FolderState, vehicle: Vehicle | None, skipped: list[str]) -> li
     places = [state.place(i) for i in state.of_kind(RUN)]
     if not places:  # the runs that the models name
         sources = [s.path for i in state.of_kind(MODEL) for s in i.sources if s.path is not None]
-        places = [p for p in dict.fromkeys(sources) if p.suffix != ".yaml"]
+        places = [p for p in dict.fromkeys(sources) if p.suffix not in (".yaml", ".yml")]
     if len(places) > MOST_RUNS:
         said = "those that the model was not fitted to come first, then others evenly by name"
         skipped.append(f"{len(places) - MOST_RUNS} of {len(places)} runs are not drawn: {said}")
         places = _chosen(places, _fitted_to(state))
     limits = {} if vehicle is None else vehicle.signal_limits
-    tried = (_tried(partial(load_run, p, fin_max_rad=limits, recognise=True), p.name, skipped) for p in places)
+    read = {p: partial(load_run, p, state.mapping_of(p), fin_max_rad=limits, recognise=True) for p in places}
+    tried = (_tried(how, p.name, skipped) for p, how in read.items())
     return [run for run in tried if run is not None]
 
 

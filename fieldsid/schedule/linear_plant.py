@@ -298,16 +298,21 @@ def _actuator(shared: Mapping[str, FloatArray], limits: FinLimits, draws: int) -
     return out
 
 
-def not_counted(models: Sequence[Model]) -> tuple[str, ...]:
-    """Return the effects of models that bend the path from fin to motion in a way a linear plant does not hold."""
-    return tuple(sorted({e.name for m in models for e in effects_of(m) if not _counted(e, m)}))
+def not_counted(models: Sequence[Model]) -> dict[str, tuple[str, ...]]:
+    """Return what of the path from fin to motion a linear plant does not hold: by effect, the coefficients left out."""
+    left: dict[str, set[str]] = {}
+    for model in models:
+        for effect in effects_of(model):
+            if out := _left_out(effect, model):
+                left.setdefault(effect.name, set()).update(out)
+    return {name: tuple(sorted(left[name])) for name in sorted(left)}
 
 
-def _counted(effect: Effect, model: Model) -> bool:
+def _left_out(effect: Effect, model: Model) -> set[str]:
     if effect.stage is Stage.SENSOR:
-        return True
+        return set()
+    own = {c.name for c in effect.every if c.name in model.values}
     if effect.core is not None:
         core = effect.core({EXPONENT: model.law.damping_exponent} | dict(model.values), 1.0)
-        return not any(core[place] for place in OF_ANGLE)
-    own = {c.name for c in effect.every if c.name in model.values}
-    return own <= set(ACTUATOR) or follows_the_run(effect)
+        return own if any(core[place] for place in OF_ANGLE) else set()
+    return set() if follows_the_run(effect) else own - set(ACTUATOR)

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from math import degrees, isfinite
+from math import degrees, inf, isfinite
 from typing import Annotated
 
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.records.keys import Key, Number
-from fieldsid.rounding import number
-from fieldsid.schedule.check import READ_OFF
+from fieldsid.rounding import beside, number
+from fieldsid.schedule.check import READ_OFF, Check, StepCheck
+from fieldsid.schedule.flown.response import steady_error, swing
 from fieldsid.schedule.linear_plant import not_counted
 from fieldsid.schedule.margins import HELD_SHARE
 from fieldsid.schedule.record import Schedule
-from fieldsid.schedule.verify import DEPTH_STEP_M, Verification, steps_of
+from fieldsid.schedule.verify import AT_REST_SHARE, DEPTH_STEP_M, Verification, steps_of
 
 MOST_NAMED = 3
 
@@ -42,7 +43,7 @@ class Gate:
     def says(self) -> str:
         """The gate in words."""
         side = "least" if self.at_least else "most"
-        return f"{self.name} {number(self.found, 3)} at {number(self.speed, 3)} m/s, wanted at {side} {self.wanted:.3g}"
+        return f"{self.name} {beside(self.found, self.wanted)} at {number(self.speed, 3)} m/s, wanted at {side} {self.wanted:.3g}"
 
 
 def gates_of(checked: Verification, wanted: Mapping[str, float | None]) -> tuple[Gate, ...]:
@@ -73,14 +74,14 @@ def verdict_of(checked: Verification, schedule: Schedule, gates: tuple[Gate, ...
 def _settles(checked: Verification, step: float) -> str:
     """Return how long a step (deg) takes to settle where it takes longest, by the estimate and over the draws."""
     slowest, latest = max(c.settling for c in checked.scheduled), max(c.settling_most for c in checked.scheduled)
-    by_draws = f"in {latest:.1f} s by the slowest draw" if isfinite(latest) else f"by some draws not within {_longest(checked)}"
+    most, longest = f"{100 * HELD_SHARE:.0f} % of the draws", f"{_longest(checked):.0f} s"
+    by_draws = f"within {latest:.1f} s by {most}" if isfinite(latest) else f"by fewer than {most} within {longest}"
     return f"a {step:.0f} deg step settles within {slowest:.1f} s at every speed" + (f", {by_draws}" if checked.spread else "")
 
 
 def _faults(checked: Verification, schedule: Schedule) -> list[str]:
     """Return why the loop does not hold, whatever was asked for."""
-    weakest, slowest = checked.weakest("phase_margin_deg"), max(checked.scheduled, key=lambda c: c.settling)
-    step, found = degrees(steps_of(schedule)[1]), []
+    weakest, found = checked.weakest("phase_margin_deg"), []
     if weakest.phase_least_deg <= 0.0:
         of = f" by {weakest.unstable} of the draws" if checked.spread else ""
         found.append(f"unstable at {number(weakest.speed, 3)} m/s{of}, phase margin {number(weakest.phase_least_deg, 3)} deg")
@@ -91,10 +92,7 @@ def _faults(checked: Verification, schedule: Schedule) -> list[str]:
     unheld = min(schedule.rows, key=lambda r: r.draws_held)
     if unheld.draws_held < HELD_SHARE and not found and checked.spread:
         found.append(f"at {number(unheld.speed, 3)} m/s it holds {100 * unheld.draws_held:.0f} % of the draws it was designed on")
-    if not isfinite(slowest.settling):
-        found.append(
-            f"at {number(slowest.speed, 3)} m/s a {step:.0f} deg step is not within 5 % after {slowest.steps[1].flown:.0f} s"
-        )
+    found.extend(_unsettled(checked))
     deepest = max((c for c in checked.scheduled if schedule.depth), key=lambda c: c.depth_settling, default=None)
     if deepest is not None and not isfinite(deepest.depth_settling):
         where = f"at {number(deepest.speed, 3)} m/s a {DEPTH_STEP_M:.0f} m depth step"
@@ -102,32 +100,62 @@ def _faults(checked: Verification, schedule: Schedule) -> list[str]:
     return found
 
 
+def _unsettled(checked: Verification) -> Iterator[str]:
+    """Yield of the smallest step that the estimate does not settle from at which speed it is furthest off, and by how much."""
+    for i in range(3):
+        lost = [
+            (abs(float(steady_error(flown.scheduled[i].angle, check.steps[i].size)[0])), check, flown.scheduled[i])
+            for check, flown in zip(checked.scheduled, checked.flown, strict=True)
+            if check.steps[i].settling == inf
+        ]
+        if lost:
+            off, check, flight = max(lost, key=lambda at: at[0])
+            step = check.steps[i]
+            rests = float(swing(flight.angle, step.size)[0]) <= AT_REST_SHARE
+            where = f": it is still {number(degrees(off), 2)} deg off" if rests else ""
+            size = f"{degrees(step.size):.0f} deg step"
+            yield f"at {number(check.speed, 3)} m/s a {size} is not within 5 % after {step.flown:.0f} s{where}"
+            return
+
+
 def against_constant(checked: Verification) -> str:
-    """Return how the schedule compares with the best one gain for all speeds, by the objective that its rows are designed for."""
+    """Return how the schedule compares with the best one gain for all speeds, by the objective that its rows are designed for.
+
+    The times are those of the table: the standard step's by the estimate.
+    """
     row = checked.constant_row.gains
     named = ", ".join(f"{n} {number(v, 3)}" for n, v in (("kp", row.kp), ("ki", row.ki), ("kd", row.kd)) if v or n == "kp")
     lacking = next((c for c in checked.constant if not c.outcome.serves), None)
-    ours, theirs = (max(c.outcome.settled for c in part) for part in (checked.scheduled, checked.constant))
+    pairs = list(zip(checked.scheduled, checked.constant, strict=True))
     if checked.worse:
         where = ", ".join(number(speed, 3) for speed in checked.worse)
-        return f"one constant gain, {named}, is better at {where} m/s: {_compared(ours, theirs)}"
+        own, one = next(pair for pair in pairs if pair[0].speed == checked.worse[0])
+        return f"one constant gain, {named}, is better at {where} m/s: {_at(own, one)}"
     if lacking is not None and all(c.outcome.serves for c in checked.scheduled):
         return f"no one gain for all speeds keeps what was asked: the best, {named}, does not at {number(lacking.speed, 3)} m/s"
-    pairs = zip(checked.scheduled, checked.constant, strict=True)
     own, one = max(pairs, key=lambda pair: pair[1].outcome.fin / pair[0].outcome.fin)
+    ours, theirs = (max((c.steps[1] for c in part), key=lambda s: s.settling) for part in (checked.scheduled, checked.constant))
+    slowest = f"the slowest {degrees(ours.size):.0f} deg step settles {_when(ours)} with the schedule, {_when(theirs)} with it"
     fins = f"{100.0 * one.outcome.fin:.0f} % of the fin with it, {100.0 * own.outcome.fin:.0f} % with the schedule"
-    return f"against the best constant gain, {named}: {_compared(ours, theirs)}; at {number(own.speed, 3)} m/s it asks for {fins}"
+    return f"against the best constant gain, {named}: {slowest}; at {number(own.speed, 3)} m/s it asks for {fins}"
 
 
-def _compared(ours: float, theirs: float) -> str:
-    both = (f"{s:.1f} s" if isfinite(s) else "never" for s in (ours, theirs))
-    return "the slowest step settles in {} with the schedule, {} with it".format(*both)
+def _at(own: Check, one: Check) -> str:
+    """Return what the standard step comes to at one speed with the schedule and with the constant gain, in time and fin."""
+    ours, theirs = (f"{_when(c.steps[1])} for {100.0 * c.outcome.fin:.0f} % of the fin" for c in (own, one))
+    short = " and less than was asked" if one.outcome.serves and not own.outcome.serves else ""
+    size = f"{degrees(own.steps[1].size):.0f} deg step"
+    return f"at {number(own.speed, 3)} m/s a {size} settles {ours}{short} with the schedule, {theirs} with it"
 
 
-def _longest(checked: Verification) -> str:
-    """Return how long the standard steps that did not settle were flown, in words."""
-    unsettled = [c.steps[1].flown for c in (*checked.scheduled, *checked.constant) if not isfinite(c.settling_most)]
-    return f"{min(unsettled, default=0.0):.0f} s"
+def _when(step: StepCheck) -> str:
+    """Return when a step settles by the estimate."""
+    return f"in {step.settling:.1f} s" if isfinite(step.settling) else f"not in {step.flown:.0f} s"
+
+
+def _longest(checked: Verification) -> float:
+    """Return how long the standard steps that did not settle by the draws were flown at least, s."""
+    return min((c.steps[1].flown for c in checked.scheduled if not isfinite(c.settling_most)), default=0.0)
 
 
 def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource) -> str:
@@ -187,4 +215,5 @@ def lost(source: ParameterSource) -> tuple[str, ...]:
         return ("a table carries no effects",)
     left = not_counted(source.models)
     unsure = [f"left out, its fin's sign not known: {', '.join(source.left_out)}"] if source.left_out else []
-    return (*([f"not counted in full: {', '.join(left)}"] if left else []), *unsure)
+    parts = ", ".join(f"{effect}'s {' and '.join(names)}" for effect, names in left.items())
+    return (*([f"not counted: {parts}"] if left else []), *unsure)

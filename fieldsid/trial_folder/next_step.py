@@ -85,10 +85,17 @@ def _remake(state: FolderState, item: Item) -> str:
         read = [*logs, *(word for name in mappings for word in ("--mapping", name))]
         return shlex.join(["sysid", "import", *read, "-o", str(Path(item.path).parent), "--force"])
     if item.kind == MODEL:
-        return shlex.join(["sysid", "identify", *run_words(state), "--axis", axis, "-o", str(Path(item.path).parent), "--force"])
+        read = [*run_words(state), *_mapped(item)]
+        return shlex.join(["sysid", "identify", *read, "--axis", axis, "-o", str(Path(item.path).parent), "--force"])
     if item.kind == "diagnosis":
         return shlex.join(["sysid", "diagnose", *run_words(state), "--axis", axis, "-o", item.path, "--force"])
     return shlex.join(["sysid", "history", item.path])
+
+
+def _mapped(item: Item) -> list[str]:
+    """Return the option by which a model's logs are read, where a mapping was named for them."""
+    named = (item.body or {}).get("mapping")
+    return [] if named is None else ["--mapping", str(named["path"])]
 
 
 def _sides(state: FolderState) -> tuple[str, str] | None:
@@ -354,6 +361,6 @@ def _axis(state: FolderState) -> str:
 def _loaded(state: FolderState, item: Item) -> list[Run]:
     """Return a run; none where it cannot be read: who works with it says so."""
     try:
-        return [load_run(state.place(item), recognise=True)]
+        return [load_run(state.place(item), state.mapping_of(state.place(item)), recognise=True)]
     except FieldsidError:
         return []

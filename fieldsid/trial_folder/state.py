@@ -85,6 +85,14 @@ class FolderState(Brief):
         """Return the file that a model was extended from, none for others."""
         return _parents(item, self.folder)
 
+    def mapping_of(self, log: Path) -> Path | None:
+        """Return the mapping that a model of a log was made with, None where none was named: the log is read without one."""
+        for item in self.of_kind(MODEL):
+            sources = _sources(_named(_body(item), "mapping"), self.folder)
+            if sources and any(s.path == log.resolve() for s in item.sources):
+                return sources[0].path
+        return None
+
     @property
     def models(self) -> tuple[Item, ...]:
         """The models that nothing was extended from, joint ones before those of one run."""
@@ -158,11 +166,12 @@ def _own(path: Path, name: str, kind: str, folder: Path) -> Item:
         return Item(name, kind)
     body = read_yaml(path)
     check_kind(body, f"fieldsid/{kind}", path)
-    return Item(name, kind, _sources([*(body.get("inputs") or ()), *_parent(body)], folder), body=body)
+    named = [*(body.get("inputs") or ()), *_named(body, "mapping"), *_named(body, "parent")]
+    return Item(name, kind, _sources(named, folder), body=body)
 
 
-def _parent(body: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    return [] if body.get("parent") is None else [body["parent"]]
+def _named(body: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
+    return [] if body.get(key) is None else [body[key]]
 
 
 def run_head(path: Path) -> Mapping[str, Any] | None:
@@ -212,7 +221,7 @@ def _unknown(source: Source) -> str:
 
 
 def _parents(item: Item, folder: Path) -> tuple[Source, ...]:
-    return _sources(_parent(_body(item)), folder)
+    return _sources(_named(_body(item), "parent"), folder)
 
 
 def _body(item: Item) -> Mapping[str, Any]:

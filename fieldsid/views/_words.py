@@ -56,13 +56,15 @@ def base_words(model: Model) -> str:
 
 
 def parameter_block(model: Model) -> Block:
-    """Return the parameters of a model: value, standard error, 95 % interval, unit."""
+    """Return the parameters of a model: value, standard error, 95 % interval, unit; what stands on a bound has no error."""
+    from fieldsid.dynamics.at_bound import at_bound
     from fieldsid.fitting.estimates import estimates
 
-    rows = []
+    rows, bound = [], at_bound(model)
     for e in estimates(model):
         value, _, error = with_error(e.value, e.std_error).partition(BETWEEN)
-        rows.append((e.name, value, error or "-", interval(*e.interval95), in_unit(e.unit)))
+        told = (number(e.value), "at its bound", "-") if e.name in bound else (value, error or "-", interval(*e.interval95))
+        rows.append((e.name, *told, in_unit(e.unit)))
     at = f" at {model.law.reference:.2f} m/s" if isfinite(model.law.reference) else ""
     return Block(f"Parameters{at}", tuple(rows), ("", "value", "std error", "95 % interval", "unit"))
 

@@ -101,7 +101,7 @@ def test_a_step_that_does_not_settle_is_no_schedule_that_holds(run_cli, gains, t
     weak.write_text(re.sub(r"kp: (\S+)", r"kp: -0.001", gains.read_text()))
     first = run_cli("schedule", "verify", weak).out.splitlines()[0]
     assert first.startswith("does not hold: at ")
-    assert "a 20 deg step is not within 5 % after 240 s" in first
+    assert "a 5 deg step is not within 5 % after 240 s" in first
 
 
 def test_verify_says_when_the_models_are_gone(run_cli, gains, tmp_path):

@@ -126,8 +126,8 @@ def test_a_table_that_does_not_fit_a_narrow_terminal_is_shown_row_by_row_with_it
 def test_a_table_that_fits_or_a_page_that_is_wide_keeps_its_columns():
     small = table(Block("", (("a", "1.4"),), ("run", "m/s")))
     assert on_a_terminal_of(40, small).splitlines()[0].split() == ["run", "m/s"]
-    wide = table(Block("", (("r" * 90, "1.4"),), ("run", "value")))
-    assert on_a_terminal_of(80, wide).splitlines()[0].split() == ["run", "value"]
+    wide = table(Block("", (("it is said " * 9, "1.4"),), ("why", "value")))
+    assert on_a_terminal_of(80, wide).splitlines()[0].split() == ["why", "value"]
 
 
 @pytest.mark.parametrize("width", [45, 60, 80, 120])

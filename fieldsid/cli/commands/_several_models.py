@@ -16,6 +16,7 @@ from fieldsid.cli.voice import angles
 from fieldsid.comparison.sufficient import pooled
 from fieldsid.errors import UsageError
 from fieldsid.figures.kinds import sketch
+from fieldsid.logs.several.run_names import short_names
 from fieldsid.page import Block, Page, Whole, written
 from fieldsid.records.keys import body_of
 
@@ -123,7 +124,8 @@ def _names(paths: Sequence[Path]) -> list[str]:
 
 
 def _page(told: ComparedSeveral, found_of: Sequence[Sequence[Comparison]], names: Sequence[str]) -> Page:
-    rows = tuple((of_run[0].run, *(f"{c.over_noise:.2f}" for c in of_run)) for of_run in zip(*found_of, strict=True))
+    short = short_names([c.run for c in found_of[0]])
+    rows = tuple((short.of(of_run[0].run), *(f"{c.over_noise:.2f}" for c in of_run)) for of_run in zip(*found_of, strict=True))
     errors = Block("error over the noise", rows, ("run", *names))
     loop = () if told.loop is None else _loop_blocks(told.loop)
-    return Page("", blocks=(*loop, errors), closing=written(figure=told.figures))
+    return Page("", blocks=(*loop, errors, Whole(short.says)), closing=written(figure=told.figures))

@@ -17,9 +17,10 @@ from fieldsid.cli.session import drawn_in
 from fieldsid.cli.voice import angles
 from fieldsid.errors import UsageError
 from fieldsid.figures.kinds import sketch
+from fieldsid.logs.several.run_names import short_names
 from fieldsid.page import Block, Page, Whole, written
 from fieldsid.records.keys import body_of
-from fieldsid.rounding import number
+from fieldsid.rounding import beside, number
 from fieldsid.views._words import merit_blocks
 from fieldsid.views.comparison import MOST_PLACES, blocks_of
 
@@ -121,17 +122,20 @@ def command(
 
 
 def _gate(entries: Sequence[Mapping[str, Any]], least: float | None) -> None:
+    if least is None:
+        return
     found = [(e["run"], name, e[f"{name}_fit_percent"]) for e in entries for name in e["over_floor"]]
-    failed = [(run, name, fit) for run, name, fit in found if least is not None and not fit >= least]
+    failed = [(run, name, fit) for run, name, fit in found if not fit >= least]
     for run, name, fit in failed:
-        complain(f"gate failed: {run} has {name} fit {fit:.1f} %, below {least:g} %")
+        complain(f"gate failed: {run} has {name} fit {beside(fit, least)} %, below {least:g} %")
     if failed:
         raise typer.Exit(1)
 
 
 def _page(found: Sequence[Comparison], runs: Sequence[ComparedRun], top: int) -> Page:
-    units = angles()
-    blocks: list[Block | str] = list(merit_blocks(((r.run, r.speed_m_s, r.merit, r.noise_floor) for r in runs), units))
+    units, short = angles(), short_names([r.run for r in runs])
+    followed = ((short.of(r.run), r.speed_m_s, r.merit, r.noise_floor) for r in runs)
+    blocks: list[Block | str] = [*merit_blocks(followed, units), Whole(short.says)]
     for r in runs:
         for flown in filter(None, (r.command_times, r.own_speed)):
             angle, rate = (number(units.factor * v, 2) for v in (flown.as_logged.angle_rms_rad, flown.as_logged.rate_rms_rad_s))

@@ -93,7 +93,7 @@ def command(
     )
     told = replace(told, file=_saved(told, output, inputs, force=force), figure=drawn_at(figure, found.plot, force=force))
     if apply:
-        told = replace(told, applied=_applied(found, (known, model), training, unseen, force=force))
+        told = replace(told, applied=_applied(found, (known, model), training, unseen, mapping, force=force))
     from fieldsid.cli.headlines.missing import Searched, of_diagnosis
 
     headline = of_diagnosis(told, Searched(files_of(training), files_of(unseen), model, thorough))
@@ -126,7 +126,7 @@ def _saved(told: Diagnosed, path: Path | None, inputs: Sequence[Path], *, force:
 
 def _applied(
     found: Diagnosis, model: tuple[Model | None, Path | None], training: Sequence[Run],
-    unseen: Sequence[Run], *, force: bool,
+    unseen: Sequence[Run], mapping: Path | None, *, force: bool,
 ) -> tuple[Applied, ...]:  # fmt: skip
     """Extend the model diagnosed by each named effect in turn, write each model, and return what each step has changed."""
     from fieldsid.cli.commands.extend import step_files
@@ -143,11 +143,11 @@ def _applied(
         stem = "joint" if len(training) > 1 else training[0].name
         known, path = found.base_model, Path(MODELS) / f"{stem}_{found.axis.value}.yaml"
         if not path.exists() or force:
-            save_model(known, path, inputs=files_of(training), force=force)
+            save_model(known, path, inputs=files_of(training), mapping=mapping, force=force)
     targets = step_files(path, found.effects, force=force)
     with compiling_first(), trying("adding what was found") as report:
         steps = extend_in_steps(known, found.effects, training, unseen, report=report)
-    save_steps(steps, targets, path, (training, unseen), force=force)
+    save_steps(steps, targets, path, (training, unseen), mapping=mapping, force=force)
     return tuple(
         Applied(step.gain, name, str(target), step.pays) for name, step, target in zip(found.effects, steps, targets, strict=True)
     )

@@ -20,7 +20,7 @@ from fieldsid.comparison.sufficient import is_noise
 from fieldsid.errors import ArtifactError, UsageError
 from fieldsid.page import Block, Page, paragraph, written
 from fieldsid.records.keys import body_of
-from fieldsid.rounding import number, with_error
+from fieldsid.rounding import at_its_bound, number, with_error
 
 if TYPE_CHECKING:
     from fieldsid.extension import Extension
@@ -83,7 +83,7 @@ def command(
     training, unseen = skips.left_of(training), skips.left_of(unseen)
     kept = found.pays or keep
     if kept:
-        save_steps(steps, targets, path, (training, unseen), force=force)
+        save_steps(steps, targets, path, (training, unseen), mapping=mapping, force=force)
     now = targets[-1] if kept else path
     left, next_ = _left(found, now, known, runs, validate, kept=kept)
     told = Extended(
@@ -141,13 +141,15 @@ def _left(
 
 
 def _coefficients(found: Extension) -> dict[str, AddedCoefficient]:
+    from fieldsid.dynamics.at_bound import at_bound
     from fieldsid.effects import pick_effect
     from fieldsid.models.effect import as_fitted
     from fieldsid.results.extensions import AddedCoefficient
 
     model = found.model
+    bound = at_bound(model)
     return {
-        c.name: AddedCoefficient(model.values[c.name], model.std_error(c.name), c.unit, c.name in found.on_bound)
+        c.name: AddedCoefficient(model.values[c.name], model.std_error(c.name), c.unit, c.name in bound)
         for n in found.gain.added
         for c in as_fitted(pick_effect(n), model.values).shared
     }
@@ -207,6 +209,6 @@ def _verdict(told: Extended) -> str:
 def _value(value: float, error: float, *, at_bound: bool) -> str:
     """Return a value with its error, or why it has none."""
     if at_bound:
-        return f"{number(value)} (at its bound)"
+        return at_its_bound(value)
     known = error < MUCH * max(abs(value), SMALL)
     return with_error(value, error) if known else f"{number(value)} (these data do not tell)"

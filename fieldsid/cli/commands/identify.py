@@ -31,6 +31,7 @@ from fieldsid.cli.session import drawn_in
 from fieldsid.cli.voice import angles
 from fieldsid.figures.kinds import sketch
 from fieldsid.logs.run import Note
+from fieldsid.logs.several.run_names import ShortNames, short_names
 from fieldsid.page import Block, Page, Whole, paragraph, written
 from fieldsid.records.keys import body_of
 from fieldsid.views._words import merit_blocks
@@ -100,7 +101,7 @@ def command(
     used = skips.left_of(known)
     groups = [used] if joint else [[run] for run in used]
     files = [files_of(group) for group in groups]
-    models = _written(fits, files, output, force=force)
+    models = _written(fits, files, mapping, output, force=force)
     drawn_in(output if figures else None, {k: v for fit in fits for k, v in _plots(fit).items()}, force=force)
     entries = tuple(fitted_model(fit, model, of) for fit, model, of in zip(fits, models, groups, strict=True))
     told = Identified(axis=axis, fits=entries, skipped_runs=tuple(skips.records))
@@ -112,13 +113,17 @@ def command(
     return result
 
 
-def _written(fits: Sequence[Fit], sources: Sequence[list[Path]], folder: Path | None, *, force: bool) -> Sequence[Path | None]:
+def _written(
+    fits: Sequence[Fit], sources: Sequence[list[Path]], mapping: Path | None, folder: Path | None, *, force: bool
+) -> Sequence[Path | None]:
     if folder is None:
         return [None] * len(fits)
     from fieldsid.models.model import save_model
 
     pairs = zip(fits, sources, strict=True)
-    return [save_model(fit.model, folder / f"{_stem(fit)}.yaml", inputs=inputs, force=force) for fit, inputs in pairs]
+    return [
+        save_model(fit.model, folder / f"{_stem(fit)}.yaml", inputs=inputs, mapping=mapping, force=force) for fit, inputs in pairs
+    ]
 
 
 def _plots(fit: Fit) -> dict[str, Callable[[], Any]]:
@@ -162,22 +167,29 @@ def _reasons(entries: Sequence[FittedModel]) -> Iterator[str]:
         yield Whole(f"{_label(first)}: {first.method_reason}{more}")
 
 
-def _label(entry: FittedModel) -> str:
-    """Return the run's name, or how many runs a joint fit has."""
-    return entry.run if len(entry.runs) == 1 else f"{len(entry.runs)} runs"
+def _label(entry: FittedModel, short: ShortNames | None = None) -> str:
+    """Return the run's name, shortened if asked, or how many runs a joint fit has."""
+    name = entry.run if short is None else short.of(entry.run)
+    return name if len(entry.runs) == 1 else f"{len(entry.runs)} runs"
 
 
 def _page(entries: Sequence[FittedModel], *, figures: bool) -> Page:
+    short = short_names([r.run for e in entries for r in e.runs])
     rows = tuple(
-        (_label(e) if i == 0 else "", p.shown, *angles().estimate(v.value, v.std_error, v.interval95, v.unit))
+        (
+            _label(e, short) if i == 0 else "",
+            p.shown,
+            *angles().estimate(v.value, v.std_error, v.interval95, v.unit, at_bound=p.at_bound),
+        )
         for e in entries
         for i, (p, v) in enumerate((p, p.estimate) for p in e.parameters.values())
     )
-    runs = ((r.run, r.speed_m_s, r.merit, e.noise_floor) for e in entries for r in e.runs)
+    runs = ((short.of(r.run), r.speed_m_s, r.merit, e.noise_floor) for e in entries for r in e.runs)
     merits, units = merit_blocks(runs, angles())
     methods = ", ".join(sorted({e.method for e in entries}))
     parameters = Block("", rows, ("run", "parameter", "value", "unit", "95 % interval"), left=2)
-    blocks: tuple[Block | str, ...] = (parameters, merits, *paragraph([f"method: {methods}; {units}"]), *_reasons(entries))
+    said = paragraph([f"method: {methods}; {units}"])
+    blocks: tuple[Block | str, ...] = (parameters, merits, *said, Whole(short.says), *_reasons(entries))
     closing: list[str] = []
     for e in (e for e in entries if e.model):
         closing += written(model=e.model)

@@ -114,14 +114,14 @@ def _fin_zero(text: str) -> float:
 def _runs(given: Sequence[Path] | None, source: ParameterSource, mapping: Path | None, skips: Skips) -> Sequence[Run]:
     """Return the runs the models came from: those given, else the inputs the model files name, where they can still be read."""
     from fieldsid.cli.inputs import mapping_of, read_runs
-    from fieldsid.face.arguments import run_files
-    from fieldsid.logs import Run, load_run
+    from fieldsid.face.arguments import read_again, run_files
+    from fieldsid.logs import Run
     from fieldsid.logs.several.sifting import attempt
 
     if given:
         return read_runs(given, mapping=mapping, refused=skips.skip)
     chosen = mapping_of(mapping)
-    outcomes = {path: attempt(lambda p: load_run(p, chosen, recognise=True), path) for path in run_files(source, say)}
+    outcomes = {log.now: attempt(lambda named: read_again(named, chosen), log) for log in run_files(source, say)}
     lost = [f"`{path}`" for path, outcome in outcomes.items() if not isinstance(outcome, Run)]
     if lost:
         say(

@@ -38,18 +38,22 @@ def _runs(parsed: Parsed, state: FolderState) -> list[str]:
 def _of_plane(parsed: Parsed, state: FolderState) -> list[str]:
     axis = parsed.values.get("axis")
     places = {i.path: state.place(i) for i in state.of_kind(RUN)}
-    mine = [path for path, place in places.items() if axis is None or _may_show(place, place.stat().st_mtime_ns, axis)]
+    mine = [
+        path
+        for path, place in places.items()
+        if axis is None or _may_show(place, place.stat().st_mtime_ns, state.mapping_of(place), axis)
+    ]
     return mine or run_words(state)
 
 
 @cache
-def _may_show(place: Path, _written_ns: int, axis: Axis) -> bool:
+def _may_show(place: Path, _written_ns: int, mapping: Path | None, axis: Axis) -> bool:
     """Whether a run may show something of an axis, also one that cannot be read: the command itself says so."""
     from fieldsid.logs import load_run
     from fieldsid.logs.segments import may_show
 
     try:
-        return may_show(load_run(place, recognise=True), axis)
+        return may_show(load_run(place, mapping, recognise=True), axis)
     except FieldsidError:
         return True
 
@@ -157,7 +161,7 @@ def _circles(state: FolderState) -> list[str]:
     found = []
     for item in state.of_kind(RUN):
         try:
-            run = load_run(state.place(item), recognise=True)
+            run = load_run(state.place(item), state.mapping_of(state.place(item)), recognise=True)
         except FieldsidError:
             continue
         if is_circle(run):

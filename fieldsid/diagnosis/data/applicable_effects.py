@@ -15,13 +15,18 @@ def applicable_effects(catalogue: Iterable[Effect], records: Sequence[Record]) -
     for effect in catalogue:
         missing, columns = _missing(effect.needs, records), sorted({r.thrust_column for r in records if r.thrust_column})
         if missing:
-            skipped[effect.name] = f"needs {', '.join(missing)}, which the log lacks"
+            skipped[effect.name] = f"needs {', '.join(missing)}, {_why(missing, records)}"
         elif "thrust" in effect.needs and len(columns) > 1:
             skipped[effect.name] = f"needs one thrust for all runs, and they log it as {' and as '.join(columns)}"
         else:
             forms = [f for f in effect.variants if not _missing(f.needs, records) and all(r.axis in f.axes for r in records)]
             kept.append(effect if len(forms) == len(effect.variants) else replace(effect, variants=tuple(forms)))
     return tuple(kept), skipped
+
+
+def _why(missing: Sequence[str], records: Sequence[Record]) -> str:
+    """Return why roles are missing, for each reason once."""
+    return ", ".join(dict.fromkeys(r.why_without(role) for role in missing for r in records if role not in r.signals))
 
 
 def _missing(needs: Iterable[str], records: Sequence[Record]) -> list[str]:

@@ -85,5 +85,6 @@ def part_of(record: Record, samples: slice) -> Record:
         cross_ok=record.cross_ok[samples],
         signals={k: v[samples] for k, v in record.signals.items()},
         speed=record.speed,
+        refused=record.refused,
         fin_line=None if record.fin_line is None else record.fin_line[:, samples],
     )

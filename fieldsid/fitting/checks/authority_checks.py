@@ -22,6 +22,7 @@ from fieldsid.fitting.problem.problem import Problem
 from fieldsid.logs.run import Note
 from fieldsid.models.model import Noise
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.rounding import beside
 
 MIN_STD_ERRORS = 3.0
 """Standard errors below which an authority is not significant."""
@@ -36,10 +37,7 @@ def authority_check(problem: Problem, solution: Solution, floor: Noise, slot: in
     value, error = float(solution.x[slot]), float(np.sqrt(max(solution.covariance[slot, slot], 0.0)))
     if error == 0.0 or abs(value) >= MIN_STD_ERRORS * error:
         return None
-    # its 95 % interval holds zero below two standard errors only
-    far = f"is less than {MIN_STD_ERRORS:g} standard errors from zero"
-    unclear = "cannot be told from zero" if abs(value) < 2.0 * error else far
-    said = f"{problem.layout.shown(problem.layout.names[slot])} = {value:.2g} +/- {error:.2g} 1/s^2 {unclear}"
+    said = f"{problem.layout.shown(problem.layout.names[slot])} = {value:.2g} +/- {error:.2g} 1/s^2 {far_from_zero(value, error)}"
     data = {"parameter": problem.layout.names[slot], "value": value, "std_error": error, "limit": MIN_STD_ERRORS}
     led = [problem.records[run].name for run in _runs_of(problem, slot) if any(closed_loop_note(problem.records[run]))]
     if led:
@@ -59,6 +57,13 @@ def authority_check(problem: Problem, solution: Solution, floor: Noise, slot: in
         )
     causes = dict(_causes(problem, solution, floor, slot))
     return Note("authority_unclear", f"{said}: {'; '.join(causes.values())}", {**data, "causes": list(causes)})
+
+
+def far_from_zero(value: float, error: float) -> str:
+    """Return how far a value that is not significant is from zero in words, in standard errors where they say so."""
+    if abs(value) < 2.0 * error:  # its 95 % interval holds zero
+        return "cannot be told from zero"
+    return f"is {beside(abs(value) / error, MIN_STD_ERRORS)} standard errors from zero, less than {MIN_STD_ERRORS:g}"
 
 
 def _causes(problem: Problem, solution: Solution, floor: Noise, slot: int) -> Iterator[tuple[str, str]]:

@@ -11,7 +11,7 @@ from fieldsid.logs.doctor.fin_findings import BEYOND_SHARE, share_beyond
 from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
-from fieldsid.models.record import SPEED_LIMITS_M_S, fin_holes, knows_speed
+from fieldsid.models.record import SPEED_LIMITS_M_S, fin_holes, speed_refused
 from fieldsid.numerics.white_noise import white_noise_std
 from fieldsid.vehicle import Vehicle
 
@@ -61,13 +61,13 @@ def _limit(run: Run, axis: Axis, vehicle: Vehicle | None) -> Iterator[Note]:
 
 
 def _speed(run: Run) -> Iterator[Note]:
-    if not run.has("surge_m_s") or knows_speed(run):
+    why = speed_refused(run)
+    if not why:
         return
     middle, (low, high) = float(np.nanmedian(run["surge_m_s"])), SPEED_LIMITS_M_S
     yield Note(
         "no_speed",
-        f"run {run.name!r}: surge_m_s is {middle:.3g} m/s in the middle (limits {low:g} and {high:g} m/s): no vehicle under way, "
-        "so the speed is taken as not measured; correct its sign or unit, or map another one",
+        f"run {run.name!r}: {why}, so the speed is taken as not measured; correct its sign or unit, or map another one",
         {"value": middle, "limit": low if middle <= low else high, "signal": "surge_m_s", "run": run.name},
     )
 

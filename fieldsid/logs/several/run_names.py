@@ -6,6 +6,7 @@ import os
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from hashlib import sha256
 from itertools import takewhile
 from pathlib import Path
@@ -15,6 +16,10 @@ from fieldsid.logs.run import Run
 
 _BOUNDARY = re.compile(r"[-_. ]+")
 """What stands between the words of a file's name."""
+_BESIDE_NUMBERS = re.compile(r"[-_ ]+")
+"""The same without the point of a number: the 4 of `pulses_1.4` is no word."""
+LONGEST_NAME = 20
+"""Letters of a name beside which a table of numbers has room in 80 columns."""
 
 
 def stem_of(path: Path) -> str:
@@ -58,16 +63,44 @@ def name_of_run(tables: Sequence[Path]) -> str:
     return shared or tables[0].resolve().parent.name
 
 
-def shared_start(stems: Sequence[str]) -> str:
-    """Return what names begin with, up to the end of a word in all of them."""
+def shared_start(stems: Sequence[str], boundary: re.Pattern[str] = _BOUNDARY) -> str:
+    """Return what names begin with, up to the end of a word in all of them: up to what matches `boundary`."""
     same = common_start(stems)
-    ends = [m.end() for m in _BOUNDARY.finditer(same)]
+    ends = [m.end() for m in boundary.finditer(same)]
     return same[: ends[-1]] if ends else ""
 
 
 def common_start(names: Sequence[str]) -> str:
     """Return the letters that all names begin with."""
     return "".join(letters[0] for letters in takewhile(lambda found: len(set(found)) == 1, zip(*names, strict=False)))
+
+
+@dataclass(frozen=True, slots=True)
+class ShortNames:
+    """What long names of several runs begin and end with, which a table leaves out: nothing where they are short or one."""
+
+    start: str
+    end: str
+
+    def of(self, name: str) -> str:
+        """Return a name with three dots for what all begin and end with."""
+        middle = name[len(self.start) : len(name) - len(self.end)]
+        return f"{'...' if self.start else ''}{middle}{'...' if self.end else ''}"
+
+    @property
+    def says(self) -> str:
+        """What the dots stand for, in words; empty where there are none."""
+        parts = [f"{verb} with `{part}`" for verb, part in (("begin", self.start), ("end", self.end)) if part]
+        return f"the names of all runs {' and '.join(parts)}" if parts else ""
+
+
+def short_names(names: Sequence[str]) -> ShortNames:
+    """Return what the names of runs have in common, up to the ends of words, where one of them is longer than LONGEST_NAME."""
+    if len(set(names)) < 2 or max(map(len, names)) <= LONGEST_NAME:
+        return ShortNames("", "")
+    start = shared_start(names, _BESIDE_NUMBERS)
+    end = shared_start([name[len(start) :][::-1] for name in names], _BESIDE_NUMBERS)[::-1]
+    return ShortNames(start, end)
 
 
 def _told_apart(name: str, paths: Sequence[Path]) -> list[str]:

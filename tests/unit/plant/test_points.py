@@ -226,7 +226,7 @@ def test_a_fit_file_carries_its_models_with_effects_covariance_and_logs(tmp_path
     for one, other in zip(given.models, carried.models, strict=True):
         assert one.values == other.values
         assert np.array_equal(one.covariance, other.covariance)
-    assert logs_of([path]) == logs_of(paths) == ((str(log), log),)
+    assert logs_of([path]) == logs_of(paths) == ((str(log), log, None),)
 
 
 def test_logs_are_found_from_another_folder_and_where_the_trial_was_moved_to(tmp_path, monkeypatch):
@@ -235,15 +235,15 @@ def test_logs_are_found_from_another_folder_and_where_the_trial_was_moved_to(tmp
     (tmp_path / "day" / "runs" / "log.csv").write_text("x\n")
     monkeypatch.chdir(tmp_path / "day")
     save_model(yaw_model(1.0, ()), Path("models/m.yaml"), inputs=[Path("runs/log.csv")])
-    assert logs_of([Path("models/m.yaml")]) == (("runs/log.csv", Path("runs/log.csv")),)
+    assert logs_of([Path("models/m.yaml")]) == (("runs/log.csv", Path("runs/log.csv"), None),)
     monkeypatch.chdir(tmp_path / "day" / "models")
-    assert logs_of([Path("m.yaml")]) == (("runs/log.csv", Path("../runs/log.csv")),)
+    assert logs_of([Path("m.yaml")]) == (("runs/log.csv", Path("../runs/log.csv"), None),)
     assert inputs_of(Path("m.yaml")) == (Path("../runs/log.csv"),)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "day").rename(tmp_path / "moved")
-    assert logs_of([Path("moved/models/m.yaml")]) == (("runs/log.csv", Path("moved/runs/log.csv")),)
+    assert logs_of([Path("moved/models/m.yaml")]) == (("runs/log.csv", Path("moved/runs/log.csv"), None),)
     (tmp_path / "moved" / "runs" / "log.csv").write_text("another\n")
-    assert logs_of([Path("moved/models/m.yaml")]) == (("runs/log.csv", None),)  # what is there now is another
+    assert logs_of([Path("moved/models/m.yaml")]) == (("runs/log.csv", None, None),)  # what is there now is another
     assert inputs_of(Path("moved/models/m.yaml")) == ()
 
 

@@ -11,7 +11,9 @@ import pytest
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.dynamics.free_run import command_record
 from fieldsid.effects import pick_effect
+from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
+from fieldsid.models.record import record_of
 
 PROP = pick_effect("prop_moment")
 
@@ -28,6 +30,22 @@ def test_an_effect_without_its_signal_is_left_out_with_the_reason():
     kept, skipped = applicable_effects([PROP], [run(Axis.YAW, "thrust"), run(Axis.YAW)])
     assert kept == ()
     assert skipped == {"prop_moment": "needs thrust, which the log lacks"}
+
+
+@pytest.mark.parametrize(
+    ("speed", "why"),
+    [
+        (128.4, "surge_m_s is 128 m/s in the middle, above the 50 m/s of any vehicle in water"),
+        (50.01, "surge_m_s is 50.01 m/s in the middle, above the 50 m/s of any vehicle in water"),
+        (-1.4, "surge_m_s is -1.40 m/s in the middle, below the 0.05 m/s of one under way"),
+    ],
+)
+def test_of_a_speed_that_the_log_has_it_is_said_why_it_is_not_taken(speed, why):
+    time = np.arange(0.0, 10.0, 0.1)
+    rudder, yaw = 0.1 * np.sign(np.sin(time)), np.cumsum(0.01 * np.sin(time))
+    flown = Run("flight", time, {"yaw_rad": yaw, "rudder_rad": rudder, "surge_m_s": np.full(time.size, speed)})
+    _, skipped = applicable_effects([pick_effect("speed_varying")], [record_of(flown, Axis.YAW)])
+    assert skipped == {"speed_varying": f"needs surge, and {why}"}
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 from truth.pilots import Autopilot, excited
 from truth.vehicle import Fins, Sea, fly_vehicle
 
-from fieldsid.fitting.checks.authority_checks import confounded_with
+from fieldsid.fitting.checks.authority_checks import confounded_with, far_from_zero
 from fieldsid.fitting.fit import Fit
 from fieldsid.fitting.identify import identify
 from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
@@ -104,3 +104,9 @@ def test_of_many_parameters_those_are_named_whose_knowledge_helps():
     assert set(twins) < {0, 1}
     assert error == pytest.approx(np.sqrt(np.linalg.inv(np.delete(np.delete(j.T @ j, twins, 0), twins, 1))[-1, -1]))
     assert confounded_with(known, 2, 0.2)[0] == []
+
+
+def test_how_far_a_value_is_from_zero_is_said_by_the_number_that_was_compared():
+    assert far_from_zero(-1.58, 0.5277) == "is 2.99 standard errors from zero, less than 3"
+    assert far_from_zero(-2.9998, 1.0) == "is 2.9998 standard errors from zero, less than 3"
+    assert far_from_zero(1.0, 0.6) == "cannot be told from zero"

@@ -1,0 +1,51 @@
+"""The verdict says what the table below it says, and holds nothing that does not settle."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from fieldsid.plant.parameter_source import load_parameter_source
+from fieldsid.schedule.make import design_schedule
+from fieldsid.schedule.verdict import Gate, against_constant, verdict_of
+from fieldsid.schedule.verify import verify_schedule
+from fieldsid.schedule.wish import Wish
+
+LIMIT = 0.26
+
+
+def source_of(folder, text):
+    path = folder / "table.csv"
+    path.write_text(text)
+    return load_parameter_source([path])
+
+
+def test_the_verdict_the_comparison_and_the_table_have_one_time_to_settle(tmp_path):
+    source = source_of(tmp_path, "speed_m_s,a22,b2,C0\n1.0,0.8,-0.6,0.0\n1.4,1.1,-1.2,0.0\n1.8,1.4,-1.9,0.0\n")
+    schedule = design_schedule(source, LIMIT, wish=Wish("pd"))
+    checked = verify_schedule(schedule, source, draws=8)
+    slowest = f"{max(c.settling for c in checked.scheduled):.1f}"
+    assert max(c.outcome.settled for c in checked.scheduled) > float(slowest) + 0.1, "what the rows are sought by is another one"
+    (said,) = re.findall(r"settles within ([\d.]+) s at every speed", verdict_of(checked, schedule, ())[1])
+    (compared,) = re.findall(r"settles in ([\d.]+) s with the schedule", against_constant(checked))
+    assert said == compared == slowest
+
+
+def test_a_small_step_that_stays_off_is_no_schedule_that_holds(tmp_path):
+    rows = "1.0,1.2,0.05,-0.5,0.00\n1.45,1.7,0.05,-1.0,0.003\n1.9,2.2,0.05,-1.8,0.00\n"
+    source = source_of(tmp_path, f"speed_m_s,c22,c23,d2,Cb\n{rows}")
+    schedule = design_schedule(source, LIMIT, speeds=[1.0, 1.9], wish=Wish("p"))
+    checked = verify_schedule(schedule, source, draws=8)
+    small, usual, _ = checked.scheduled[1].steps
+    assert small.settling == pytest.approx(float("inf"))
+    assert usual.settling < 10.0, "of the standard step the offset is within 5 %"
+    verdict, says = verdict_of(checked, schedule, ())
+    assert verdict == "does not hold"
+    assert re.match(r"at 1\.45 m/s a 2 deg step is not within 5 % after \d+ s: it is still 0\.\d+ deg off", says)
+
+
+def test_a_gate_that_fails_by_little_shows_that_it_does():
+    gate = Gate("phase_margin_deg", 45.0, 44.98, 1.4, at_least=True)
+    assert not gate.passed
+    assert gate.says == "phase_margin_deg 44.98 at 1.40 m/s, wanted at least 45"
