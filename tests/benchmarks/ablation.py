@@ -15,7 +15,6 @@ import json
 import os
 import sys
 import time
-from importlib import import_module
 from pathlib import Path
 from unittest.mock import patch
 
@@ -34,7 +33,9 @@ SEARCH, MOVES = "fieldsid.diagnosis.search", "fieldsid.diagnosis.moves"
 STAGES = {
     "nothing left out": [],
     "whole_hull": [(f"{SEARCH}.search", "whole_hull", lambda base, *_of: base)],
-    "variants": [(f"{SEARCH}.search", "try_variants", lambda *_of: None), (f"{MOVES}.grow", "try_variants", lambda *_of: None)],
+    "variants": [(f"{SEARCH}.search", "try_variants", lambda *_of: False), (f"{MOVES}.grow", "try_variants", lambda *_of: False)],
+    "laws": [(f"{SEARCH}.search", "under_other_law", lambda *_of: None)],
+    "free_run": [(f"{MOVES}.grounds", "Grounds.fit_from_the_free_run", lambda _grounds, h: h.likelihood_fit)],
     "refit": [(f"{SEARCH}.search", "refit_from_parts", lambda *_of: False)],
     "drop": [(f"{SEARCH}.search", "drop_each", lambda *_of: False)],
 }
@@ -45,7 +46,7 @@ def asked(folder, stage):
     """The answer to one case without a stage: its kind, what is right, and the time."""
     about = json.loads((folder / "case.json").read_text(encoding="utf-8"))
     training, validation = ([run_of(folder / name) for name in about[part]] for part in ("train", "valid"))
-    patches = [patch.object(import_module(module), name, new) for module, name, new in STAGES[stage]]
+    patches = [patch(f"{module}.{name}", new) for module, name, new in STAGES[stage]]
     for one in patches:
         one.start()
     began = time.process_time()
