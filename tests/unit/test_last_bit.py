@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from fieldsid.diagnosis.data.holdout_split import holdout_split
-from fieldsid.diagnosis.evidence import likelihood_fit, noise_kind
+from fieldsid.diagnosis.evidence import noise_kind
 from fieldsid.diagnosis.moves import speed_law_search
 from fieldsid.diagnosis.parallel_map import ParallelMap
-from fieldsid.effects import pick_effect
 from fieldsid.fitting.initial.joint_grid_search import _first_least
-from fieldsid.fitting.problem.parameters import layout_of, speed_groups
+from fieldsid.fitting.problem.parameters import speed_groups
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.record import record_of
@@ -117,34 +116,6 @@ def test_models_of_one_speed_share_every_speed_alike(tmp_path, speeds):
 @pytest.mark.parametrize("bits", [(1.0, 1.0), (1.0, 1.0 - 1e-15), (1.0 - 1e-15, 1.0)])
 def test_the_first_of_grid_points_that_cost_the_same_is_taken(bits):
     assert _first_least(np.array([[3.0, *bits, 2.0], [1.0, 0.9, 0.9, 0.9]])).tolist() == [1, 1]
-
-
-@pytest.mark.parametrize("gained", [-5.9, -0.4, -1e-12, 0.0, 1e-12, 0.4, 5.9, 6.1, -6.1])
-@pytest.mark.parametrize(("lag", "other"), [(0.2, 0.9), (0.9, 0.2)])
-def test_of_two_starts_that_are_alike_the_smaller_effect_is_kept(monkeypatch, record, gained, lag, other):
-    effect = pick_effect("servo_lag")
-    problem = SimpleNamespace(layout=layout_of([record], Axis.YAW, (effect,)))
-    place = problem.layout.names.index("lag")
-
-    def judged(value, likelihood):
-        x = np.zeros(place + 1)
-        x[place] = value
-        return SimpleNamespace(
-            fitted=SimpleNamespace(problem=problem, x=x, effects=(effect,)),
-            log_likelihood=likelihood,
-            noise=None,
-            floor=None,
-            noise_kind="",
-        )
-
-    def exchanged(_problem, x, _effect):
-        return np.where(x == lag, other, np.where(x == other, lag, x))
-
-    monkeypatch.setattr(likelihood_fit, "equivalent_solution", exchanged)
-    monkeypatch.setattr(likelihood_fit, "fit_maximum_likelihood", lambda *_of, **_and: judged(other, 100.0 + gained))
-    kept = likelihood_fit.prefer_smaller_equivalent(judged(lag, 100.0), effect).fitted.x[place]
-    # beyond the prior odds against a servo slower than its hull the likelier one is
-    assert kept == (min(lag, other) if abs(gained) < 6.0 else (other if gained > 0.0 else lag))
 
 
 @pytest.mark.parametrize(

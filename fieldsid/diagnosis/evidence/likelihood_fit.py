@@ -143,22 +143,6 @@ def largest_own_moment(problem: Problem, x: FloatArray) -> float:
     return FIN_REPEATABILITY_RAD * max(abs(problem.base_of(x, run).authority) for run in range(len(problem.records)))
 
 
-def prefer_smaller_equivalent(ml_fit: LikelihoodFit, effect: Effect) -> LikelihoodFit:
-    """Return the fit, or the fit from its equivalent solution where that is likelier; a priori the smaller coefficient is.
-
-    The equivalent solution has the same response at one speed (see `Effect.equivalent_solution`).
-    """
-    problem = ml_fit.fitted.problem
-    other = equivalent_solution(problem, ml_fit.fitted.x, effect)
-    if other is None:
-        return ml_fit
-    # the fit stops early where it cannot overtake the first one even with the largest penalty
-    most = ml_fit.log_likelihood - ALTERNATIVE_LOG_ODDS * len(ml_fit.fitted.effects)
-    twin = fit_maximum_likelihood(problem, other, ml_fit.noise, ml_fit.floor, ml_fit.noise_kind, rival=most)
-    own, others = (j.log_likelihood - exchange_penalty(j) for j in (ml_fit, twin))
-    return twin if others > own else ml_fit
-
-
 def exchange_penalty(ml_fit: LikelihoodFit) -> float:
     """Return the prior log odds against effects that are at the larger of two equivalent coefficients.
 

@@ -18,16 +18,11 @@ from fieldsid.fitting.initial.effect_screen import (
     ScreenResult,
     backtrack,
     linearise_at,
-    scan_points,
     screen_points,
-    shifts_time,
-    with_effect,
 )
-from fieldsid.fitting.initial.equation_error import equation_error_start
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of, levenberg_marquardt
 from fieldsid.models.effect import Effect, with_variant
-from fieldsid.models.record import Record
-from fieldsid.numerics.arrays import BoolArray, FloatArray
+from fieldsid.numerics.arrays import FloatArray
 from fieldsid.rounding import nine_digits
 
 T = TypeVar("T")
@@ -56,28 +51,25 @@ MAX_ITERATED_POINTS = 4
 """Scan points of an effect that are iterated."""
 MIN_EVENT_SEPARATION_SHARE = 0.1
 """Share of a run by which two times of an event must differ to be two separate starts."""
-MAX_TIME_SHIFTS, TIME_SHIFT_ITERATIONS = 3, 12
-"""Time shifts that are iterated, and the iterations of each."""
 
 
 @dataclass(frozen=True, slots=True)
 class Addition:
     """A request to add one of some effects to a model: the `most` best of each screen, and all their starts where that is None.
 
-    `is_base`: of the base, which may be far from the measurement, the free run is screened too, and time shifts are iterated,
-    because a model that lacks one has biased parameters (see `_iterate_time_shift`).
+    `flown`: the free run is screened too, where the parent may be far from the measurement.
     """
 
     parent: ScoredModel
     effects: Sequence[Effect]
     most: int | None = None
-    is_base: bool = False
+    flown: bool = False
 
     def screens(self) -> list[_Screen]:
         """Return the screens of its effects; none for a parent that diverges, which cannot be linearised."""
         if not np.isfinite(self.parent.likelihood_fit.log_likelihood):
             return []
-        flown = [_Screen(self, _output_error_linearisation(self.parent), by_output_error=True)] if self.is_base else []
+        flown = [_Screen(self, _output_error_linearisation(self.parent), by_output_error=True)] if self.flown else []
         return [*flown, _Screen(self, likelihood_linearisation(self.parent), by_output_error=False)]
 
 
@@ -124,11 +116,7 @@ class _Screen:
             first = first_few(ranked, most + follows * EXTRA_ITERATED_EFFECTS, lambda points: points[0].effect)
             ranked = [p for p in first if self.linearisation.cost - p[0].predicted_cost > self._least_fall(p[0].effect)]
         way = iterate_points if follows else _backtracked
-        steps = [_PendingMove(self, follows, partial(way, self.linearisation, p)) for p in ranked]
-        if self.by_output_error:
-            shifts = [e for e in mechanisms(self.asked.effects) if shifts_time(e)]
-            steps += [_PendingMove(self, False, partial(_iterate_time_shift, self.linearisation, e)) for e in shifts]
-        return steps
+        return [_PendingMove(self, follows, partial(way, self.linearisation, p)) for p in ranked]
 
     def _least_fall(self, effect: Effect) -> float:
         """Return the fall of the cost that an effect must promise."""
@@ -263,33 +251,3 @@ def iterate_points(
         )
         tried.append(replace(screened, predicted_cost=found.cost, start=found.x))
     return min(tried, key=lambda p: p.predicted_cost)
-
-
-def _iterate_time_shift(linearisation: Linearisation, effect: Effect) -> ScreenResult:
-    """Return the screen result of an effect that shifts time: the best scan point after a few iterations.
-
-    A model that lacks a time shift has biased parameters, which no first-order step repairs. So the base parameters are estimated
-    again from the measurement shifted back.
-    """
-    base, starts = linearisation.problem.layout, []
-    for values in scan_points(linearisation, effect):
-        moved = [advance_measurement(r, next(iter(values.values()))) for r in linearisation.problem.records]
-        x = linearisation.x.copy()
-        x[: base.shared] = equation_error_start(moved, base)[: base.shared]
-        problem, start = with_effect(linearisation.problem, x, effect, values)
-        starts.append((cost_of(problem, start, linearisation.noise), problem, start))
-    tried = []
-    for _, problem, start in sorted(starts, key=lambda s: s[0])[:MAX_TIME_SHIFTS]:
-        found = levenberg_marquardt(problem, start, linearisation.noise, max_iterations=TIME_SHIFT_ITERATIONS, tolerance=1e-3)
-        tried.append(ScreenResult(effect, found.cost, start, found.x, problem))
-    return min(tried, key=lambda p: p.predicted_cost)
-
-
-def advance_measurement(record: Record, late_s: float) -> Record:
-    """Return a record with its measurement taken late_s seconds later, which removes a delay of that length."""
-    then = record.time + late_s
-
-    def moved(values: FloatArray, ok: BoolArray) -> FloatArray:
-        return np.interp(then, record.time[ok], values[ok]) if ok.any() else values
-
-    return replace(record, angle=moved(record.angle, record.angle_ok), rate=moved(record.rate, record.rate_ok))

@@ -17,7 +17,6 @@ from fieldsid.diagnosis.evidence.acceptance import (
 from fieldsid.diagnosis.evidence.likelihood_fit import (
     LikelihoodFit,
     fit_output_error,
-    prefer_smaller_equivalent,
 )
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.moves.add_effect import (
@@ -66,17 +65,14 @@ class Growth:
 
     def grow(self) -> None:
         """Put into the archive the parent with each effect that passes the screens."""
-        is_root, tried = self.key == self.tried.known, self.tried
-        tried.expanded.add(self.key)
+        is_root = self.key == self.tried.known
+        self.tried.expanded.add(self.key)
         most = None if self.forced else MAX_EFFECTS_AT_BASE if is_root else MAX_EFFECTS_LATER
-        groups = by_effects(screen_addition(Addition(self.parent, self.effects, most, is_base=is_root), self.grounds.parallel))
+        groups = by_effects(screen_addition(Addition(self.parent, self.effects, most, flown=is_root), self.grounds.parallel))
         if self.forced:
             self.evaluate(groups)
         else:
             self._evaluate_foremost(groups)
-        if is_root and self._is_lost(tried.children(self.key)):
-            rest = [e for e in self.effects if e.variants and self.key | {e.name} not in tried]
-            self.evaluate(by_effects(screen_addition(Addition(self.parent, rest), self.grounds.parallel)))
         if self.may_refine():
             self._try_variants(self._leading())
 
@@ -115,17 +111,13 @@ class Growth:
                 self.tried[group[0].names] = found
 
     def _fitted(self, move: SearchMove, rival: float) -> LikelihoodFit:
-        """Fit the model of a move by maximum likelihood, and from the equivalent solution with the same response at one speed.
-
-        A move screened by output error is first fitted by output error.
-        """
+        """Fit the model of a move by maximum likelihood, first by output error where it was screened by that."""
         screened, of_parent = move.screened, move.parent.likelihood_fit
         self.grounds.report("+".join((*move.parent.names, screened.effect.name)))
         start = screened.start
         if move.by_output_error:
             start = fit_output_error(screened.problem, start, of_parent.fitted.weights).x
-        ml_fit = self.grounds.fit(screened.problem, start, of_parent.noise, rival=rival)
-        return prefer_smaller_equivalent(ml_fit, screened.effect)
+        return self.grounds.fit(screened.problem, start, of_parent.noise, rival=rival)
 
     def _leading(self) -> list[Names]:
         """Return the children worth refining: the best few, and the one with most evidence on the training runs.
