@@ -149,7 +149,7 @@ def check_signals(records: Sequence[Record], effects: Sequence[str]) -> tuple[Ef
     missing = [f"{name} needs {role}, {r.why_without(role)} ({r.name})" for name, r, role in lacking]
     if missing:
         raise DataError(
-            "an effect needs a signal that there is not",
+            "an effect needs a signal that a run does not give",
             found="; ".join(missing),
             hint="map the signal on import, where the log has it, or leave the effect out",
         )

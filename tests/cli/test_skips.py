@@ -90,7 +90,7 @@ def test_a_run_without_a_signal_that_an_effect_needs_is_skipped(run_cli, good, t
     rolling = save_run(replace(run, signals={**run.signals, "roll_rad": roll}), tmp_path / "rolling.parquet")
     answer = run_cli("identify", rolling, good[1], "--axis", "yaw", "--effects", "roll_coupling", "--json")
     (skipped,) = skipped_in(answer)
-    assert skipped["found"] == "roll_coupling needs roll (v1.6)"
+    assert skipped["found"] == "roll_coupling needs roll, which the log lacks (v1.6)"
 
 
 def test_compare_goes_on_with_the_others(run_cli, good, bad, tmp_path):
