@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from fieldsid.dynamics.free_run import effects_of
 from fieldsid.errors import EffectError, ModelError
+from fieldsid.models.effect import is_on_bound
 from fieldsid.models.model import Model
-
-BOUND_SHARE = 1e-6
-"""Share of the range of a coefficient from a bound within which it stands on it."""
 
 
 def at_bound(model: Model) -> frozenset[str]:
@@ -16,5 +14,4 @@ def at_bound(model: Model) -> frozenset[str]:
         every = [c for effect in effects_of(model) for c in effect.shared]
     except (EffectError, ModelError):
         return frozenset()
-    apart = {c.name: min(model.values[c.name] - c.low, c.high - model.values[c.name]) / (c.high - c.low) for c in every}
-    return frozenset(name for name, share in apart.items() if share <= BOUND_SHARE)
+    return frozenset(c.name for c in every if is_on_bound(model.values[c.name], c.low, c.high))

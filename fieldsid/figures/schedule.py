@@ -24,7 +24,7 @@ STOP_SHARE = 0.999
 
 
 def figure(schedule: Schedule, verification: Verification) -> Figure:
-    """Return gains, feed-forward, margins and a a leg in the disturbance, if any, at the left; steps and fin at the right."""
+    """Return gains, feed-forward, margins and a leg in the disturbance, if any, at the left; steps and fin at the right."""
     sheet = canvas.sheet(12.0, 11.0)
     left, right = np.asarray(sheet.subfigures(1, 2, width_ratios=(1.0, 1.15)), dtype=object)
     disturbance = verification.disturbance

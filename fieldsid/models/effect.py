@@ -34,6 +34,8 @@ MomentHook = Callable[["Motion", Values, "Record"], FloatArray]
 
 
 REGISTRY = "fieldsid.effects"
+BOUND_SHARE = 1e-6
+"""Share of the range of a number from a bound within which it stands on it."""
 
 
 class Stage(StrEnum):
@@ -264,6 +266,11 @@ def as_fitted(effect: Effect, values: Values) -> Effect:
     """Return an effect in the form that a model's values belong to."""
     form = variant_of(effect, values)
     return effect if form is None else with_variant(effect, form)
+
+
+def is_on_bound(value: float, low: float, high: float) -> bool:
+    """Whether a number stands on one of its bounds."""
+    return min(value - low, high - value) <= BOUND_SHARE * (high - low)
 
 
 def over_intervals(values: FloatArray) -> FloatArray:

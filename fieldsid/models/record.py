@@ -272,17 +272,25 @@ def fin_holes(run: Run, axis: Axis) -> tuple[Note, ...]:
 
 def knows_speed(run: Run) -> bool:
     """Whether a run's surge is that of a vehicle under way: sensors that are not fitted are logged as zero."""
-    low, high = SPEED_LIMITS_M_S
-    return run.has(ROLES["surge"]) and low < float(np.nanmedian(run[ROLES["surge"]])) < high
+    return run.has(ROLES["surge"]) and speed_beyond(run) is None
+
+
+def speed_beyond(run: Run) -> tuple[float, float] | None:
+    """Return the median (m/s) of a run's surge and the limit (m/s) that it lies beyond; None within both, and without surge."""
+    if not run.has(ROLES["surge"]):
+        return None
+    middle, (low, high) = float(np.nanmedian(run[ROLES["surge"]])), SPEED_LIMITS_M_S
+    return None if low < middle < high else (middle, high if middle >= high else low)
 
 
 def speed_refused(run: Run) -> str:
     """Return why a run's surge is not taken for its speed, in words; empty where it is, and where there is none."""
-    if not run.has(ROLES["surge"]) or knows_speed(run):
+    beyond = speed_beyond(run)
+    if beyond is None:
         return ""
-    middle, (low, high) = float(np.nanmedian(run[ROLES["surge"]])), SPEED_LIMITS_M_S
-    limit = f"above the {high:g} m/s of any vehicle in water" if middle >= high else f"below the {low:g} m/s of one under way"
-    return f"surge_m_s is {beside(middle, high if middle >= high else low)} m/s in the middle, {limit}"
+    middle, limit = beyond
+    side = "above the {:g} m/s of any vehicle in water" if middle >= limit else "below the {:g} m/s of one under way"
+    return f"surge_m_s is {beside(middle, limit)} m/s in the middle, {side.format(limit)}"
 
 
 def _measured(run: Run, name: str) -> tuple[FloatArray, npt.NDArray[np.bool_]]:

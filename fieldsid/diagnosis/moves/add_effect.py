@@ -115,7 +115,7 @@ class _Screen:
         if most is not None:
             first = first_few(ranked, most + follows * EXTRA_ITERATED_EFFECTS, lambda points: points[0].effect)
             ranked = [p for p in first if self.linearisation.cost - p[0].predicted_cost > self._least_fall(p[0].effect)]
-        way = iterate_points if follows else _backtracked
+        way = _iterated if follows else _backtracked
         return [_PendingMove(self, follows, partial(way, self.linearisation, p)) for p in ranked]
 
     def _least_fall(self, effect: Effect) -> float:
@@ -239,15 +239,13 @@ def _backtracked(linearisation: Linearisation, points: Sequence[ScreenResult]) -
     return backtrack(linearisation, points[0])
 
 
-def iterate_points(
-    linearisation: Linearisation, points: Sequence[ScreenResult], max_iterations: int = SCREEN_ITERATIONS
-) -> ScreenResult:
+def _iterated(linearisation: Linearisation, points: Sequence[ScreenResult]) -> ScreenResult:
     """Return the best of some scan points after a few Levenberg-Marquardt iterations, its cost the one reached."""
     tried = []
     for point in points:
         screened = backtrack(linearisation, point)
         found = levenberg_marquardt(
-            screened.problem, screened.start, linearisation.noise, max_iterations=max_iterations, tolerance=1e-3
+            screened.problem, screened.start, linearisation.noise, max_iterations=SCREEN_ITERATIONS, tolerance=1e-3
         )
         tried.append(replace(screened, predicted_cost=found.cost, start=found.x))
     return min(tried, key=lambda p: p.predicted_cost)

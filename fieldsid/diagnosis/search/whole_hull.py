@@ -2,8 +2,8 @@
 
 Every real hull has a cross state (sway or heave), a servo lag, drag that grows with the square of the rate, and loses speed in a
 turn. Steps from the bare model go astray among the four, because each effect alone fits a part of the others. So all four are
-added one after another, whatever each gains alone, each from its few most promising scan points at the fit before it.
-What the data do not show of it is dropped again.
+added one after another, whatever each gains alone, each from its few most promising scan points at the fit before it. Which of
+them the data do not show is found by leaving each out.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from fieldsid.logs.doctor.fin_findings import BEYOND_SHARE, share_beyond
 from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
-from fieldsid.models.record import SPEED_LIMITS_M_S, fin_holes, speed_refused
+from fieldsid.models.record import fin_holes, speed_beyond, speed_refused
 from fieldsid.numerics.white_noise import white_noise_std
 from fieldsid.vehicle import Vehicle
 
@@ -61,14 +61,14 @@ def _limit(run: Run, axis: Axis, vehicle: Vehicle | None) -> Iterator[Note]:
 
 
 def _speed(run: Run) -> Iterator[Note]:
-    why = speed_refused(run)
-    if not why:
+    beyond = speed_beyond(run)
+    if beyond is None:
         return
-    middle, (low, high) = float(np.nanmedian(run["surge_m_s"])), SPEED_LIMITS_M_S
+    (middle, limit), why = beyond, speed_refused(run)
     yield Note(
         "no_speed",
         f"run {run.name!r}: {why}, so the speed is taken as not measured; correct its sign or unit, or map another one",
-        {"value": middle, "limit": low if middle <= low else high, "signal": "surge_m_s", "run": run.name},
+        {"value": middle, "limit": limit, "signal": "surge_m_s", "run": run.name},
     )
 
 

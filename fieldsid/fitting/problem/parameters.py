@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Coefficient, Effect, with_one_cross_state
+from fieldsid.models.effect import Coefficient, Effect, is_on_bound, with_one_cross_state
 from fieldsid.models.record import Record
 from fieldsid.models.speed_law import GROUP_WIDTH, TRIM_OF_FIN, SpeedLaw, with_speed
 from fieldsid.numerics.arrays import BoolArray, FloatArray
@@ -24,8 +24,6 @@ EVENT_UNIT = "run"
 """Unit of the time of an event, a share of its run."""
 GROUP_WIDTH_TRAINED = 0.12
 """A run this near to a group counts as of it, where the training runs showed that a group shares its parameters."""
-BOUND_SHARE = 1e-6
-"""Share of a parameter's range from its bound within which it lies on it."""
 BASE_BOUNDS = {"damping": (-10.0, 100.0), "stiffness": (-20.0, 100.0), "authority": (-500.0, 500.0), "trim": (-50.0, 50.0)}
 
 
@@ -148,7 +146,7 @@ class ParameterLayout:
     def on_bound(self, x: FloatArray) -> list[Parameter]:
         """Return the shared parameters that a vector has on one of their bounds."""
         shared = zip(self.parameters[: self.shared], x[: self.shared].tolist(), strict=True)
-        return [p for p, value in shared if min(value - p.low, p.high - value) <= BOUND_SHARE * (p.high - p.low)]
+        return [p for p, value in shared if is_on_bound(value, p.low, p.high)]
 
     def shown(self, name: str) -> str:
         """Return a shared parameter's name as it is printed: that of several runs with the speed it belongs to."""
