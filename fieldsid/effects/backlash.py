@@ -1,7 +1,8 @@
 """Play in the linkage: the fin stays until the command has crossed the gap, then follows half a gap behind (play operator).
 
     delta <- min(max(delta, command - gap/2), command + gap/2),   gap >= 0 in rad
-The fin starts in the middle of the play. Source: Nordin and Gutman 2002, Controlling mechanical systems with backlash.
+A trimmed fin hangs at one end of the play before the run, or anywhere in it: where it starts is each run's own number, in
+halves of the gap off its middle. Source: Nordin and Gutman 2002, Controlling mechanical systems with backlash.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ from fieldsid.numerics.jit import jit
 
 
 @jit
-def played(start: FloatArray, end: FloatArray, gap: float, out: FloatArray) -> None:
-    """Fill out (n-1, 4) with line and ends of the path behind a play of width `gap`."""
+def played(start: FloatArray, end: FloatArray, gap: float, begins: float, out: FloatArray) -> None:
+    """Fill out (n-1, 4) with line and ends of the path behind a play of width `gap`, from where in it the fin begins (-1..1)."""
     half = 0.5 * gap
-    fin = start[0]
+    fin = start[0] + begins * half
     for i in range(start.shape[0]):
         first = min(max(fin, start[i] - half), start[i] + half)
         last = min(max(first, end[i] - half), end[i] + half)
@@ -38,11 +39,14 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     """Return the path of a fin behind a play of `gap`, (n-1,) rad."""
     if values["gap"] <= 0.0:
         return path
-    gap = float(values["gap"])
-    return through(path, record.steps, lambda _steps, start, end, out: played(start, end, gap, out))
+    gap, begins = float(values["gap"]), float(values.get("gap_start", 0.0))
+    return through(path, record.steps, lambda _steps, start, end, out: played(start, end, gap, begins, out))
 
 
 GAP = Coefficient("gap", "rad", 0.0, 0.3, 0.05, step=5e-4, says="full width of the play")
+START = Coefficient(
+    "gap_start", "1", -1.0, 1.0, 0.0, step=1e-2, per_run=True, of_start=True, says="where in the play the fin starts, -1 to 1"
+)
 
 EFFECT = Effect(
     name="backlash",
@@ -50,7 +54,7 @@ EFFECT = Effect(
     stage=Stage.ACTUATOR,
     axes=(Axis.YAW, Axis.PITCH),
     equation="delta = play(command, gap): |delta - command| <= gap/2, and delta rests inside",
-    coefficients=(GAP,),
+    coefficients=(GAP, START),
     telltale="the same command gives two different rates, by whether it was reached from port or from starboard",
     excited_by=("stairs", "multisine", "chirp", "three_two_one_one", "square_pulses"),
     mistaken_for=("deadband", "servo_lag", "asymmetric_fin", "stall"),

@@ -52,7 +52,8 @@ class Coefficient:
 
     `scan` gives start values tried before the descent; `step` is the half width of the central difference. `per_run` marks a
     nuisance (a phase, an event time) that every run has of its own and that is refitted on validation runs; its bounds are
-    fractions of the run's length when `unit` is "run". `rate_exponent` is the power of the hull's characteristic rate (1/s) that
+    fractions of the run's length when `unit` is "run". `of_start` marks one that is where a hidden state begins, which the run
+    soon forgets. `rate_exponent` is the power of the hull's characteristic rate (1/s) that
     scales the points of the grid: the coefficients of a slow hull are small.
     """
 
@@ -65,6 +66,7 @@ class Coefficient:
     step: float = 1e-4
     rate_exponent: int = 0
     per_run: Annotated[bool, Key("Whether every run has its own.")] = False
+    of_start: bool = False
     says: Annotated[str, Key("What it is.")] = ""
 
 

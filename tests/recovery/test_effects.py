@@ -72,6 +72,18 @@ def test_the_coefficients_that_were_put_in_come_back(case):
     assert with_it < 0.2 * without
 
 
+def test_a_run_that_starts_at_one_end_of_the_play_shows_the_whole_gap():
+    (case,) = (c for c in CASES if c.name == "backlash")
+    log = flight(case)
+    moved = 200 + int(np.argmax(np.abs(np.diff(log["rudder_rad"][200:600]))))
+    late = cut(log, moved + 2)  # the fin hangs half a gap behind the command, on the side it came from
+    found = fit(
+        [record_of(Run(case.name, late.pop("time_s"), late), case.axis)], case.axis, method="output_error", effects=[case.name]
+    )
+    assert found.model.values["gap"] == pytest.approx(case.expected["gap"], rel=0.02)
+    assert np.sqrt(np.mean(found.predictions[0].residual ** 2, axis=1)).max() < 5e-5
+
+
 @pytest.mark.parametrize("case", [c for c in CASES if c.name.endswith("_coupling")], ids=lambda c: c.name)
 def test_a_run_that_starts_in_a_turn_shows_the_hidden_state_it_starts_with(case):
     log = flight(case)

@@ -317,8 +317,9 @@ def price_of_runs(effect: Effect, records: Sequence[Record]) -> float:
 
     The start of a hidden state is soon forgotten and speaks on few samples: it costs 1, as Akaike has it.
     """
-    hidden = 1.0 if effect.extra_states else 0.0
-    return sum(0.5 * len(effect.nuisance) * float(np.log(max(measured_count([r]), 2))) + hidden for r in records)
+    starts = bool(effect.extra_states) + sum(c.of_start for c in effect.nuisance)
+    lasting = len(effect.nuisance) - sum(c.of_start for c in effect.nuisance)
+    return sum(0.5 * lasting * float(np.log(max(measured_count([r]), 2))) + starts for r in records)
 
 
 def errors_of(runs: Sequence[FreeRun], own_moment: float) -> Errors:

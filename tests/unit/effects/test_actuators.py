@@ -169,6 +169,8 @@ def test_a_rate_limited_path_agrees_with_small_steps(held, max_rate):
 def test_the_play_operator_by_hand():
     log = record(np.arange(7.0), [0.0, 0.04, 0.2, 0.15, 0.05, 0.2, 0.2], held=True)
     np.testing.assert_allclose(through("backlash", log, gap=0.1).mean, [0.0, 0.0, 0.15, 0.15, 0.1, 0.15], atol=1e-15)
+    behind = through("backlash", log, gap=0.1, gap_start=-1.0).mean  # as it hangs after the command has risen
+    np.testing.assert_allclose(behind, [-0.05, -0.01, 0.15, 0.15, 0.1, 0.15], atol=1e-15)
 
 
 def test_a_moving_command_takes_the_fin_along_once_the_gap_is_crossed():
