@@ -163,9 +163,9 @@ def leaves_error(h: ScoredModel, floor: Noise) -> bool:
 
 def gains_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
     """Whether an addition gains log evidence over all runs, whatever happens to the free-run error."""
-    least = MIN_TRAINING_GAIN if _adds_numbers_of_runs(without, with_) else 0.0
-    learned = with_.log_likelihood - without.log_likelihood > least
-    return learned and with_.log_evidence > without.log_evidence
+    if _adds_numbers_of_runs(without, with_) and not with_.log_likelihood - without.log_likelihood > MIN_TRAINING_GAIN:
+        return False
+    return with_.log_evidence > without.log_evidence
 
 
 def _adds_numbers_of_runs(without: ScoredModel, with_: ScoredModel) -> bool:

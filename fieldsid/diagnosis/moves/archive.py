@@ -65,12 +65,6 @@ class Archive(MutableMapping[Names, ScoredModel]):
         left = ((n, frozenset(h.names) - {n}) for n in h.names if n not in self.known)
         return [(n, self.models[k]) for n, k in left if k in self.models]
 
-    def parts(self, h: ScoredModel) -> list[ScoredModel]:
-        """Return the models of one effect fewer whose optimum a model holds: the others in its variants, under its speed law."""
-        names = set(h.likelihood_fit.fitted.problem.layout.names)
-        less = ((w, w.likelihood_fit.fitted.problem.layout) for _, w in self.without_each(h))
-        return [w for w, layout in less if names > set(layout.names) and all(e in h.effects for e in layout.effects)]
-
     def is_varied(self, h: ScoredModel) -> bool:
         """Whether all effects of a model were tried in other variants at an evidence that it has hardly exceeded since."""
         names = frozenset(h.names)

@@ -12,7 +12,6 @@ from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit, fit_maximu
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, bic_penalty, score_model
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.thresholds import RIVAL_LOG_ODDS
-from fieldsid.fitting.initial.effect_screen import carry_parameters
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
@@ -40,12 +39,6 @@ class Grounds:
     def fit(self, problem: Problem, x: FloatArray, noise: Noise, *, rival: float = -np.inf) -> LikelihoodFit:
         """Return the maximum-likelihood fit from x and a noise; stopped early where it cannot reach a log likelihood, `rival`."""
         return fit_maximum_likelihood(problem, x, noise, self.resolution_floor, self.noise_kind, rival=rival)
-
-    def fit_from(self, h: ScoredModel, other: ScoredModel) -> LikelihoodFit:
-        """Fit a model from another model's parameters where that has them, from its own elsewhere."""
-        here, there = h.likelihood_fit.fitted, other.likelihood_fit.fitted
-        x = carry_parameters(here.problem.layout, there.vector, here.vector)
-        return self.fit(here.problem, x, other.likelihood_fit.noise)
 
     def fit_from_the_free_run(self, h: ScoredModel) -> LikelihoodFit:
         """Fit a model from its output-error fit, which no disturbance can lead to an optimum where it does the work."""

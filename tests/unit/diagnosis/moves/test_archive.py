@@ -58,14 +58,6 @@ def test_children_come_by_their_evidence_and_what_diverges_is_not_ranked(base):
     assert tried.most_evident() is max((base, stall), key=lambda h: h.log_evidence)
 
 
-def test_a_part_has_the_other_effects_in_the_same_variants(base):
-    both = model(base, "servo_lag", "stall", formed="stall")
-    plain, formed = model(base, "stall"), model(base, "stall", formed="stall")
-    lag = model(base, "servo_lag")
-    assert archive(base, both, plain, lag).parts(both) == [lag]
-    assert archive(base, both, formed, lag).parts(both) == [formed, lag]
-
-
 def test_a_model_is_thinned_again_once_its_evidence_has_grown(base):
     tried = archive(base, both := model(base, "servo_lag", "stall", evidence=3.0))
     assert not tried.is_thinned(both)
