@@ -15,6 +15,7 @@ from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.diagnosis.data.heading_span import shown_by_headings
 from fieldsid.diagnosis.data.holdout_split import holdout_split
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
+from fieldsid.diagnosis.evidence.acceptance import compared_error
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
 from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, with_free_run
@@ -169,7 +170,7 @@ def _diagnosis(
         base=base.errors,
         final=named.errors,
         noise_floor=floor,
-        candidates=_candidates(end, floor, 1.0 if work.is_noiseless else left.ratio),
+        candidates=_candidates(end, floor, 1.0 if work.is_noiseless else compared_error(base, found, floor)),
         model=model,
         base_model=base_model,
         where=where,
@@ -208,7 +209,7 @@ def _of_the_user(work: Search) -> list[str]:
 
 
 def _candidates(end: _SearchResult, floor: Noise, left: float) -> tuple[Candidate, ...]:
-    """Return the leading models as candidates of a diagnosis that leaves an error over the noise floor."""
+    """Return the leading models as candidates of a search that ends at an error `left` over the noise floor."""
     work, sums = end.work, end.work.evidences()
     p = probabilities(sums, left)
 

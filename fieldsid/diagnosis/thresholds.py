@@ -80,8 +80,6 @@ SHARES_TO_EXPLAIN = ((0.7, CERTAIN_P_VALUE), (0.6, 1e-3), (0.3, MIN_P_VALUE))
 is never exact, but the less it explains the less it may leave."""
 SHARES_TO_EXPLAIN_MISSING = ((0.85, 1e-6),)
 """The same in addition where it leaves an error above MISSING_ERROR_RATIO."""
-SHARES_TO_EXPLAIN_FAR = ((0.97, 1e-6),)
-"""The same where it leaves one above FAR_ERROR_RATIO: there, any effect that bends the response explains most of the excess."""
 MIN_EXPLAINED_SHARE = SHARES_TO_EXPLAIN[0][0]
 """The largest of those shares that is asked whatever the error."""
 LEAST_EXPLAINED_SHARE = SHARES_TO_EXPLAIN[-1][0]

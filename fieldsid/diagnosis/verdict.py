@@ -34,7 +34,6 @@ from fieldsid.diagnosis.thresholds import (
     MISSING_ERROR_RATIO,
     RIVAL_LOG_ODDS,
     SHARES_TO_EXPLAIN,
-    SHARES_TO_EXPLAIN_FAR,
     SHARES_TO_EXPLAIN_MISSING,
     SUFFICIENT_ERROR_RATIO,
     UNTRIED_LEAST,
@@ -60,7 +59,8 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     verdict is `sufficient` if training and validation errors are within SUFFICIENT_ERROR_RATIO; else `disturbed` if the
     innovations pass the tests of a disturbance, and `unexplained` if not. The same two verdicts are given where the effects found
     leave a visible error on the validation runs that is no smaller than without them, explain less than half of a large error, or
-    are hardly more evident than no effect: such an effect may exist and is still not what is missing. A moment of the water, such
+    are hardly more evident than no effect: such an effect may exist and is still not what is missing. Nothing is named where
+    so much is left that what is hidden is more probably in no set tried, see `untried_probability`. A moment of the water, such
     as a wave, is not named where the remaining error surely follows another measured signal, because the moment of a rolling hull
     oscillates as that of a wave does.
     """
@@ -78,11 +78,11 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     doubtful = sums[frozenset(found.names)] - sums.get(search.root, -np.inf) < RIVAL_LOG_ODDS
     if visible and (minor or doubtful or not now.mean < was.mean):
         return _unnamed(found, left, floor)
-    more = SHARES_TO_EXPLAIN_MISSING if error <= FAR_ERROR_RATIO else SHARES_TO_EXPLAIN_FAR
-    asked = (*SHARES_TO_EXPLAIN, *(more if large else ()))
+    asked = (*SHARES_TO_EXPLAIN, *(SHARES_TO_EXPLAIN_MISSING if large else ()))
     added = [e for e in found.effects if e.name not in search.known]
+    doubted = not search.is_noiseless and untried_probability(error) > 0.5
     follows = 3.0 * left.signals < CERTAIN_P_VALUE and any(e.is_of_the_water for e in added)
-    if follows or (visible and any(left.p < p and share < enough for enough, p in asked)):
+    if doubted or follows or (visible and any(left.p < p and share < enough for enough, p in asked)):
         return Verdict("unexplained", ())
     rivals = rivals_of(search, found)
     if rivals:

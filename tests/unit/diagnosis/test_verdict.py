@@ -90,6 +90,13 @@ def test_an_effect_must_explain_most_of_what_all_runs_show_and_not_of_the_unseen
     assert judged(monkeypatch, 3.0, 1.56, 0.6, fitted=(2.15, 2.11), runs=runs) == word
 
 
+@pytest.mark.parametrize(
+    ("after", "noiseless", "word"), [(3.5, False, "effect"), (5.0, False, "unexplained"), (5.0, True, "effect")]
+)
+def test_nothing_is_named_where_what_is_hidden_is_more_probably_in_no_set_tried(monkeypatch, after, noiseless, word):
+    assert judged(monkeypatch, 100.0, after, 0.6, noiseless=noiseless) == word
+
+
 def test_a_large_error_on_fitted_runs_is_one_that_is_left(monkeypatch):
     assert judged(monkeypatch, 2.0, 1.1, 1e-9, fitted=(3.5, 3.3), runs=2) == "unexplained"
 
