@@ -86,7 +86,9 @@ class Contents:
     def inventory(self, collector: Collector) -> Inventory:
         """Return the inventory of a bag whose topics were all caught; raises LogError for a bag of which nothing can be read."""
         check_not_empty(self.path, collector)
-        self._refuse_unreadable()
+        errors = [found.error for _, found in sorted(self.topics.items()) if found.error is not None]
+        if errors and len(errors) == len(self.topics):  # such a bag is no log yet
+            raise errors[0]
         names = sorted(t for t in collector.connections if t in self.topics)
         channels = [self._channel(collector.connections[t], collector.packets[t]) for t in names]
         notes = [*collector.notes, *(found.note for _, found in sorted(self.topics.items()) if found.note is not None)]
@@ -95,12 +97,6 @@ class Contents:
         serialization = next((c.serialization for c in collector.connections.values()), "")
         form = {ROS1: "ROS 1 bag", CDR: "ROS 2 bag"}.get(serialization, "bag")
         return Inventory(self.path, form, duration, tuple(channels), notes=tuple(notes))
-
-    def _refuse_unreadable(self) -> None:
-        """Raise the error of the first topic where no topic can be read: such a bag is no log yet."""
-        errors = [found.error for _, found in sorted(self.topics.items()) if found.error is not None]
-        if errors and len(errors) == len(self.topics):
-            raise errors[0]
 
     def _channel(self, connection: Connection, packets: TopicPackets) -> ChannelInfo:
         known = self.topics.get(connection.topic, _Topic())
@@ -142,27 +138,21 @@ def _raw_log(path: Path, collector: Collector, mapping: ChannelMap, topics: list
 
 def check_not_empty(path: Path, collector: Collector) -> None:
     """Raise LogError for a bag without messages."""
-    if not collector.connections:
-        cut = next((n.message for n in collector.notes if n.code in ("truncated", "damaged")), "no topics")
-        raise LogError(f"`{path}` has no messages", found=cut, hint="copy it from the vehicle again")
-    if any(packets.stamps for packets in collector.packets.values()) or (
-        collector.wanted is not None and collector.wanted - collector.connections.keys()
-    ):
+    known, wanted = collector.connections, collector.wanted
+    has_messages = any(packets.stamps for packets in collector.packets.values())
+    if known and (has_messages or (wanted is not None and wanted - known.keys())):
         return
-    topics = ", ".join(sorted(collector.connections)) or "no topics"
-    damage = [n.message for n in collector.notes if n.code in ("truncated", "damaged")]
-    if damage:
-        raise LogError(
-            f"`{path}` holds no message that can be read",
-            found=f"{damage[0]}; topics {topics}",
-            hint="copy it from the vehicle again",
-        )
-    what = "has no messages" if collector.wanted is None else "has no messages on the mapped topics"
-    raise LogError(
-        f"`{path}` {what}",
-        found=topics,
-        hint="check that the recorder ran: its topics and their types are all that is in the file",
+    damage, topics = (
+        next((n.message for n in collector.notes if n.code in ("truncated", "damaged")), ""),
+        ", ".join(sorted(known)),
     )
+    if damage or not known:
+        what = "holds no message that can be read" if known else "has no messages"
+        found = f"{damage}; topics {topics}" if known else damage or "no topics"
+        raise LogError(f"`{path}` {what}", found=found, hint="copy it from the vehicle again")
+    what = "has no messages" if wanted is None else "has no messages on the mapped topics"
+    hint = "check that the recorder ran: its topics and their types are all that is in the file"
+    raise LogError(f"`{path}` {what}", found=topics, hint=hint)
 
 
 def _topic(path: Path, collector: Collector, signal: str, source: Source) -> None:

@@ -94,9 +94,9 @@ def _plain_part(part: Path, collector: Collector) -> Iterator[Path]:
 
 def _unpack_messages(packets: TopicPackets, collector: Collector) -> None:
     """Unpack messages that the recorder compressed one by one; no plain message starts like zstd data."""
-    from fieldsid.logs.readers.bags.containers.decompress import unzstd
+    from fieldsid.logs.readers.bags.containers.decompress import unpacked
 
-    plain = [unzstd(p) if p.startswith(ZSTD) else p for p in packets.payloads]
+    plain = [unpacked(p, "zstd") if p.startswith(ZSTD) else p for p in packets.payloads]
     if None in plain:
         collector.damaged(f"{plain.count(None)} compressed messages on {packets.topic}", {"topic": packets.topic})
     collector.unpacked.add(sum(len(p) for p in plain if p is not None))

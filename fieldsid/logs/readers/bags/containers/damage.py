@@ -6,12 +6,14 @@ They go on at the first place from which several records follow each other.
 from __future__ import annotations
 
 import mmap
+import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from fieldsid.logs.readers.bags.containers.decompress import unpacked
 from fieldsid.logs.readers.bags.packets import LAST_NS, Collector, TopicPackets
 
 Bytes = bytes | mmap.mmap
@@ -57,6 +59,23 @@ class Place:
     is_cut: bool = False
     low: int = 0
     high: int = LAST_NS
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkHead:
+    """What the head of a chunk states: bytes when unpacked, where its records start, its length in words, stamps and checksum."""
+
+    size: int
+    compression: str
+    start: int
+    length: str
+    low: int = 0
+    high: int = LAST_NS
+    crc: int = 0
+
+    def is_wrong(self, plain: bytes) -> bool:
+        """Whether bytes do not have the checksum that is stated; 0 states none."""
+        return self.crc != 0 and zlib.crc32(plain) != self.crc
 
 
 class Records(ABC):
@@ -114,21 +133,44 @@ class Records(ABC):
             self.last.leave_out_last()
             self.last = None
 
-    def packed_chunk(self, plain: bytes | None, says: str, place: Place, data: Bytes, stop: int, *, sure: bool = False) -> int:
-        """Read what a compressed chunk that ends at `stop` holds, None where it is damaged, or leave it out; return its bytes.
+    def take_chunk(self, data: Bytes, pos: int, stop: int, whole: int, head: ChunkHead) -> None:
+        """Read the records of the chunk at `pos` that ends at `stop`, in a file that is not cut at `whole`."""
+        self.collector.has_read(stop - pos)
+        forget(data, pos)
+        place = Place(pos, bool(head.compression), stop < whole, head.low, head.high)
+        got = (self._packed_chunk if place.is_packed else self._plain_chunk)(data, stop, head, place)
+        if place.is_cut:
+            self.collector.cut_chunk(pos, got, head.size)
 
-        `sure` tells that a checksum holds: else the stamps of its messages must be those that the index behind it states.
+    def _packed_chunk(self, data: Bytes, stop: int, head: ChunkHead, place: Place) -> int:
+        """Read what a compressed chunk holds as far as it is whole, or leave it out; return its bytes.
+
+        Where no checksum is stated, the stamps of its messages must be those that the index behind it states.
         """
-        if plain is None:
-            self.collector.damaged_at(says, place.chunk)
+        plain = unpacked(bytes(data[head.start : stop]), head.compression, head.size)
+        if plain is None or not (place.is_cut or (len(plain) == head.size and not head.is_wrong(plain))):
+            self.collector.damaged_at(f"a compressed chunk of {head.length}", place.chunk)
             return 0
         self.collector.unpacked.add(len(plain))
         counts = self.collector.counts()
         self.run(plain, 0, len(plain), place)
-        if not (sure or place.is_cut or self._agrees_with_index(data, stop, counts)):
+        if not (head.crc or place.is_cut or self._agrees_with_index(data, stop, counts)):
             self.collector.leave_out_from(counts)
-            self.collector.damaged_at(says, place.chunk)
+            self.collector.damaged_at(f"a compressed chunk of {head.length}", place.chunk)
         return len(plain)
+
+    def _plain_chunk(self, data: Bytes, stop: int, head: ChunkHead, place: Place) -> int:
+        """Read a chunk that is not compressed; one whose checksum fails though its records look sound is left out."""
+        counts, damages = self.collector.counts(), self.collector.damages
+        self.run(data, head.start, stop, place)
+        if place.is_cut or damages < self.collector.damages or not head.is_wrong(data[head.start : stop]):
+            return stop - head.start
+        if self.end_behind_damage(data, stop, len(data), Place()) is None:
+            self.leave_out_last()  # the damage is that behind the chunk, and begins inside its last message
+        else:
+            self.collector.leave_out_from(counts)
+            self.collector.damaged_at(f"a chunk of {head.length} whose checksum does not hold", place.chunk)
+        return stop - head.start
 
     def _agrees_with_index(self, data: Bytes, pos: int, counts: Mapping[str, int]) -> bool:
         """Whether the messages of a chunk have the stamps that the index records behind it state; true without any.

@@ -20,7 +20,7 @@ unpacked where so many are packed that they can be meant."""
 KNOWN = ("", "none", "bz2", "lz4", "zstd")
 
 
-def unpacked(data: bytes, compression: str, size: int) -> bytes | None:
+def unpacked(data: bytes, compression: str, size: int = LARGEST) -> bytes | None:
     """Return the plain bytes, or those of the blocks that are whole; None where the data are damaged.
 
     `size` is the number of bytes that they should be: of more no more than one is unpacked, and none where so many are too many.
@@ -28,32 +28,22 @@ def unpacked(data: bytes, compression: str, size: int) -> bytes | None:
     """
     if compression in ("", "none"):
         return data
-    if compression in KNOWN and size > max(LARGEST, MOST_TIMES * len(data)):
+    if compression not in KNOWN:
+        hint = "record or convert it with zstd or lz4"
+        raise LogError(f"the bag is compressed with {compression!r}", found=compression, hint=hint)
+    if size > max(LARGEST, MOST_TIMES * len(data)):
         return None
     try:
-        if compression == "bz2":
-            return bz2.BZ2Decompressor().decompress(data, size + 1)
-        if compression == "lz4":
-            return _decompressed(import_module("lz4.frame").LZ4FrameDecompressor(), data, size + 1)
-    except (OSError, RuntimeError, EOFError, ValueError):
+        plain: bytes = _decompressor(compression).decompress(data, size + 1)
+    except (OSError, RuntimeError, EOFError, ValueError, _zstd().ZstdError):
         return None
-    if compression == "zstd":
-        return unzstd(data, size)
-    raise LogError(f"the bag is compressed with {compression!r}", found=compression, hint="record or convert it with zstd or lz4")
-
-
-def unzstd(data: bytes, size: int = LARGEST) -> bytes | None:
-    """Return what zstd data hold, up to where they end and to one byte more than `size`; None where they are damaged."""
-    module = _zstd()
-    try:
-        return _decompressed(module.ZstdDecompressor(), data, size + 1)
-    except (module.ZstdError, EOFError):
-        return None
-
-
-def _decompressed(decompressor: Any, data: bytes, most: int) -> bytes:
-    plain: bytes = decompressor.decompress(data, most)
     return plain
+
+
+def _decompressor(compression: str) -> Any:
+    if compression == "bz2":
+        return bz2.BZ2Decompressor()
+    return import_module("lz4.frame").LZ4FrameDecompressor() if compression == "lz4" else _zstd().ZstdDecompressor()
 
 
 def unpack_file(packed: Path, plain: Path) -> str | None:
@@ -62,19 +52,18 @@ def unpack_file(packed: Path, plain: Path) -> str | None:
     Raises LogError where it unpacks to far more than a log does.
     """
     size = UnpackedSize(packed)
-    module = _zstd()
-    decompressor = module.ZstdDecompressor()
+    decompressor = _decompressor("zstd")
     with packed.open("rb") as source, plain.open("wb") as target:
         try:
             while piece := source.read(PIECE_BYTES):
                 while piece:
                     if decompressor.eof:
-                        decompressor = module.ZstdDecompressor()
+                        decompressor = _decompressor("zstd")
                     size.add(target.write(decompressor.decompress(piece, PIECE_BYTES)))
                     while not (decompressor.eof or decompressor.needs_input):
                         size.add(target.write(decompressor.decompress(b"", PIECE_BYTES)))
                     piece = decompressor.unused_data
-        except module.ZstdError:
+        except _zstd().ZstdError:
             return "damaged"
     return None if decompressor.eof else "cut off"
 

@@ -10,16 +10,13 @@ repeats schemas and channels and counts the messages; it is used where it is the
 from __future__ import annotations
 
 import re
-import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from struct import Struct, error
 from types import MappingProxyType
 from typing import Literal
 
-from fieldsid.logs.readers.bags.containers.damage import Bytes, Place, Records, forget, mapped
-from fieldsid.logs.readers.bags.containers.decompress import unpacked
+from fieldsid.logs.readers.bags.containers.damage import Bytes, ChunkHead, Place, Records, forget, mapped
 from fieldsid.logs.readers.bags.packets import LAST_NS, SETTLE_BYTES, Collector, Connection
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -55,23 +52,6 @@ def scan(path: Path, collector: Collector) -> None:
             collector.truncated("no footer", len(data))
 
 
-@dataclass(frozen=True, slots=True)
-class _ChunkHead:
-    """The head of a chunk record: stamps from `low` to `high`, bytes and CRC when unpacked, and where its records start."""
-
-    low: int
-    high: int
-    size: int
-    crc: int
-    compression: str
-    start: int
-
-    @property
-    def seconds(self) -> float:
-        """The time its messages span; 0 where it has none."""
-        return max(self.high - self.low, 0) / 1e9
-
-
 class _Records(Records):
     """The records of a file, and of the chunks inside it."""
 
@@ -79,6 +59,7 @@ class _Records(Records):
         super().__init__(collector)
         self.schemas: dict[int, tuple[str, str, str]] = {}
         self.done = False
+        self.takers = {SCHEMA: self._schema, CHANNEL: self._channel, STATISTICS: self._statistics}
 
     def summary(self, data: Bytes) -> None:
         """Take schemas, channels and counts from the summary, which a whole file ends in."""
@@ -91,7 +72,7 @@ class _Records(Records):
             stop = pos + 9 + length
             if op not in LEAST or stop > footer:
                 return
-            if op in self._takers:
+            if op in self.takers:
                 self._parsed(op, bytes(data[pos + 9 : stop]))
             pos = stop
 
@@ -107,7 +88,9 @@ class _Records(Records):
                 channel, _, stamp, _ = message(data, pos + 9)
                 if channel in by_number and stamp <= LAST_NS:
                     if pos > settle_at:
-                        settle_at = self._settle(data, pos)
+                        settle_at = pos + SETTLE_BYTES
+                        self.collector.has_read(SETTLE_BYTES)
+                        forget(data, pos)
                     packets = self.last = by_number[channel]
                     if packets is not None:
                         packets.stamps.append(stamp)
@@ -118,12 +101,6 @@ class _Records(Records):
                 pos = stop
                 continue
             pos = self.behind_damage(data, pos, end, place)
-
-    def _settle(self, data: Bytes, pos: int) -> int:
-        """Settle what stands before a sound record; return where to do so next."""
-        self.collector.has_read(SETTLE_BYTES)
-        forget(data, pos)
-        return pos + SETTLE_BYTES
 
     def _is_other(self, op: int, data: Bytes, pos: int, stop: int, place: Place) -> bool:
         """Take a record that is no message; return whether one like it can stand in this place.
@@ -177,20 +154,8 @@ class _Records(Records):
         head = _head_of_chunk(data, pos, whole)
         if head is None:
             return False
-        self.collector.has_read(stop - pos)
-        forget(data, pos)
-        place = Place(pos, is_packed=bool(head.compression), is_cut=stop < whole, low=head.low, high=head.high)
-        got = self._unpacked_chunk(data, stop, head, place) if place.is_packed else self._plain_chunk(data, stop, head, place)
-        if place.is_cut:
-            self.collector.cut_chunk(pos, got, head.size)
+        self.take_chunk(data, pos, stop, whole, head)
         return True
-
-    def _unpacked_chunk(self, data: Bytes, stop: int, head: _ChunkHead, place: Place) -> int:
-        """Read a compressed chunk as far as it is whole, or leave it out; return its bytes."""
-        plain = unpacked(bytes(data[head.start : stop]), head.compression, head.size)
-        is_whole = plain is not None and (place.is_cut or (len(plain) == head.size and not _is_wrong(plain, head.crc)))
-        says = f"a compressed chunk of {head.seconds:.2f} s"
-        return self.packed_chunk(plain if is_whole else None, says, place, data, stop, sure=head.crc != 0)
 
     def stated_stamps(self, data: Bytes, pos: int) -> Iterator[tuple[int, Iterable[int]]]:
         """Yield the stamps in ns that the index records at `pos` state, by channel."""
@@ -204,28 +169,10 @@ class _Records(Records):
             yield channel, (stamp for stamp, _ in entries)
             pos = stop
 
-    def _plain_chunk(self, data: Bytes, stop: int, head: _ChunkHead, place: Place) -> int:
-        """Read a chunk that is not compressed; one whose checksum fails though its records look sound is left out."""
-        counts = self.collector.counts()
-        damages = self.collector.damages
-        self.run(data, head.start, stop, place)
-        if place.is_cut or damages < self.collector.damages or not _is_wrong(data[head.start : stop], head.crc):
-            return stop - head.start
-        if self.end_behind_damage(data, stop, len(data), Place()) is None:
-            self.leave_out_last()  # the damage is that behind the chunk, and begins inside its last message
-        else:
-            self.collector.leave_out_from(counts)
-            self.collector.damaged_at(f"a chunk of {head.seconds:.2f} s whose checksum does not hold", place.chunk)
-        return stop - head.start
-
-    @property
-    def _takers(self) -> Mapping[int, Callable[[bytes], None]]:
-        return {SCHEMA: self._schema, CHANNEL: self._channel, STATISTICS: self._statistics}
-
     def _parsed(self, op: int, body: bytes) -> bool:
         """Take a schema, a channel or the statistics; return whether it could be read."""
         try:
-            self._takers[op](body)
+            self.takers[op](body)
         except error:
             return False
         return True
@@ -258,7 +205,7 @@ class _Records(Records):
                 self.collector.expect(self.topics[channel], count)
 
 
-def _head_of_chunk(data: Bytes, pos: int, stop: int) -> _ChunkHead | None:
+def _head_of_chunk(data: Bytes, pos: int, stop: int) -> ChunkHead | None:
     """Return the head of the chunk at `pos` whose record ends at `stop`, or None where its lengths do not fit that."""
     at = pos + 9 + _CHUNK.size
     if at + 4 > len(data):
@@ -272,12 +219,8 @@ def _head_of_chunk(data: Bytes, pos: int, stop: int) -> _ChunkHead | None:
     (packed,) = _U64.unpack_from(data, start - 8)
     if start + packed != stop or not (compression.isalnum() or not compression):
         return None
-    return _ChunkHead(low, high, size if compression else packed, crc, compression.decode("ascii"), start)
-
-
-def _is_wrong(plain: bytes, crc: int) -> bool:
-    """Whether bytes do not have the checksum that is stated; 0 states none."""
-    return crc != 0 and zlib.crc32(plain) != crc
+    length = f"{max(high - low, 0) / 1e9:.2f} s"
+    return ChunkHead(size if compression else packed, compression.decode("ascii"), start, length, low, high, crc)
 
 
 def _text(body: bytes, pos: int) -> tuple[str, int]:

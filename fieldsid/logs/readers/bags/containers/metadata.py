@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -13,14 +12,6 @@ from fieldsid.logs.run import Note
 from fieldsid.records.reading import read_yaml
 
 NAME = "metadata.yaml"
-
-
-@dataclass(frozen=True, slots=True)
-class Metadata:
-    """Messages by topic, and the serialization of each."""
-
-    counts: Mapping[str, int]
-    serializations: Mapping[str, str]
 
 
 def check_against_metadata(path: Path, collector: Collector) -> None:
@@ -33,34 +24,35 @@ def check_against_metadata(path: Path, collector: Collector) -> None:
     file = (path if path.is_dir() else path.parent) / NAME
     if file.is_file():
         try:
-            metadata = _metadata_of(file, None if path.is_dir() else path.name)
+            about = _stated_by(file, None if path.is_dir() else path.name)
         except FieldsidError as error:
             collector.notes.append(Note("metadata", f"`{file}` cannot be used: {error.what}", {"found": error.found}))
-            metadata = None
-        if metadata is not None:
-            stated, source = metadata.counts, NAME
-            collector.notes += _other_serializations(metadata, collector)
+        else:
+            stated, source = ({t: n for t, (n, _) in about.items()}, NAME) if about is not None else (stated, source)
+            collector.notes += _other_serializations(about or {}, collector)
     collector.notes += _share_read(stated, source, collector)
 
 
-def _metadata_of(file: Path, only: str | None) -> Metadata | None:
-    """Return what the file states, or None where it is about more files than the one that is read; raises FieldsidError."""
+def _stated_by(file: Path, only: str | None) -> dict[str, tuple[int, str]] | None:
+    """Return the messages that the file states of each topic, and their serialization; raises FieldsidError.
+
+    None where it is about more files than the one that is read.
+    """
     body = read_yaml(file)
     try:
         about = body["rosbag2_bagfile_information"]
         names = [PurePosixPath(name).name for name in about["relative_file_paths"]]
         topics: list[Any] = [(t["topic_metadata"], t["message_count"]) for t in about["topics_with_message_count"]]
-        counts = {str(t["name"]): int(count) for t, count in topics}
-        serializations = {str(t["name"]): str(t["serialization_format"]) for t, _ in topics}
+        found = {str(t["name"]): (int(count), str(t["serialization_format"])) for t, count in topics}
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise FieldsidError("it is no description of a bag", found=f"{type(error).__name__}: {error}") from error
-    return Metadata(counts, serializations) if only is None or names in ([only], [f"{only}.zstd"]) else None
+    return found if only is None or names in ([only], [f"{only}.zstd"]) else None
 
 
-def _other_serializations(metadata: Metadata, collector: Collector) -> list[Note]:
+def _other_serializations(about: Mapping[str, tuple[int, str]], collector: Collector) -> list[Note]:
     """Note topics that metadata.yaml and the bag's file state different serializations of."""
     notes = []
-    for topic, stated in metadata.serializations.items():
+    for topic, (_, stated) in about.items():
         connection = collector.connections.get(topic)
         if connection is not None and topic in collector.packets and connection.serialization != stated:
             message = f"{topic}: {NAME} states messages in `{stated}`, the file itself in `{connection.serialization}`"

@@ -12,13 +12,11 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
 from fieldsid.errors import LogError
-from fieldsid.logs.readers.bags.containers.damage import Bytes, Place, Records, forget, mapped
-from fieldsid.logs.readers.bags.containers.decompress import unpacked
+from fieldsid.logs.readers.bags.containers.damage import Bytes, ChunkHead, Place, Records, mapped
 from fieldsid.logs.readers.bags.packets import ROS1, Collector, Connection
 
 MAGIC = b"#ROSBAG V"
@@ -61,13 +59,8 @@ def scan(path: Path, collector: Collector) -> None:
         records.run(data, first, len(data), Place())
 
 
-@dataclass(frozen=True, slots=True)
-class _Shape:
-    """Where the fields of a message's header stand, as in the message before; `conn` and `time` are those of the values."""
-
-    op: int
-    conn: int
-    time: int
+Shape = tuple[int, int, int]
+"""Where the op, and the values of conn and time, stand in a message's header, as in the message before."""
 
 
 class _Records(Records):
@@ -77,7 +70,7 @@ class _Records(Records):
 
     def __init__(self, collector: Collector) -> None:
         super().__init__(collector)
-        self.shape: _Shape | None = None
+        self.shape: Shape | None = None
 
     def index(self, data: Bytes, pos: int) -> None:
         """Take connections and counts from the index, which a whole bag ends in."""
@@ -99,20 +92,20 @@ class _Records(Records):
         self.last = None
         while pos < end:
             head = pos + 4
-            shape = self.shape
+            op, conn, time = self.shape or (0, 0, 0)
             if (
-                shape is not None
+                self.shape is not None
                 and head + MESSAGE_HEADER + 4 <= end
                 and data[pos:head] == _SIZE_OF_MESSAGE
-                and data[head + shape.op : head + shape.op + 4] == _OP_MESSAGE
-                and data[head + shape.conn - 5 : head + shape.conn] == _CONN
+                and data[head + op : head + op + 4] == _OP_MESSAGE
+                and data[head + conn - 5 : head + conn] == _CONN
             ):
-                (number,) = take_u32(data, head + shape.conn)
+                (number,) = take_u32(data, head + conn)
                 stop = head + MESSAGE_HEADER + 4 + take_u32(data, head + MESSAGE_HEADER)[0]
                 if stop <= end and number in by_number:
                     packets = self.last = by_number[number]
                     if packets is not None:
-                        sec, nanosec = take_stamp(data, head + shape.time)
+                        sec, nanosec = take_stamp(data, head + time)
                         packets.stamps.append(sec * 1_000_000_000 + nanosec)
                         packets.payloads.append(bytes(data[head + MESSAGE_HEADER + 4 : stop]))
                     pos = stop
@@ -183,7 +176,7 @@ class _Records(Records):
         (size,) = _U32.unpack_from(data, pos)
         head = bytes(data[pos + 4 : pos + 4 + size])
         if size == MESSAGE_HEADER:
-            self.shape = _Shape(head.index(_OP_MESSAGE), head.index(_CONN) + 5, head.index(b"time=") + 5)
+            self.shape = head.index(_OP_MESSAGE), head.index(_CONN) + 5, head.index(b"time=") + 5
         self.last = self.by_number[_number(fields)]
         if self.last is not None:
             self.last.stamps.append(_stamp(fields))
@@ -217,18 +210,8 @@ class _Records(Records):
         body = pos + 8 + _U32.unpack_from(data, pos)[0]
         compression = fields[b"compression"].decode(errors="replace")
         size = int.from_bytes(fields[b"size"], "little")
-        self.collector.has_read(stop - pos)
-        forget(data, pos)
-        place = Place(pos, is_packed=compression != "none", is_cut=stop < whole)
-        if place.is_packed:
-            plain = unpacked(bytes(data[body:stop]), compression, size)
-            is_whole = plain is not None and (place.is_cut or len(plain) == size)
-            got = self.packed_chunk(plain if is_whole else None, f"a compressed chunk of {size} bytes", place, data, stop)
-        else:
-            self.run(data, body, stop, place)
-            got = stop - body
-        if place.is_cut:
-            self.collector.cut_chunk(pos, got, size)
+        head = ChunkHead(size, "" if compression == "none" else compression, body, f"{size} bytes")
+        self.take_chunk(data, pos, stop, whole, head)
 
     def stated_stamps(self, data: Bytes, pos: int) -> Iterator[tuple[int, Iterable[int]]]:
         """Yield the stamps in ns that the index records at `pos` state, by connection."""

@@ -26,21 +26,12 @@ MOST_FOLDERS = 2000
 """Folders beside a bag that are looked into: a bag in a home folder must not start a search of it all."""
 
 
-class AmbiguousDefinitionError(LogError):
-    """Several definitions of one type beside a bag, of which none is the more likely one."""
-
-
 @dataclass(frozen=True, slots=True)
 class DefinitionSearch:
     """Where definitions may stand that a bag lacks: beside the log, and in the folder that was asked for."""
 
     log: Path
     msg_path: Path | None = None
-
-    def roots(self) -> list[Path]:
-        """Return the folders beside the bag, nearest first."""
-        folder = (self.log if self.log.is_dir() else self.log.parent).resolve()
-        return [folder, folder.parent]
 
 
 def decoder_of(connection: Connection, payload: bytes, search: DefinitionSearch) -> tuple[Decoder, Note | None]:
@@ -53,8 +44,6 @@ def decoder_of(connection: Connection, payload: bytes, search: DefinitionSearch)
     for origin, fields in _sources(connection, search):
         try:
             decoder = _fitting(fields(), connection, payload)
-        except AmbiguousDefinitionError:
-            raise
         except LogError as error:
             first = first or error
             continue
@@ -77,10 +66,12 @@ def _sources(connection: Connection, search: DefinitionSearch) -> Iterator[tuple
     if folder:
         yield f"`--msg-path {search.msg_path}`", lambda: {**_shipped(), **folder}
     yield "ROS 2", _shipped
-    for root in search.roots():
-        file = _file_of(connection.type_name, _msg_files(root))
+    beside = (search.log if search.log.is_dir() else search.log.parent).resolve()
+    for files in map(_msg_files, (beside, beside.parent)):
+        file = _file_of(connection.type_name, files)
         if file is not None:
-            yield f"`{file}`", lambda r=root: {**_shipped(), **_beside(r, connection, search)}
+            _refuse_several(files, connection, search)
+            yield f"`{file}`", lambda files=files: {**_shipped(), **_of_files(files, connection)}
 
 
 def _fitting(known: Fields, connection: Connection, payload: bytes) -> Decoder:
@@ -145,17 +136,15 @@ def _msg_files(root: Path) -> tuple[Path, ...]:
     return tuple(found)
 
 
-def _beside(root: Path, connection: Connection, search: DefinitionSearch) -> Fields:
-    """Return the definitions of files below a folder; raises AmbiguousDefinitionError where two of the type itself differ."""
-    files = _msg_files(root)
+def _refuse_several(files: Sequence[Path], connection: Connection, search: DefinitionSearch) -> None:
+    """Raise LogError where two of the files beside a bag define the type itself, and differ."""
     own = [f for f in files if f.stem == connection.type_name.rpartition("/")[2]]
     if len({f.read_text(encoding="utf-8", errors="replace") for f in own}) > 1:
-        raise AmbiguousDefinitionError(
+        raise LogError(
             f"`{connection.type_name}` has {len(own)} definitions beside the bag that differ",
             found=", ".join(map(str, own)),
             hint=f"choose one: `sysid inspect {search.log} --msg-path {own[0].parent}`",
         )
-    return _of_files(files, connection)
 
 
 @lru_cache(maxsize=MOST_PARSED)

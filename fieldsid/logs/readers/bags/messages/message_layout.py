@@ -202,11 +202,8 @@ def numbers_at(layout: Layout, path: str) -> list[tuple[int, np.dtype[Any]]]:
 def _index(layout: Layout, base: str, key: str) -> int:
     if key.isdigit():
         return int(key)
-    parent = base.rpartition(".")[0]
-    beside = [f"{parent}.{n}" if parent else n for n in ("name", "names")]
-    path = next((b for b in beside if b in layout.texts), None)
-    names = layout.texts[path] if path else ()
-    if path is None or key not in names:
+    path, names = _names_beside(layout, base)
+    if key not in names:
         raise MappingError(
             f"`{base}` has no element named {key!r}", found=", ".join(names) or "no names beside it", hint=near(key, names)
         )
@@ -282,7 +279,7 @@ class Decoder:
             if leaf.count is None:
                 found[path] = np.frombuffer(raw, leaf.dtype, 1, leaf.offset)[0].item()
                 continue
-            names = _names_beside(layout, path)
+            _, names = _names_beside(layout, path)
             for i, value in enumerate(np.frombuffer(raw, leaf.dtype, leaf.count, leaf.offset)[:8]):
                 found[f"{path}[{names[i] if i < len(names) else i}]"] = value.item()
         return found
@@ -338,9 +335,11 @@ def _take(
             out[k][rows, j] = column
 
 
-def _names_beside(layout: Layout, path: str) -> tuple[str, ...]:
-    parent = path.rpartition(".")[0]
-    return layout.texts.get(f"{parent}.name" if parent else "name", ())
+def _names_beside(layout: Layout, base: str) -> tuple[str, tuple[str, ...]]:
+    """Return the path of the texts that name the elements of a row, and them; none where nothing does."""
+    parent = base.rpartition(".")[0]
+    beside = (f"{parent}.{name}" if parent else name for name in ("name", "names"))
+    return next(((path, layout.texts[path]) for path in beside if path in layout.texts), ("", ()))
 
 
 def as_floats(values: npt.NDArray[Any]) -> FloatArray:
