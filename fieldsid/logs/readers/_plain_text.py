@@ -10,6 +10,7 @@ import codecs
 import io
 import re
 import zlib
+from collections import deque
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -18,15 +19,13 @@ from tempfile import TemporaryFile
 from typing import IO
 
 from fieldsid.errors import LogError
-from fieldsid.logs.readers._unpacked import GZIP, LONGEST_ROW, PIECE_BYTES, UnpackedRows
+from fieldsid.logs.readers._unpacked import GZIP, LONGEST_ROW, PIECE_BYTES, UnpackedRows, gunzipped
 from fieldsid.logs.unknown_file import COPY_AGAIN
 
 HEAD = LONGEST_ROW
 """Bytes at the start of a table that tell how it is written."""
 LONGEST_CELL = 64
 """Bytes that a cell looked for may have before a piece of the text."""
-_SMALL_PIECE = 512
-"""Bytes of a gzip stream that are unpacked at once: what a damaged one still gives is known to as many."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,12 +119,11 @@ def plain_text(path: Path, asked: str | None = None, limit: int | None = None) -
         encoding = asked or _encoding(head)
         try:
             if _needs_transcoding(encoding, head):
-                stream.seek(0)
                 other, stream = stream, stack.enter_context(TemporaryFile())
                 _transcode(other, stream, encoding, "strict" if asked else "replace", limit)
                 encoding = "utf-8"
             elif asked:
-                _check(stream, asked)
+                deque(_decoded(stream, asked, "strict"), maxlen=0)  # raises where it is none
         except (UnicodeDecodeError, LookupError) as error:
             hint = "leave `encoding` out of the mapping: it is found out"
             raise LogError(f"`{path}` is not text in {encoding}", found=str(error), hint=hint) from error
@@ -140,26 +138,19 @@ def _unzip(packed: IO[bytes], plain: IO[bytes], path: Path, limit: int | None) -
 
     Raises LogError where nothing can be unpacked, and for what is no table.
     """
-    stream, rows = zlib.decompressobj(wbits=31), UnpackedRows(path)
-    piece = b""
+    rows = UnpackedRows(path)
     try:
-        while piece := piece or packed.read(_SMALL_PIECE):
-            if stream.eof:
-                if not piece.startswith(GZIP[: len(piece)]):
-                    return False
-                stream = zlib.decompressobj(wbits=31)
-            text = stream.decompress(piece)
+        for text, size in gunzipped(packed):
             plain.write(text)
-            rows.add(text, len(piece) - len(stream.unused_data))
-            piece = stream.unused_data
+            rows.add(text, size)
             if limit is not None and plain.tell() >= limit:
-                return False
-    except zlib.error as error:
-        if not plain.tell():
+                break
+    except (zlib.error, EOFError) as error:
+        if isinstance(error, zlib.error) and not plain.tell():
             found = f"{path.stat().st_size} bytes"
             raise LogError(f"`{path}` is not a readable gzip file: {error}", found=found, hint=COPY_AGAIN) from error
         return True
-    return not stream.eof
+    return False
 
 
 def _needs_transcoding(encoding: str, head: bytes) -> bool:
@@ -171,24 +162,18 @@ def _needs_transcoding(encoding: str, head: bytes) -> bool:
 
 def _transcode(other: IO[bytes], plain: IO[bytes], encoding: str, errors: str, limit: int | None) -> None:
     """Write a text as UTF-8 whose lines end in a line feed."""
-    decoder = codecs.getincrementaldecoder(encoding)(errors=errors)
     has_line_feeds: bool | None = None
-    is_last = False
-    while not is_last and (limit is None or plain.tell() < limit):
-        piece = other.read(PIECE_BYTES)
-        is_last = not piece
-        text = decoder.decode(piece, final=is_last)
+    for text in _decoded(other, encoding, errors):
         has_line_feeds = "\n" in text if has_line_feeds is None else has_line_feeds
         plain.write((text if has_line_feeds else text.replace("\r", "\n")).encode("utf-8"))
+        if limit is not None and plain.tell() >= limit:
+            break
 
 
-def _check(stream: IO[bytes], encoding: str) -> None:
-    """Raise UnicodeDecodeError where bytes are no text in an encoding."""
-    decoder = codecs.getincrementaldecoder(encoding)(errors="strict")
+def _decoded(stream: IO[bytes], encoding: str, errors: str) -> Iterator[str]:
+    """Yield the text of some bytes from their start, piece by piece; raises UnicodeDecodeError where they are none."""
     stream.seek(0)
-    while piece := stream.read(PIECE_BYTES):
-        decoder.decode(piece)
-    decoder.decode(b"", final=True)
+    return codecs.iterdecode(iter(lambda: stream.read(PIECE_BYTES), b""), encoding, errors)
 
 
 def _encoding(raw: bytes) -> str:

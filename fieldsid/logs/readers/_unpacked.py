@@ -7,12 +7,16 @@ it fills the memory, as soon as that is known. So are rows of a table that repea
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import IO
 
 from fieldsid.errors import LogError
 
 GZIP = b"\x1f\x8b"
 PIECE_BYTES = 1 << 20
+_SMALL_PIECE = 512
+"""Bytes of a gzip stream that are unpacked at once: what a damaged one still gives is known to as many."""
 SMALL = 128 << 20
 """Unpacked bytes that are read however they were packed."""
 MOST_TIMES = 300
@@ -43,23 +47,41 @@ class UnpackedSize:
             )
 
 
+def gunzipped(packed: IO[bytes], most: Callable[[], int] = lambda: 0) -> Iterator[tuple[bytes, int]]:
+    """Yield what gzip streams hold, as many as follow each other, piece by piece with the packed bytes of each.
+
+    `most` says how many bytes a piece may have, 0 any number. Raises zlib.error for damage, EOFError for an early end.
+    """
+    stream, piece = zlib.decompressobj(wbits=31), b""
+    while piece := piece or packed.read(_SMALL_PIECE):
+        if stream.eof:
+            if not piece.startswith(GZIP[: len(piece)]):
+                return
+            stream = zlib.decompressobj(wbits=31)
+        plain = stream.decompress(piece, most())
+        yield plain, len(piece) - len(stream.unused_data) - len(stream.unconsumed_tail)
+        piece = stream.unused_data or stream.unconsumed_tail
+    if not stream.eof:
+        raise EOFError
+
+
 def inflated(path: Path) -> tuple[bytes, bool]:
     """Return the bytes of a file, unpacked where it is gzip, and whether they end before its stream does.
 
     Raises LogError where it unpacks to more than a log does.
     """
-    raw = path.read_bytes()
-    if not raw.startswith(GZIP):
-        return raw, False
-    unpack, out, size = zlib.decompressobj(wbits=31), bytearray(), UnpackedSize(path)
-    try:
-        for start in range(0, len(raw), PIECE_BYTES):
-            piece = unpack.decompress(raw[start : start + PIECE_BYTES], size.left + 1)
-            size.add(len(piece))
-            out += piece
-    except zlib.error:
-        return bytes(out), True
-    return bytes(out), not unpack.eof
+    with path.open("rb") as stream:
+        if stream.read(len(GZIP)) != GZIP:
+            return path.read_bytes(), False
+        stream.seek(0)
+        out, size = bytearray(), UnpackedSize(path)
+        try:
+            for piece, _ in gunzipped(stream, lambda: size.left + 1):
+                size.add(len(piece))
+                out += piece
+        except (zlib.error, EOFError):
+            return bytes(out), True
+    return bytes(out), False
 
 
 LEAST_BYTES = 1.0

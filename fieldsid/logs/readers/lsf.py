@@ -7,12 +7,12 @@ reference, LSTS). Where the next message does not follow, what lies between is d
 
 from __future__ import annotations
 
-import gzip
 import struct
 import zlib
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
 from xml.etree import ElementTree as ET
@@ -23,7 +23,7 @@ import numpy.typing as npt
 from fieldsid.errors import LogError
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.readers._topics import MOST_DEVICES, Means, Topic, Topics, topic_of, topic_reader
-from fieldsid.logs.readers._unpacked import GZIP, inflated
+from fieldsid.logs.readers._unpacked import GZIP, gunzipped, inflated
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN, head_of, imc_order
 from fieldsid.numerics.arrays import FloatArray
@@ -103,40 +103,31 @@ def sniff(path: Path) -> bool:
     head = head_of(path)
     if head.startswith(GZIP):
         try:
-            with gzip.open(path) as packed:
-                head = packed.read(2)
-        except (OSError, EOFError, zlib.error):  # whatever it is, this reader does not take it
+            head = next((piece for piece, _ in gunzipped(BytesIO(head)) if piece), b"")
+        except (zlib.error, EOFError):  # whatever it is, this reader does not take it
             return False
     return imc_order(head) is not None
 
 
-@dataclass(frozen=True, slots=True)
-class _Places:
-    """Where messages start, by kind, source, entity and size, and where the bytes are none, in all and first."""
-
-    by_kind: dict[tuple[int, int, int, int], list[int]]
-    damaged: int
-    first: int
+Kinds = dict[tuple[int, int, int, int], list[int]]
+"""Where messages start, by kind, source, entity and size."""
 
 
-def _places(data: bytes, order: str) -> _Places:
+def _places(data: bytes, order: str) -> tuple[Kinds, int, int]:
+    """Return where the messages of each kind start, and where the bytes are none: how often, and first."""
     head, by_kind = struct.Struct(f"{order}HHHdHBHB"), defaultdict(list)
-    sync, at, damaged, first = data[:2], 0, 0, -1
+    sync, at, damaged, first, buffer = data[:2], 0, 0, -1, np.frombuffer(data, np.uint8)
     while at >= 0 and at + HEADER + FOOTER <= len(data):
         _, kind, size, _, source, entity, _, _ = head.unpack_from(data, at)
         end = at + HEADER + size + FOOTER
         follows = end == len(data) or data[end : end + 2] == sync
-        if data[at : at + 2] == sync and end <= len(data) and (follows or _is_whole(data[at:end], order)):
+        if data[at : at + 2] == sync and end <= len(data) and (follows or _whole(buffer[None, at:end], order)[0]):
             by_kind[kind, source, entity, size].append(at)
             at = end
             continue
         damaged, first = damaged + 1, at if first < 0 else first
         at = data.find(sync, at + 1)
-    return _Places(by_kind, damaged + (0 <= at < len(data)), first if first >= 0 else at)
-
-
-def _is_whole(message: bytes, order: str) -> bool:
-    return bool(_whole(np.frombuffer(message, np.uint8)[None, :], order)[0])
+    return by_kind, damaged + (0 <= at < len(data)), first if first >= 0 else at
 
 
 def _crc_table() -> npt.NDArray[np.uint16]:
@@ -166,11 +157,11 @@ def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
     order = imc_order(data[:2])
     if order is None:
         raise LogError(f"`{path}` is a damaged IMC log", found="no message at its start", hint=COPY_AGAIN)
-    places, buffer = _places(data, order), np.frombuffer(data, np.uint8)
-    own = Counter({key: len(at) for key, at in places.by_kind.items()})
+    (places, lost, first), buffer = _places(data, order), np.frombuffer(data, np.uint8)
+    own = Counter(source for (_, source, _, _), starts in places.items() for _ in starts)
     parts: dict[tuple[int, int, int], list[tuple[FloatArray, dict[str, FloatArray]]]] = defaultdict(list)
     wrong = 0
-    for (kind, source, entity, size), starts in places.by_kind.items():
+    for (kind, source, entity, size), starts in places.items():
         layout = np.dtype([(n, f"{order}{t}") for n, t in kinds[kind].numbers]) if kind in kinds else np.dtype([])
         if not 0 < layout.itemsize <= size:
             continue
@@ -180,25 +171,18 @@ def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
         time = np.ascontiguousarray(good[:, 6:14]).view(f"{order}f8")[:, 0].astype(np.float64)
         numbers = np.ascontiguousarray(good[:, HEADER : HEADER + layout.itemsize]).view(layout)[:, 0]
         parts[kind, source, entity].append((time, {n: numbers[n].astype(np.float64) for n in layout.names or ()}))
-    return Topics(dict(_named(kinds, parts, _most(own))), MEANS, _notes(places, wrong, is_cut=is_cut))
+    # the system of most messages wrote the log, which hears others too
+    named = dict(_named(kinds, parts, max(own, key=lambda source: own[source], default=0)))
+    return Topics(named, MEANS, _notes(lost, wrong, first, is_cut=is_cut))
 
 
-def _notes(places: _Places, wrong: int, *, is_cut: bool) -> tuple[Note, ...]:
-    lost = places.damaged + wrong
-    if not lost and not is_cut:
+def _notes(lost: int, wrong: int, first: int, *, is_cut: bool) -> tuple[Note, ...]:
+    if not lost + wrong and not is_cut:
         return ()
-    where = f", the first at byte {places.first}" if places.damaged else ""
+    where = f", the first at byte {first}" if lost else ""
     cut = "; the packed file is cut off" if is_cut else ""
-    message = f"messages that are damaged or cut off, left out: {lost}{where}{cut}"
-    return (Note("truncated", message, {"count": lost}),)
-
-
-def _most(counts: Counter[tuple[int, int, int, int]]) -> int:
-    """Return the source of most messages: the system that wrote the log, which hears others too."""
-    by_source: Counter[int] = Counter()
-    for (_, source, _, _), count in counts.items():
-        by_source[source] += count
-    return by_source.most_common(1)[0][0] if by_source else 0
+    message = f"messages that are damaged or cut off, left out: {lost + wrong}{where}{cut}"
+    return (Note("truncated", message, {"count": lost + wrong}),)
 
 
 def _named(
