@@ -14,7 +14,7 @@ from fieldsid.artifacts import check_output
 from fieldsid.errors import UsageError
 from fieldsid.logs.channels import ChannelMap, Source
 from fieldsid.logs.convert.assemble import WHOLE
-from fieldsid.logs.convert.conditioning import MAIN, MAX_GAP_S, ROUNDING, gap_limit, gaps_in
+from fieldsid.logs.convert.conditioning import MAX_GAP_S, long_gaps
 from fieldsid.logs.load import load_run
 from fieldsid.logs.run import EXPLAINING, Note, Run
 from fieldsid.logs.save import SUFFIXES, save_run
@@ -26,67 +26,26 @@ from fieldsid.registry import near
 FORMATS = {"parquet": ".parquet", "csv": ".csv", "csv.gz": ".csv.gz"}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Imported:
     """A run that was written, and where."""
 
     run: Run
-    path: Path
+    name: Annotated[str, Key("Its name.", "run")]
+    file: Annotated[str, Key("The file that was written.")]
+    log: Annotated[str | None, Key("The log it came from.")]
+    samples: Annotated[int, Key("Number of samples.")]
+    start_s: Annotated[float, Key("Time of the first sample.")]
+    end_s: Annotated[float, Key("Time of the last sample.")]
+    duration_s: Annotated[float, Key("Length.")]
+    rate_hz: Annotated[float, Key("Samples per second, by the median step.")]
+    signals: Annotated[Mapping[str, int], Key("Number of measured samples of each signal.")]
+    notes: Annotated[tuple[Note, ...], Key("What was done and what was found.")]
 
     @property
     def warnings(self) -> tuple[Note, ...]:
         """The notes that the user should act on."""
-        return tuple(n for n in self.run.notes if n.code not in EXPLAINING)
-
-    @property
-    def name(self) -> Annotated[str, Key(name="run")]:
-        """Its name."""
-        return self.run.name
-
-    @property
-    def file(self) -> Annotated[str, Key()]:
-        """The file that was written."""
-        return str(self.path)
-
-    @property
-    def log(self) -> Annotated[str | None, Key()]:
-        """The log it came from."""
-        return None if self.run.source is None else str(self.run.source)
-
-    @property
-    def samples(self) -> Annotated[int, Key()]:
-        """Number of samples."""
-        return len(self.run)
-
-    @property
-    def start_s(self) -> Annotated[float, Key()]:
-        """Time of the first sample."""
-        return float(self.run.time[0])
-
-    @property
-    def end_s(self) -> Annotated[float, Key()]:
-        """Time of the last sample."""
-        return float(self.run.time[-1])
-
-    @property
-    def duration_s(self) -> Annotated[float, Key()]:
-        """Length."""
-        return self.end_s - self.start_s
-
-    @property
-    def rate_hz(self) -> Annotated[float, Key()]:
-        """Samples per second, by the median step."""
-        return 1.0 / float(np.median(np.diff(self.run.time)))
-
-    @property
-    def signals(self) -> Annotated[Mapping[str, int], Key()]:
-        """Number of measured samples of each signal."""
-        return {s: int(np.isfinite(v).sum()) for s, v in self.run.signals.items()}
-
-    @property
-    def notes(self) -> Annotated[tuple[Note, ...], Key()]:
-        """What was done and what was found."""
-        return self.run.notes
+        return tuple(n for n in self.notes if n.code not in EXPLAINING)
 
 
 def runs_under_way(load: Callable[[tuple[float, float], float], Run], max_gap_s: float) -> list[Run]:
@@ -94,8 +53,7 @@ def runs_under_way(load: Callable[[tuple[float, float], float], Run], max_gap_s:
     run = load(WHOLE, np.inf)
     stretches, notes = stretches_of(run)
     if not notes:
-        has_gaps = any(_is_long(run, s, max_gap_s) for s in MAIN if run.has(s))
-        return [load(WHOLE, max_gap_s) if has_gaps else run]
+        return [load(WHOLE, max_gap_s) if long_gaps(run.time, run.signals, max_gap_s) else run]
     return [replace(r, notes=(*r.notes, *notes)) for r in (load(part, max_gap_s) for part in stretches)]
 
 
@@ -174,7 +132,20 @@ class Importer:
     def write(self, run: Run, path: Path, *, force: bool = False) -> Imported:
         """Write a run under the name of its file and return what was written."""
         named = replace(run, name=stem_of(path))
-        return Imported(named, save_run(named, path, force=force))
+        start, end = float(run.time[0]), float(run.time[-1])
+        return Imported(
+            run=named,
+            name=named.name,
+            file=str(save_run(named, path, force=force)),
+            log=None if run.source is None else str(run.source),
+            samples=len(run),
+            start_s=start,
+            end_s=end,
+            duration_s=end - start,
+            rate_hz=1.0 / float(np.median(np.diff(run.time))),
+            signals={s: int(np.isfinite(v).sum()) for s, v in run.signals.items()},
+            notes=run.notes,
+        )
 
     def _sources(self) -> dict[str, Source]:
         if not self.channels:
@@ -182,11 +153,6 @@ class Importer:
         from fieldsid.logs.mapping.mapping_file import channel_of
 
         return dict(channel_of(text) for text in self.channels)
-
-
-def _is_long(run: Run, signal: str, limit_s: float) -> bool:
-    limit = ROUNDING * gap_limit(run.time, run[signal], limit_s)
-    return any(gap.length_s > limit for gap in gaps_in(run.time, run[signal]))
 
 
 def _check_free(logs: Sequence[Path], targets: Sequence[Path], *, force: bool) -> None:

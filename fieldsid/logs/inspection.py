@@ -15,6 +15,7 @@ from fieldsid.display import Brief
 from fieldsid.errors import FieldsidError, MappingError
 from fieldsid.logs.channels import TableForm
 from fieldsid.logs.convert.conditioning import MAIN, MAX_GAP_S, gaps_in
+from fieldsid.logs.few_of import SHOWN
 from fieldsid.logs.importing import Importer
 from fieldsid.logs.mapping.propose import propose
 from fieldsid.logs.mapping.trial import Proposal
@@ -30,8 +31,6 @@ _TOPIC_EXAMPLE = (
     _EXAMPLE + "#   yaw_rad: {topic: TOPIC, field: FIELD, unit: UNIT}\n#   rudder_rad: {topic: ..., field: ..., unit: ...}\n"
 )
 NO_TIME = "# No column is a time; say how many rows there are a second:\n# time: {rate: 10}\n"
-FIELDS_SHOWN = 12
-"""Fields of a topic that the page lists."""
 SHORT = 120
 """Letters up to which a finding tells what was found beside what is wrong."""
 _PLAIN = re.compile(r"^[A-Za-z/_][\w/.]*$")
@@ -96,7 +95,9 @@ def inspect_log(
     inventory = reader.inventory(path, options, TableForm() if given is None else given.table)
     proposal = propose(inventory, reader, options)
     own = reader.own_map(path, options)
-    notes_of_size = [] if not inventory.more else [Note("many_channels", _many(inventory), {"more": inventory.more})]
+    looked, more = len(inventory.channels), inventory.more
+    many = f"{looked + more} channels: the first {looked} by name were looked into for signals, {more} were not"
+    notes_of_size = [Note("many_channels", many, {"more": more})] if more else []
     needs_none = own is not None and not {s for s in proposal.body["signals"] if s in MAIN} - own.sources.keys()
     run = proposal.run
     if mapping is not None or needs_none:
@@ -132,11 +133,6 @@ def write_proposal(found: Inspection, path: Path, *, force: bool = False) -> Pat
     return write_text(path, found.yaml(), force=force)
 
 
-def _many(inventory: Inventory) -> str:
-    looked, more = len(inventory.channels), inventory.more
-    return f"{looked + more} channels: the first {looked} by name were looked into for signals, {more} were not"
-
-
 def _line(item: dict[str, Any]) -> str:
     """Return one signal's source on one line of YAML; a name that YAML could take for something else is quoted."""
     return "{" + ", ".join(f"{key}: {_scalar(value)}" for key, value in item.items()) + "}"
@@ -161,10 +157,10 @@ def shown_channels(channel: ChannelInfo) -> Iterator[ShownChannel]:
     fields = [f for f in channel.fields if "covariance" not in f.path and not f.path.startswith("header.")]
     holds = _range(fields[0]) if len(fields) == 1 else ""
     yield ShownChannel(channel.name, channel.kind, channel.count, rate, holds)
-    for info in fields[:FIELDS_SHOWN] if len(fields) > 1 else ():
+    for info in fields[:SHOWN] if len(fields) > 1 else ():
         yield ShownChannel(f"  {info.path}", holds=_range(info))
-    if len(fields) > FIELDS_SHOWN:
-        yield ShownChannel(f"  +{len(fields) - FIELDS_SHOWN} more: --json")
+    if len(fields) > SHOWN:
+        yield ShownChannel(f"  +{len(fields) - SHOWN} more: --json")
 
 
 def _range(info: FieldInfo) -> str:

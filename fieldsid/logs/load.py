@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fieldsid.errors import FieldsidError, MappingError
 from fieldsid.logs.channels import ATTITUDE, AXES, ChannelMap, Source, TableForm, is_enough
@@ -17,12 +17,9 @@ from fieldsid.logs.convert.conditioning import MAX_GAP_S
 from fieldsid.logs.few_of import few_of
 from fieldsid.logs.mapping.canonical_names import canonical
 from fieldsid.logs.mapping.vocabulary import TIME
-from fieldsid.logs.reader import JOINED, Inventory, Reader, ReadOptions, reader_of
+from fieldsid.logs.reader import JOINED, Inventory, RawLog, Reader, ReadOptions, reader_of
 from fieldsid.logs.run import OF_LIMITS, READ_WITH, STEP_LINES, Note, Run, signal_of
 from fieldsid.records.reading import read_yaml
-
-if TYPE_CHECKING:
-    from fieldsid.logs.mapping.certain import Certain
 
 MAPPING_FILE = "mapping.yaml"
 WANTED = frozenset({"yaw_rad", "yaw_rate_rad_s", "surge_m_s"})
@@ -65,12 +62,15 @@ def load_run(
     run = assemble(raw, chosen, path, options, part=part, max_gap_s=max_gap_s)
     if raw.finished:
         return _judged_anew(run, fin_max_rad or {})
+    return judged(replace(run, notes=(*notes, *run.notes)), raw, chosen, fin_max_rad)
+
+
+def judged(run: Run, raw: RawLog, mapping: ChannelMap, fin_max_rad: Mapping[str, float] | None = None) -> Run:
+    """Return a run, as it was read with a mapping, with the doctor's findings behind its notes."""
     from fieldsid.logs.doctor.examine import examine
     from fieldsid.logs.doctor.stated import stated_by
 
-    return Run(
-        run.name, run.time, run.signals, path, (*notes, *run.notes, *examine(run, fin_max_rad or {}, stated_by(chosen, raw)))
-    )
+    return replace(run, notes=(*run.notes, *examine(run, fin_max_rad, stated_by(mapping, raw))))
 
 
 def _judged_anew(run: Run, fin_max_rad: Mapping[str, float]) -> Run:
@@ -115,8 +115,11 @@ def map_for(
     is_open = mapping is None and not channels and (chosen is None or chosen.origin is None)
     told = frozenset[str]() if complete is None else frozenset(complete.sources)
     if complete is None or (recognise and is_open and not (is_enough(told) and told >= WANTED)):
+        from fieldsid.logs.mapping.certain import certain_of
+        from fieldsid.logs.mapping.propose import propose
+
         found = reader.inventory(path, options, TableForm())
-        certain = _recognised(found, reader, options) if recognise and is_open else None
+        certain = certain_of(propose(found, reader, options)) if recognise and is_open else None
         mapped = None if certain is None else certain.mapping
         # what a log's own names tell is sure: where that is enough, others join it and replace none of it
         if certain is not None and mapped is not None and (not is_enough(told) or told < mapped.sources.keys()):
@@ -163,13 +166,6 @@ def _loaded(mapping: ChannelMap | Path) -> ChannelMap:
     from fieldsid.logs.mapping.mapping_file import load_mapping
 
     return load_mapping(mapping)
-
-
-def _recognised(found: Inventory, reader: Reader, options: ReadOptions) -> Certain:
-    from fieldsid.logs.mapping.certain import certain_of
-    from fieldsid.logs.mapping.propose import propose
-
-    return certain_of(propose(found, reader, options))
 
 
 def _unmapped(

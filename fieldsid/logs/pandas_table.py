@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.errors import FieldsidError, LogError, MappingError
+from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ChannelMap, Source
 from fieldsid.logs.convert.assemble import assemble
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
-from fieldsid.logs.load import chosen_map
+from fieldsid.logs.load import chosen_map, judged
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.readers._columns import Columns, own_map_of, series_of
@@ -52,26 +53,17 @@ def run_of_frame(
         options = ReadOptions(None, salvage)
         raw = series_of(place, columns, chosen, (), options)
         run = assemble(raw, chosen, place, options, max_gap_s=max_gap_s)
-    except (LogError, MappingError) as error:
-        raise _of_table(error) from error
-    from fieldsid.logs.doctor.examine import examine
-    from fieldsid.logs.doctor.stated import stated_by
-
-    return Run(called, run.time, run.signals, None, (*run.notes, *examine(run, fin_max_rad or {}, stated_by(chosen, raw))))
+    except (LogError, MappingError) as error:  # the readers' own hints name commands that take files
+        raise type(error)(error.what, found=error.found, hint=_HINT) from error
+    return judged(replace(run, name=called, source=None), raw, chosen, fin_max_rad)
 
 
 def _map(called: str, names: tuple[str, ...], mapping: ChannelMap | Path | None, channels: Mapping[str, Source]) -> ChannelMap:
     chosen = chosen_map(mapping, own_map_of(names), channels)
     if chosen is None:
-        raise MappingError(
-            f"`{called}` has no time and signal that are known by their names", found=", ".join(names) or "no columns"
-        )
+        what = f"`{called}` has no time and signal that are known by their names"
+        raise MappingError(what, found=", ".join(names) or "no columns")
     return chosen
-
-
-def _of_table(error: FieldsidError) -> FieldsidError:
-    """Return an error with a hint for who holds a table: the readers' own name commands that take files."""
-    return type(error)(error.what, found=error.found, hint=_HINT)
 
 
 def _with_time(frame: DataFrame) -> DataFrame:

@@ -140,10 +140,6 @@ class Inventory(Brief):
         return self.table is None or bool(self.table.header)
 
 
-def _unseen(share: float) -> None:
-    """Show the progress to nobody."""
-
-
 @dataclass(frozen=True, slots=True)
 class ReadOptions:
     """What a caller may ask of any reader: a folder of .msg files, and to take what is left of a damaged log.
@@ -158,7 +154,7 @@ class ReadOptions:
     command: str = "sysid import LOG"
     clock: Source | None = None
     joined: tuple[Path, ...] = ()
-    progress: Callable[[float], None] = _unseen
+    progress: Callable[[float], None] = lambda _: None
 
     def with_option(self, option: str) -> str:
         """Return the command that imports the log with one option more, into a folder of its own."""
@@ -234,9 +230,7 @@ def _is_empty(path: Path) -> bool:
 def _missing(path: Path) -> LogError:
     if path.is_symlink():
         return LogError(f"`{path}` is a link to nothing", found=f"it points to `{path.readlink()}`", hint="mend the link")
-    found = neighbours(path)
-    hint = near_files(path) if found.startswith("`") else "check the path"
-    return LogError(f"there is no log `{path}`", found=found, hint=hint)
+    return LogError(f"there is no log `{path}`", found=neighbours(path), hint=near_files(path))
 
 
 def neighbours(path: Path) -> str:

@@ -6,7 +6,7 @@ nothing is NaN: gaps stay gaps.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -88,6 +88,11 @@ class Note(Brief):
     data: Annotated[Mapping[str, Any], Key("What the sentence rests on: values, limits, the hint's option.")] = field(
         default_factory=dict
     )
+
+
+def origin_of(notes: Iterable[Note]) -> float:
+    """Return the log's own time at time 0, in s: two readings of other fields start at other messages."""
+    return next((n.data["origin_ns"] / 1e9 for n in notes if n.code == "time_origin"), 0.0)
 
 
 SIMULATED = "simulated"

@@ -20,18 +20,21 @@ ULOG = b"ULog\x01\x12\x35"
 DATAFLASH = b"\xa3\x95\x80"
 ULOG_HEADER = 16
 """Bytes of a ULog file's header: signature, version and time of the start."""
+NO_READER = ", for which no reader is installed"
 FOREIGN: Mapping[bytes, tuple[str, str]] = MappingProxyType(
     {
-        b"\x89HDF": ("an HDF5 file", "write a table from it"),
-        b"PK\x03\x04": ("a ZIP file, as .xlsx and .npz are too", "unpack it, or write a table from it"),
-        b"BZh": ("a bzip2 file", "unpack it: `bunzip2 -k {path}`"),
-        b"\xfd7zXZ\x00": ("an xz file", "unpack it: `unxz -k {path}`"),
-        b"\x28\xb5\x2f\xfd": ("a zstd file", "unpack it: `unzstd {path}`"),
-        b"\x93NUMPY": ("a NumPy array", "write a table with a header from it"),
+        b"\x89HDF": ("an HDF5 file" + NO_READER, "write a table from it"),
+        b"PK\x03\x04": ("a ZIP file, as .xlsx and .npz are too" + NO_READER, "unpack it, or write a table from it"),
+        b"BZh": ("a bzip2 file" + NO_READER, "unpack it: `bunzip2 -k {path}`"),
+        b"\xfd7zXZ\x00": ("an xz file" + NO_READER, "unpack it: `unxz -k {path}`"),
+        b"\x28\xb5\x2f\xfd": ("a zstd file" + NO_READER, "unpack it: `unzstd {path}`"),
+        b"\x93NUMPY": ("a NumPy array" + NO_READER, "write a table with a header from it"),
+        b"\x89PNG": ("a picture, not a log", ""),
+        b"%PDF": ("a document, not a log", ""),
+        b"\x7fELF": ("a program, not a log", ""),
     }
 )
 """Binary formats by their signature: what they are, and how to make a log of them where there is a way."""
-NO_LOG = MappingProxyType({b"\x89PNG": "a picture", b"%PDF": "a document", b"\x7fELF": "a program"})
 TABLE = "write a table from it, a column for each signal"
 TEXTS: tuple[tuple[re.Pattern[str], str, str], ...] = (
     (re.compile(r"^[$!][A-Z]{2,}[A-Z0-9]*,"), "a log of NMEA 0183 sentences", TABLE),
@@ -65,7 +68,7 @@ def is_text(path: Path) -> bool:
     head = head_of(path)
     if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return True
-    if head.startswith((*FOREIGN, *NO_LOG)) or _is_read_elsewhere(head) or _OWN.search(head):
+    if head.startswith(tuple(FOREIGN)) or _is_read_elsewhere(head) or _OWN.search(head):
         return False
     return b"\x00" not in head[:512] or head[:512].count(b"\x00") > len(head[:512]) // 4
 
@@ -114,11 +117,7 @@ def not_a_log(path: Path, suffixes: Sequence[str]) -> LogError:
         return LogError(f"`{path}` starts as a log of another kind does, and is none", found=size, hint=COPY_AGAIN)
     for signature, (what, way) in FOREIGN.items():
         if head.startswith(signature):
-            hint = way.format(path=quote(str(path)))
-            return LogError(f"`{path}` is {what}, for which no reader is installed", found=size, hint=hint)
-    for signature, what in NO_LOG.items():
-        if head.startswith(signature):
-            return LogError(f"`{path}` is {what}, not a log", found=size, hint=give)
+            return LogError(f"`{path}` is {what}", found=size, hint=way.format(path=quote(str(path))) or give)
     return LogError(f"`{path}` is no log this program reads", found=f"{size} with no known signature", hint=give)
 
 

@@ -20,19 +20,12 @@ def unless_log(path: Path, wanted: str) -> Iterator[None]:
     try:
         yield
     except ArtifactError as error:
-        log = None if _has_keys(path) else if_log(path, wanted)
-        if log is None:
-            raise
-        raise log from error
-
-
-def _has_keys(path: Path) -> bool:
-    """Whether a file is YAML with keys, which lines of numbers are not."""
-    try:
-        read_yaml(path)
-    except ArtifactError:
-        return False
-    return True
+        try:
+            read_yaml(path)
+        except ArtifactError:  # lines of numbers are no YAML with keys
+            if (log := if_log(path, wanted)) is not None:
+                raise log from error
+        raise
 
 
 def if_log(path: Path, wanted: str) -> ArtifactError | None:

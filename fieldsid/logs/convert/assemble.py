@@ -76,12 +76,13 @@ def assemble(
         notes += fills + lines
     for name in {"roll_rad", "pitch_rad"} & tracks.keys():
         tracks[name] = replace(tracks[name], values=about_level(tracks[name].values))
-    time, signals, clock_notes = _on_one_clock(raw, tracks, mapping)
+    time, signals, found = _on_one_clock(raw, tracks, mapping)
+    notes += found
     if time.size < 2:
-        counted = _counted(time, [*notes, *clock_notes])
+        counted = _counted(time, notes)
         raise LogError(f"`{path}` has too few samples", found=counted, hint=f"{_inspect(path)} shows what is in it")
     signals = {s: signals[s] for s in COLUMNS if s in signals}
-    run = Run(raw.name, time, signals, path, _distinct([*notes, *clock_notes]))
+    run = Run(raw.name, time, signals, path, tuple({(n.code, n.message): n for n in notes}.values()))
     run = run if part == WHOLE else run.between(*part)
     refuse_long_gaps(run.time, run.signals, options, limit_s=max_gap_s)
     return run
@@ -205,7 +206,3 @@ def _quaternion(signal: str, series: Series, source: Source, mapping: ChannelMap
 def _position(signal: str, series: Series, source: Source, mapping: ChannelMap) -> dict[str, FloatArray]:
     degrees = series.values if source.unit is None else scaled(series.values, pick_unit(source.unit, "angle").factor / DEGREE)
     return dict(zip(("x_m", "y_m"), north_and_east(degrees), strict=True))
-
-
-def _distinct(notes: list[Note]) -> tuple[Note, ...]:
-    return tuple({(n.code, n.message): n for n in notes}.values())

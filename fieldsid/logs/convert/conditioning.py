@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import LogError
+from fieldsid.logs.convert.times.clock_text import FEW_STEPS
 from fieldsid.logs.convert.times.time_column import unit_of_step
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.run import FINS, Note
@@ -17,8 +18,6 @@ from fieldsid.numerics.arrays import BoolArray, FloatArray
 MAX_GAP_S = 2.0
 """A main signal missing for longer than this inside a run is refused unless the user raises the limit."""
 
-OWN_STEPS = 5.0
-"""Steps of a signal's own that are no gap of it, however long they are."""
 WORTH_TAKING = 10
 """Samples above which a part without a gap is named in a hint."""
 ROUNDING = 1.01
@@ -94,19 +93,16 @@ def in_order(time: FloatArray, label: str, options: ReadOptions | None = None) -
 
 def _disorder(stamps: FloatArray, label: str, options: ReadOptions, *, left: float) -> LogError:
     steps = np.diff(stamps)
-    back, repeated = np.flatnonzero(steps < 0), np.flatnonzero(steps == 0)
-    hint = options.salvaging("leave such samples out", left) or "check that this is the time, and sort the samples by it"
-    if back.size:
-        i = int(back[0])
-        places = f"the first from {stamps[i]:.10g} to {stamps[i + 1]:.10g} s at sample {i + 2}"
-        return LogError(f"time goes backwards in {label}", found=f"{back.size} of {steps.size} steps, {places}", hint=hint)
-    i = int(repeated[0])
-    hint = options.salvaging("leave such samples out", left) or "check that this is the time; if it is, log it with more digits"
-    return LogError(
-        f"time repeats in {label}",
-        found=f"{repeated.size} of {steps.size} steps, the first at {stamps[i]:.10g} s, samples {i + 1} and {i + 2}",
-        hint=hint,
-    )
+    wrong = np.flatnonzero(steps < 0) if bool((steps < 0).any()) else np.flatnonzero(steps == 0)
+    i, counted = int(wrong[0]), f"{wrong.size} of {steps.size} steps, the first"
+    if steps[i] < 0:
+        what, otherwise = "goes backwards", "check that this is the time, and sort the samples by it"
+        found = f"{counted} from {stamps[i]:.10g} to {stamps[i + 1]:.10g} s at sample {i + 2}"
+    else:
+        what, otherwise = "repeats", "check that this is the time; if it is, log it with more digits"
+        found = f"{counted} at {stamps[i]:.10g} s, samples {i + 1} and {i + 2}"
+    hint = options.salvaging("leave such samples out", left) or otherwise
+    return LogError(f"time {what} in {label}", found=found, hint=hint)
 
 
 def gaps_in(time: FloatArray, values: FloatArray) -> list[Gap]:
@@ -116,29 +112,32 @@ def gaps_in(time: FloatArray, values: FloatArray) -> list[Gap]:
     return [Gap(float(time[seen[i]]), float(time[seen[i + 1]]), int(seen[i + 1] - seen[i] - 1)) for i in wide]
 
 
-def gap_limit(time: FloatArray, values: FloatArray, limit_s: float) -> float:
-    """Return the longest gap in s that is allowed in a signal (n,): the limit, and never less than a few of its own steps."""
-    steps = np.diff(time[np.isfinite(values)])
-    return max(limit_s, OWN_STEPS * float(np.median(steps))) if steps.size else limit_s
+def long_gaps(time: FloatArray, signals: Mapping[str, FloatArray], limit_s: float) -> list[tuple[Gap, str, float]]:
+    """Return the gaps of main signals (n,) above a limit in s, which a few of a slow signal's own steps raise; each with both."""
+    found = []
+    for signal in (s for s in MAIN if s in signals):
+        steps = np.diff(time[np.isfinite(signals[signal])])
+        limit = max(limit_s, FEW_STEPS * float(np.median(steps))) if steps.size else limit_s
+        found += [(gap, signal, limit) for gap in gaps_in(time, signals[signal]) if gap.length_s > ROUNDING * limit]
+    return found
 
 
 def refuse_long_gaps(
     time: FloatArray, signals: Mapping[str, FloatArray], options: ReadOptions | None = None, *, limit_s: float = MAX_GAP_S
 ) -> None:
-    """Raise LogError naming the longest gap of a main signal above the limit, which a slow signal's own steps raise."""
+    """Raise LogError naming the longest of the long gaps."""
     options = options or ReadOptions()
-    limits = {s: gap_limit(time, signals[s], limit_s) for s in MAIN if s in signals}
-    long = [(g, s) for s, limit in limits.items() for g in gaps_in(time, signals[s]) if g.length_s > ROUNDING * limit]
-    if not long:
+    found = long_gaps(time, signals, limit_s)
+    if not found:
         return
-    gap, signal = max(long, key=lambda found: found[0].length_s)
+    gap, signal, limit = max(found, key=lambda of: of[0].length_s)
     length = gap.length_s
-    start, end = _longest_without(time, [g for g, _ in long])
+    start, end = _longest_without(time, [g for g, _, _ in found])
     hint = f"accept it: {options.with_option(f'--max-gap {length + 0.1:.1f}')}"
     if np.count_nonzero((time >= start) & (time <= end)) > WORTH_TAKING:
         hint += f"; or take the longest part without one: {options.with_option(f'--from {start:.2f} --to {end:.2f}')}"
     raise LogError(
-        f"`{signal}` is missing for {length:.2f} s (limit {limits[signal]:.3g} s)",
+        f"`{signal}` is missing for {length:.2f} s (limit {limit:.3g} s)",
         found=f"{gap.count} samples without a number between {gap.start_s:.2f} and {gap.end_s:.2f} s",
         hint=hint,
     )

@@ -28,7 +28,6 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.trapezoid import trapezoid_integral
 from fieldsid.numerics.white_noise import robust_white_noise_std
 
-TURN = 2.0 * math.pi
 FASTEST_RAD_S = 3.0
 """A step faster than this is no motion; a way round that takes longer than a turn at it is a real one."""
 SLACK_RAD_S = 0.5
@@ -129,7 +128,7 @@ def _path(time: FloatArray, values: FloatArray, rate: Track | None) -> _Path | N
     least = max(MIN_JUMP_RAD, NOISES * math.sqrt(2.0) * noise)
     limit = np.maximum(FASTEST_RAD_S * dt, least)
     jumps = np.flatnonzero(np.abs(steps) > limit)
-    spread = float(np.ptp(values)) - TURN
+    spread = float(np.ptp(values)) - math.tau
     if not jumps.size or (2 * jumps.size > steps.size and spread > least):
         return None
     calm = np.flatnonzero(np.abs(turned) <= limit)
@@ -138,7 +137,7 @@ def _path(time: FloatArray, values: FloatArray, rate: Track | None) -> _Path | N
 
 def within_half_turn(angle: FloatArray) -> FloatArray:
     """Return angles (n,) in rad within half a turn."""
-    return np.asarray(angle - TURN * np.round(angle / TURN))
+    return np.asarray(angle - math.tau * np.round(angle / math.tau))
 
 
 def noise_of_steps(turned: FloatArray) -> float:
@@ -186,8 +185,8 @@ def _line(path: _Path, jump: int) -> tuple[int, int] | None:
         first -= 1
     while last < path.time.size - 1 and path.stands_out(last, sign):
         last += 1
-    off = abs(path.excess(first, last) - sign * TURN)
-    whole = last - first > 1 and path.duration(first, last) <= TURN / FASTEST_RAD_S
+    off = abs(path.excess(first, last) - sign * math.tau)
+    whole = last - first > 1 and path.duration(first, last) <= math.tau / FASTEST_RAD_S
     return (first, last) if whole and off <= path.bar(first, last) else None
 
 
@@ -206,5 +205,5 @@ def _there_and_back(path: _Path, jump: int) -> tuple[int, int] | None:
     if not at_wrap or first is None or last is None or last - first < 2:
         return None
     steps = range(max(first, 0), min(last, path.time.size - 1))
-    fast = any(abs(math.remainder(path.excess(k, k + 1), TURN)) > FASTEST_RAD_S * path.duration(k, k + 1) for k in steps)
+    fast = any(abs(math.remainder(path.excess(k, k + 1), math.tau)) > FASTEST_RAD_S * path.duration(k, k + 1) for k in steps)
     return (first, last) if fast else None

@@ -11,7 +11,7 @@ from fieldsid.logs.convert.conditioning import MAIN, likely_unit
 from fieldsid.logs.convert.times.time_column import FASTEST_S, SLOW_S
 from fieldsid.logs.doctor.angle_and_rate import angle_findings
 from fieldsid.logs.doctor.fin_findings import fin_findings, limit_findings
-from fieldsid.logs.doctor.pair_findings import course_findings, pair_findings
+from fieldsid.logs.doctor.pair_findings import pair_findings
 from fieldsid.logs.doctor.signal_findings import signal_findings
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import FINS, LINES, Note, Run
@@ -36,7 +36,6 @@ def examine(run: Run, fin_max_rad: Mapping[str, float] | None = None, stated: St
             *findings,
             *angle_findings(run, stated, faulty),
             *pair_findings(run, stated),
-            *course_findings(run, stated),
             *fin_findings(run),
         )
 
@@ -47,18 +46,14 @@ def _sampling(run: Run, stated: Stated) -> list[Note]:
     steps = np.diff(run.time)
     median = float(np.median(steps))
     found = []
-    if median > SLOW_S:
+    if median > SLOW_S or median < FASTEST_S:
         # a clock that counts in another unit goes on evenly; a glider that seldom writes does not
-        is_even = float(np.std(steps)) < JITTER_LIMIT * median
+        is_even, limit = float(np.std(steps)) < JITTER_LIMIT * median, SLOW_S if median > SLOW_S else FASTEST_S
         advice = (likely_unit(median) if is_even else "") or "log faster"
-        message = f"time goes on by {median:.3g} s a sample (limit {SLOW_S:g} s): {advice}"
-        found.append(Note("time_unit", message, {"value": median, "limit": SLOW_S}))
-    if median < FASTEST_S:
-        message = (
-            f"time goes on by {median:.3g} s a sample (limit {FASTEST_S:g} s): no vehicle's log is so fast; set its unit, as "
-            "`unit: min`, `unit: h` or `unit: d`"
-        )
-        found.append(Note("time_unit", message, {"value": median, "limit": FASTEST_S}))
+        if median < FASTEST_S:
+            advice = "no vehicle's log is so fast; set its unit, as `unit: min`, `unit: h` or `unit: d`"
+        message = f"time goes on by {median:.3g} s a sample (limit {limit:g} s): {advice}"
+        found.append(Note("time_unit", message, {"value": median, "limit": limit}))
     wide = steps > GAP_FACTOR * median
     if wide.any():
         at = int(np.argmax(steps))

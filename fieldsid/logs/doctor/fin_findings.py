@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fieldsid.errors import DataError
+from fieldsid.logs.channels import AXES
 from fieldsid.logs.convert.conditioning import blocks_of
 from fieldsid.logs.convert.servo_counts import servo_of
 from fieldsid.logs.doctor.holes import MOVED
@@ -27,13 +28,12 @@ EARLY = 0.15
 FEWEST = 5
 ROLLED = math.acos(0.9)
 """Roll in rad from which on the rate about the body's axis is a tenth off that of the heading: r = psi' cos(phi)."""
-_AXES = (("rudder_rad", "yaw_rate_rad_s"), ("elevator_rad", "pitch_rate_rad_s"))
 
 
 def fin_findings(run: Run) -> list[Note]:
     """Return the findings on the fins of a run, and on the roll under which they were used."""
     found = []
-    for fin, rate in _AXES:
+    for (_, rate), (fin, _) in AXES:
         if run.has(fin):
             found += [*_range(run, fin), *_early(run, fin, rate)]
     return [*found, *(_roll(run) if run.has("roll_rad") else [])]

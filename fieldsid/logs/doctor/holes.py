@@ -1,6 +1,6 @@
 """Holes in a fin's log that hide a move: what the fin did meanwhile nobody knows, and a fit that takes it as held is wrong.
 
-A log with a usual step has a hole where the next sample comes more than OWN_STEPS steps later, whether the other signals go on
+A log with a usual step has a hole where the next sample comes more than FEW_STEPS steps later, whether the other signals go on
 or not; a command that is published when it changes has none. Where the fin is at another angle after a hole the run is cut
 there, and the part in which the fin moves most is used.
 """
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.logs.convert.conditioning import OWN_STEPS
+from fieldsid.logs.convert.times.clock_text import FEW_STEPS
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
@@ -54,7 +54,7 @@ def holes_of(time: FloatArray, fin: FloatArray) -> tuple[Hole, ...]:
     usual = usual_step(steps)
     if usual is None:
         return ()
-    places = np.flatnonzero(steps > OWN_STEPS * usual)
+    places = np.flatnonzero(steps > FEW_STEPS * usual)
     return tuple(
         Hole(float(time[i]), float(time[j]), float(fin[i]), float(fin[j]))
         for i, j in ((seen[p], seen[p + 1]) for p in places.tolist())
@@ -76,7 +76,7 @@ def unbroken(run: Run, signal: str) -> Run:
     ends = [*(h.start_s for h in hidden), float(run.time[-1])]
     kept = [(a, b) for a, b in zip(starts, ends, strict=True) if b > a]
     parts = [run.between(a, b) for a, b in kept]
-    return max(parts, key=lambda part: _travel(part[signal])) if parts else run
+    return max(parts, key=lambda part: float(np.sum(np.abs(np.diff(part[signal][np.isfinite(part[signal])]))))) if parts else run
 
 
 def hole_notes(run: Run, signal: str) -> tuple[Note, ...]:
@@ -108,7 +108,3 @@ def _note(code: str, run: Run, signal: str, holes: Sequence[Hole], says: str) ->
 
 def _length(hole: Hole) -> float:
     return hole.end_s - hole.start_s
-
-
-def _travel(fin: FloatArray) -> float:
-    return float(np.sum(np.abs(np.diff(fin[np.isfinite(fin)]))))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldsid.logs.channels import AXES
 from fieldsid.logs.convert.heading_unwrap import ALIKE
 from fieldsid.logs.convert.units import UNIT_LIMIT, factor_to, unit_of_ratio
 from fieldsid.logs.doctor.angle_and_rate import LAG_S, TRUSTED
@@ -30,13 +31,12 @@ SLOWEST = 0.1
 SLOW_RPM = 30.0
 MOST_ADVANCE_M = 4.0
 """Way made in a turn of a propeller that is larger than any this program's vehicles have."""
-_FINS = (("rudder_rad", "rudder_measured_rad"), ("elevator_rad", "elevator_measured_rad"))
 
 
 def pair_findings(run: Run, stated: Stated) -> list[Note]:
     """Return the findings on pairs of signals of a run."""
-    of_fins = [note for command, fin in _FINS for note in _command_and_fin(run, command, fin, stated)]
-    return [*_speed_and_way(run, stated), *_speed_and_turns(run), *of_fins]
+    of_fins = [note for _, (command, fin) in AXES for note in _command_and_fin(run, command, fin, stated)]
+    return [*_speed_and_way(run, stated), *_speed_and_turns(run), *of_fins, *_course(run), *_dive(run, stated)]
 
 
 def _speed_and_way(run: Run, stated: Stated) -> list[Note]:
@@ -128,11 +128,6 @@ DEPTHS = {unit: factor_to("depth_m", unit) for unit in ("ft", "fathom", "cm", "m
 """Units in which a depth is logged, in m."""
 HEADINGS = {"deg": math.degrees(1.0), "rad": math.radians(1.0)}
 """Units in which a heading is that was taken for the other one, by how many times as far it turns."""
-
-
-def course_findings(run: Run, stated: Stated) -> list[Note]:
-    """Return the findings on the course and the slope of the way of a run."""
-    return [*_course(run), *_dive(run, stated)]
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,16 +36,11 @@ def signal_findings(run: Run, name: str, stated: Stated) -> list[Note]:
     seen = np.isfinite(values)
     if not seen.any():
         return [Note("empty", f"{name} has no sample", {"signal": name})]
-    found = _missing(name, seen)
     present = values[seen]
+    found = [*_missing(name, seen), *_size(run, name, present, stated)]
     if present.size > 2 and float(np.ptp(present)) == 0.0 and name not in GOALS.union(MOTORS):
         message = f"{name} is constant at {present[0]:.6g} over {present.size} samples; check the sensor, or map another one"
-        return [
-            *found,
-            *_size(run, name, present, stated),
-            Note("constant", message, {"signal": name, "value": float(present[0])}),
-        ]
-    found += _size(run, name, present, stated)
+        return [*found, Note("constant", message, {"signal": name, "value": float(present[0])})]
     if name in MEASURED and present.size > 20:
         found += [*_frozen(name, run.time[seen], present), *_coarse(name, present), *_spikes(name, run.time[seen], present)]
     return found
@@ -74,10 +69,8 @@ def _size(run: Run, name: str, values: FloatArray, stated: Stated) -> list[Note]
         servo = servo_of(values) if name in FINS and stated.is_si(name) else None
         advice, told = stated.probable(name, unit, largest, limit)
         if servo is not None:
-            told, advice = (
-                {},
-                f"whole numbers about {servo.centre:g}, as a servo has: set `unit: counts` and `centre: {servo.centre:g}`",
-            )
+            advice = f"whole numbers about {servo.centre:g}, as a servo has: set `unit: counts` and `centre: {servo.centre:g}`"
+            told = {}
         message = f"{name} reaches {largest:.4g} {SIGNALS[name]} (limit {limit:g}): {advice}"
         found.append(Note("unit", message, {"signal": name, "value": largest, "limit": limit, **told}))
     middle = float(np.median(values))

@@ -22,7 +22,7 @@ from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, ReadOptions, span_of
 from fieldsid.logs.readers._clock_columns import clocks_in_parts, dates_beside, elapsed
 from fieldsid.logs.readers._columns import Columns, is_counter, numbers_mostly, samples_of, time_of
-from fieldsid.logs.run import Note
+from fieldsid.logs.run import Note, origin_of
 from fieldsid.numerics.arrays import FloatArray
 
 REGULAR = 0.5
@@ -177,10 +177,8 @@ def _tried(columns: Columns, source: Source) -> Clock | None:
         time, notes = time_of(columns, source, unit, ReadOptions(salvage=True))
     except FieldsidError:  # what is no time is not taken for one
         return None
-    origin = next((n.data["origin_ns"] / 1e9 for n in notes if n.code == "time_origin"), 0.0)
-    time = time if source.scale is None else time * source.scale
     steps = np.diff(time[np.isfinite(time)])
-    return Clock(time, source, origin_s=origin) if steps.size and bool((steps > 0.0).mean() > MOSTLY) else None
+    return Clock(time, source, origin_s=origin_of(notes)) if steps.size and bool((steps > 0.0).mean() > MOSTLY) else None
 
 
 def _by_numbers(columns: Columns) -> Clock | None:

@@ -49,31 +49,21 @@ class Columns:
 
     def index(self, column: str | int, signal: str) -> int:
         """Return the index of a column; raises MappingError naming the near matches."""
+        places = [i for i, name in enumerate(self.names) if name == column]
         if isinstance(column, int):
             if 0 <= column < self.width:
                 return column
-            raise MappingError(
-                f"`{self.path}` has no column {column} for `{signal}`",
-                found=f"{self.width} columns, 0 to {self.width - 1}",
-                hint=f"columns are counted from 0: `sysid inspect {quote(str(self.path))}` lists them",
-                signal=signal,
-            )
-        places = [i for i, name in enumerate(self.names) if name == column]
-        if len(places) == 1:
+            what, found = f"no column {column} for `{signal}`", f"{self.width} columns, 0 to {self.width - 1}"
+            hint = f"columns are counted from 0: `sysid inspect {quote(str(self.path))}` lists them"
+        elif len(places) == 1:
             return places[0]
-        if places:
-            raise MappingError(
-                f"`{self.path}` has {len(places)} columns named `{column}`, and which is meant for `{signal}` is open",
-                found=f"columns {places}",
-                hint=f"name it by its place in a mapping, as `column: {places[0]}`",
-                signal=signal,
-            )
-        raise MappingError(
-            f"`{self.path}` has no column `{column}` for `{signal}`",
-            found=self.shown(),
-            hint=near(column, self.names) if self.names else f"use an index from 0 to {self.width - 1}",
-            signal=signal,
-        )
+        elif places:
+            what = f"{len(places)} columns named `{column}`, and which is meant for `{signal}` is open"
+            found, hint = f"columns {places}", f"name it by its place in a mapping, as `column: {places[0]}`"
+        else:
+            what, found = f"no column `{column}` for `{signal}`", self.shown()
+            hint = near(column, self.names) if self.names else f"use an index from 0 to {self.width - 1}"
+        raise MappingError(f"`{self.path}` has {what}", found=found, hint=hint, signal=signal)
 
     def shown(self) -> str:
         """Return the names of the columns for a message, the first ones where there are many."""
@@ -207,8 +197,7 @@ def _time(columns: Columns, mapping: ChannelMap, options: ReadOptions) -> tuple[
             found=columns.shown(),
             hint=way or (f"add `--channel {quote(f'time={guessed[0]}:s')}`" if guessed else NO_CLOCK),
         )
-    time, notes = time_of(columns, mapping.time, mapping.time.unit, options)
-    return time if mapping.time.scale is None else time * mapping.time.scale, notes
+    return time_of(columns, mapping.time, mapping.time.unit, options)
 
 
 def time_of(columns: Columns, source: Source, unit: str | None, options: ReadOptions) -> tuple[FloatArray, list[Note]]:
@@ -226,7 +215,8 @@ def time_of(columns: Columns, source: Source, unit: str | None, options: ReadOpt
     index = columns.index(source.column if source.column is not None else 0, TIME)
     weeks = None if source.week is None else columns.take(columns.index(source.week, TIME))
     unit = unit or columns.unit(index, TIME)
-    return seconds_of(columns.take(index), unit, options, name=columns.name(index), dates=dates, weeks=weeks)
+    time, notes = seconds_of(columns.take(index), unit, options, name=columns.name(index), dates=dates, weeks=weeks)
+    return time if source.scale is None else time * source.scale, notes
 
 
 def _without_blank_rows(columns: Columns, mapping: ChannelMap) -> tuple[Columns, list[Note]]:

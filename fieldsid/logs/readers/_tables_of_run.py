@@ -12,7 +12,7 @@ from pathlib import Path
 from shlex import quote
 
 from fieldsid.errors import LogError
-from fieldsid.logs.channels import TableForm
+from fieldsid.logs.channels import TableForm, is_enough
 from fieldsid.logs.few_of import few_of
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
@@ -20,8 +20,6 @@ from fieldsid.logs.reader import check_readable
 from fieldsid.logs.readers import csv_table
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import common_start, name_of_run, names_apart, shared_start, stem_of
-
-FINS, TURNING = ("rudder_rad", "elevator_rad"), ("yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s")
 
 
 def run_of(path: Path, joined: Sequence[Path]) -> list[Path]:
@@ -46,7 +44,7 @@ def runs_in(folder: Path) -> list[list[Path]]:
             by_header.setdefault(names, []).append(path)
     kinds = list(by_header.values())
     signals = {names: _signals(names) for names, kind in by_header.items() if len(kind) > 1}
-    if sum(map(len, kinds)) < 2 or any(map(_is_whole, signals.values())) or (len(kinds) == 1 and any(signals.values())):
+    if sum(map(len, kinds)) < 2 or any(map(is_enough, signals.values())) or (len(kinds) == 1 and any(signals.values())):
         return []
     marks = [_marks(kind) for kind in kinds]
     if len(kinds) > 1 and len(kinds[0]) > 1 and all(m.keys() == marks[0].keys() for m in marks):
@@ -104,11 +102,6 @@ def _names(path: Path) -> tuple[str, ...]:
 def _signals(names: Sequence[str]) -> set[str]:
     """Return what the columns of a table are by their names."""
     return {found[0] for name in names if (found := meaning_of(name)) is not None and found[0] != TIME}
-
-
-def _is_whole(signals: set[str]) -> bool:
-    """Whether a table of some signals is a run by itself: it has a fin and what it turns."""
-    return bool(signals & set(FINS)) and bool(signals & set(TURNING))
 
 
 def _several(folder: Path, runs: Sequence[Sequence[Path]]) -> LogError:

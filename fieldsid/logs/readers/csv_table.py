@@ -92,16 +92,15 @@ def columns_of(path: Path, form: TableForm, options: ReadOptions) -> tuple[Colum
 
 
 def names_of(path: Path, form: TableForm) -> tuple[str, ...]:
-    """Return the names of a table's columns; raises LogError where it is none."""
+    """Return the names of a table's columns, none of an empty text; raises LogError where it is no table."""
     with plain_text(path, form.encoding, limit=HEAD) as text:
-        return form_of(_head_of(path, text), form, path).names
+        head = _head_of(path, text)
+        return form_of(head, form, path).names if head.strip() else ()
 
 
 def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
     """Return the mapping of a table with canonical names, or None."""
-    with plain_text(path, limit=HEAD) as text:
-        head = _head_of(path, text)
-        return own_map_of(form_of(head, TableForm(), path).names) if head.strip() else None
+    return own_map_of(names_of(path, TableForm()))
 
 
 def _head_of(path: Path, text: PlainText) -> str:

@@ -5,7 +5,6 @@ So write FRC's and Influx's exporters, Signal K and many programs of one's own; 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -36,15 +35,6 @@ FEWEST, OFTEN = 2, 3
 """Keys that there must be, and how often one returns on the average."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Places:
-    """The columns of the time, the key and the value."""
-
-    time: int
-    key: int
-    value: int
-
-
 def sniff(path: Path) -> bool:
     """Whether a text table has a column of times, one of few words that return, and one of what was read."""
     if not csv_table.sniff(path):
@@ -58,7 +48,8 @@ def sniff(path: Path) -> bool:
     return _places(form, head) is not None
 
 
-def _places(form: Form, head: str) -> _Places | None:
+def _places(form: Form, head: str) -> tuple[int, int, int] | None:
+    """Return the columns of the time, the key and the value; None where there are none."""
     names = [set(words_of(name)) for name in form.names]
     times = [i for i, name in enumerate(form.names) if (meaning := meaning_of(name)) is not None and meaning[0] == TIME]
     keys = [i for i, words in enumerate(names) if words & KEYS and i not in times]
@@ -69,7 +60,7 @@ def _places(form: Form, head: str) -> _Places | None:
         said = [row[key] for row in rows]
         are_words = all(is_word(word, form.decimal) for word in said)
         if are_words and FEWEST <= len(set(said)) <= len(said) / OFTEN and any(not is_word(r[value], form.decimal) for r in rows):
-            return _Places(time, key, value)
+            return time, key, value
     return None
 
 
@@ -79,10 +70,9 @@ def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
         places = _places(table.form, table.text.head())
         if places is None:
             raise LogError(f"`{path}` is no table of keys and values", found=", ".join(table.form.names), hint="name its columns")
-        columns = table.columns((places.time, places.key, places.value))
-        time, notes = _times(columns, places.time)
-        said = columns.take(places.key).astype(str)
-        values = as_numbers(columns.take(places.value))[0]
+        columns = table.columns(places)
+        time, notes = _times(columns, places[0])
+        said, values = columns.take(places[1]).astype(str), as_numbers(columns.take(places[2]))[0]
         found = {str(key): _topic(time, values, said == key) for key in np.unique(said)}
         return Topics(found, notes=(*table.notes, *notes))
 

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ATTITUDE, ChannelMap, TableForm
+from fieldsid.logs.convert.times.clock_text import FEW_STEPS
 from fieldsid.logs.convert.times.time_column import EPOCH_FROM_S
 from fieldsid.logs.few_of import few_of
 from fieldsid.logs.mapping.canonical_names import words_of
@@ -35,8 +36,6 @@ TABLES: Mapping[str, Callable[[Path, TableForm, ReadOptions], tuple[Columns, tup
     {csv_table.READER.name: csv_table.columns_of, parquet.READER.name: parquet.columns_of}
 )
 """The readers of one table, and what gives its columns and notes."""
-ALIKE_STEPS = 5.0
-"""Steps by which two tables that count from a start of their own may begin and end apart, and be taken for one run unsaid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +180,7 @@ def _joined(parts: Mapping[str, Part]) -> list[Note]:
     step = max(float(np.median(np.diff(p.topic.time))) for p in parts.values())
     ends = [p.span for p in parts.values()]
     off = max(float(np.ptp([e[k] for e in ends])) for k in (0, 1))
-    if start == "a start of its own" and off > ALIKE_STEPS * step:
+    if start == "a start of its own" and off > FEW_STEPS * step:
         message = f"the tables begin or end {off:.2f} s apart, and count from a start of their own: check that it is one clock"
         notes.append(Note("clock_assumed", message, {"seconds": off}))
     return notes

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.logs.convert.conditioning import MAIN, OWN_STEPS, blocks_of
+from fieldsid.logs.convert.conditioning import MAIN, blocks_of
+from fieldsid.logs.convert.times.clock_text import FEW_STEPS
 from fieldsid.logs.doctor.pair_findings import SLOWEST
 from fieldsid.logs.few_of import few_of
 from fieldsid.logs.run import MOTORS, Note, Run
@@ -40,7 +41,7 @@ def stretches_of(run: Run) -> tuple[tuple[Part, ...], tuple[Note, ...]]:
     }
     off = {why: _long(run.time, mask) for why, mask in reasons.items()}
     away = np.any(np.stack(list(off.values())), axis=0)
-    breaks = np.flatnonzero((np.diff(run.time) > max(OFF_S, OWN_STEPS * float(np.median(np.diff(run.time))))) | np.diff(away)) + 1
+    breaks = np.flatnonzero((np.diff(run.time) > max(OFF_S, FEW_STEPS * float(np.median(np.diff(run.time))))) | np.diff(away)) + 1
     parts = [p for p in np.split(np.arange(run.time.size), breaks) if not away[p[0]]]
     found = ((float(run.time[p[0]]), float(run.time[p[-1]])) for p in parts)
     kept = tuple((start, end) for start, end in found if end - start >= LEAST_S)

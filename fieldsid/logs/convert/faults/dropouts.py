@@ -9,7 +9,6 @@ rests is one that many jumps end at.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -43,39 +42,30 @@ def _as_many(count: int, usual: float) -> float:
     return max(1.0 - sum(math.exp(-usual + i * math.log(usual) - math.lgamma(i + 1)) for i in range(count)), 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Dropout:
-    """A number that stands where a sensor had nothing: how often it was jumped to, and how many samples it has."""
-
-    number: float
-    count: int
-    samples: int
-
-    def note(self, name: str) -> Note:
-        """Return the finding that a signal jumps to one number and back, time and again."""
-        unit, number = SIGNALS[name], f"{self.number:.6g}"
-        if unit in ("rad", "rad/s"):  # most logs have it in degrees
-            number += f" {unit} ({math.degrees(self.number):.6g} {unit.replace('rad', 'deg')})"
-        message = (
-            f"{name} jumps to exactly {number} and back {self.count} times, {self.samples} samples in all (limit {FEWEST}): what "
-            f"its sensor or logger writes where it has nothing; they are missing now"
-        )
-        data = {"signal": name, "value": self.count, "limit": FEWEST, "number": self.number, "samples": self.samples}
-        return Note("dropouts", message, data)
+def _note(name: str, number: float, count: int, samples: int) -> Note:
+    """Return the finding that a signal jumps to one number and back so often, and how many samples it has."""
+    unit, shown = SIGNALS[name], f"{number:.6g}"
+    if unit in ("rad", "rad/s"):  # most logs have it in degrees
+        shown += f" {unit} ({math.degrees(number):.6g} {unit.replace('rad', 'deg')})"
+    message = (
+        f"{name} jumps to exactly {shown} and back {count} times, {samples} samples in all (limit {FEWEST}): what "
+        f"its sensor or logger writes where it has nothing; they are missing now"
+    )
+    return Note("dropouts", message, {"signal": name, "value": count, "limit": FEWEST, "number": number, "samples": samples})
 
 
 def without_dropouts(name: str, values: FloatArray) -> tuple[FloatArray, list[Note]]:
     """Return a signal (n,) with its drop-outs missing, and the notes that say so."""
     notes = list[Note]()
     while (found := _dropout_of(values[np.isfinite(values)])) is not None:
-        notes.append(found.note(name))
-        values = np.where(values == found.number, np.nan, values)
+        notes.append(_note(name, *found))
+        values = np.where(values == found[0], np.nan, values)
     return values, notes
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def _dropout_of(values: FloatArray) -> Dropout | None:
-    """Return the number to which a signal (n,) without gaps jumps and back time and again; None where it does not."""
+def _dropout_of(values: FloatArray) -> tuple[float, int, int] | None:
+    """Return the number to which a signal (n,) without gaps jumps and back again, how often, and its samples; None for none."""
     if values.size < 20:
         return None
     steps = np.diff(values)
@@ -92,4 +82,4 @@ def _dropout_of(values: FloatArray) -> Dropout | None:
     chance = max(_chance(count, np.delete(counts, k)), _as_many(count, far.size * samples / values.size))
     if count < FEWEST or left < FEWEST - 1 or chance > MOST_CHANCE:
         return None
-    return Dropout(number, count, samples)
+    return number, count, samples

@@ -138,18 +138,14 @@ def lost_hours(name: str, times: int, period_s: float) -> Note:
 
 
 FEW_STEPS = 5.0
-"""Steps of a log that may be missing where its time starts again."""
+"""Steps of a log, or of a signal's own, that are no gap, however long they are: so many may be missing."""
 ROUNDS_S = {"minute": MINUTE_S, "hour": HOUR_S, "day": DAY_S, "week": WEEK_S}
 COUNTERS = {"16 bits": 2.0**16, "32 bits": 2.0**32}
 """Numbers after which a counter starts again, whatever its unit."""
 
 
-@dataclass(frozen=True, slots=True)
-class Round:
-    """What a time starts again with, in words, and after which number."""
-
-    words: str
-    period: float
+Round = tuple[str, float]
+"""What a time starts again with, in words, and after which number."""
 
 
 def round_of(values: npt.NDArray[Any], factor: float) -> Round | None:
@@ -162,16 +158,17 @@ def round_of(values: npt.NDArray[Any], factor: float) -> Round | None:
     if not ahead.size or not bool((steps < 0.0).any()):
         return None
     usual, span = float(np.median(ahead)), float(np.ptp(values.astype(np.float64)))
-    rounds = [Round(f"each {name}", s / factor) for name, s in ROUNDS_S.items()]
-    for found in [*rounds, *(Round(f"after {bits}", size) for bits, size in COUNTERS.items())]:
-        falls = steps[steps < -0.5 * found.period] + found.period
-        if span <= found.period and falls.size and float((falls <= FEW_STEPS * usual).mean()) > 0.5:
-            return found
+    rounds = [(f"each {name}", s / factor) for name, s in ROUNDS_S.items()]
+    for words, period in [*rounds, *((f"after {bits}", size) for bits, size in COUNTERS.items())]:
+        falls = steps[steps < -0.5 * period] + period
+        if span <= period and falls.size and float((falls <= FEW_STEPS * usual).mean()) > 0.5:
+            return words, period
     return None
 
 
 def gone_on(values: FloatArray, found: Round, name: str) -> tuple[FloatArray, Note]:
     """Return numbers (n,) of time that do not start again, and the note that says how often they did."""
-    whole, times = going_on(values, found.period)
-    message = f"`{name}` starts again {found.words}, {times} time{'s' * (times != 1)}: taken for one time that goes on"
-    return whole, Note("starts_again", message, {"count": times, "period": found.period})
+    words, period = found
+    whole, times = going_on(values, period)
+    message = f"`{name}` starts again {words}, {times} time{'s' * (times != 1)}: taken for one time that goes on"
+    return whole, Note("starts_again", message, {"count": times, "period": period})

@@ -30,7 +30,7 @@ from fieldsid.logs.mapping.numbers.units_told import Reading, as_counts, fin_rea
 from fieldsid.logs.mapping.trial import Log
 from fieldsid.logs.mapping.vocabulary import COMMANDED, MEASURED, OF_ANOTHER, word_set
 from fieldsid.logs.reader import Inventory, Series
-from fieldsid.logs.run import FINS, Note, Run
+from fieldsid.logs.run import FINS, Note, Run, origin_of
 from fieldsid.numerics.arrays import FloatArray
 
 OUTPUTS = word_set("servo servomotor actuator actuators rcou output outputs control controls")
@@ -184,7 +184,7 @@ def _read(log: Log, body: Mapping[str, Any], family: Family, run: Run) -> list[_
         raw = log.read(mapping_of({**body, "signals": signals}))
     except FieldsidError:  # what cannot be read is no fin
         return []
-    shift = _origin_s(raw.notes) - _origin_s(run.notes)
+    shift = origin_of(raw.notes) - origin_of(run.notes)
     seen = {
         name: _held(series, run.time - shift)
         for name, series in zip(family, raw.series.values(), strict=True)
@@ -200,11 +200,6 @@ def _read(log: Log, body: Mapping[str, Any], family: Family, run: Run) -> list[_
 def _held(series: Series, time: FloatArray) -> FloatArray:
     good = np.isfinite(series.time) & np.isfinite(series.values)
     return held(Track(series.time[good], series.values[good]), time)
-
-
-def _origin_s(notes: tuple[Note, ...]) -> float:
-    """Return the log's own time at time 0, in s: two readings of other fields start at other messages."""
-    return next((n.data["origin_ns"] / 1e9 for n in notes if n.code == "time_origin"), 0.0)
 
 
 def _how(names: list[str], unit: str | None, values: FloatArray) -> Reading:

@@ -15,7 +15,6 @@ from itertools import permutations, product
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fieldsid.logs.convert.frames import north_and_east
 from fieldsid.logs.convert.units import CLEARLY, UNITS
@@ -25,7 +24,7 @@ from fieldsid.logs.mapping.fins.shares import EXPLAINS, beyond, explained, expla
 from fieldsid.logs.mapping.fins.shares import WINDOWS_S as SHORT_S
 from fieldsid.logs.mapping.numbers.units_told import Reading, fin_reading, in_radians
 from fieldsid.logs.reader import Samples
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.arrays import ComplexArray, FloatArray
 from fieldsid.numerics.shifted_correlation import slope_of
 
 WINDOWS_S = (*SHORT_S, 10.0)
@@ -52,7 +51,6 @@ MOST_COLUMNS = 40
 PLACE = ("x_m", "y_m")
 """Of degrees too, which `is_geographic` tells."""
 Column = str | int
-ComplexArray = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,22 +163,14 @@ def recognised(samples: Samples, known: Mapping[str, Column], free: list[Column]
     """
     best: tuple[Recognised, ...] = ()
     moving = [c for c in free if _moves(samples.columns[c])] if len(free) <= MOST_COLUMNS else []
-    for scene in _scenes(samples, known, moving):
+    widths = (width_of(samples.time, window) for window in WINDOWS_S)
+    for scene in (_Scene(samples, width, known, moving) for width in widths if samples.time.size > width + FEWEST):
         for way in _ways(scene):
             seen = scene.knowing(way)
             for tie in TIES:
                 seen = seen.knowing(_tied(seen, tie))
-            best = max(best, seen.knowing(_fin(seen)).found, key=_worth)
+            best = max(best, seen.knowing(_fin(seen)).found, key=lambda found: sum(r.trust for r in found))
     return best
-
-
-def _scenes(samples: Samples, known: Mapping[str, Column], free: list[Column]) -> Iterator[_Scene]:
-    widths = (width_of(samples.time, window) for window in WINDOWS_S)
-    yield from (_Scene(samples, width, known, free) for width in widths if samples.time.size > width + FEWEST)
-
-
-def _worth(found: tuple[Recognised, ...]) -> float:
-    return sum(r.trust for r in found)
 
 
 def _moves(values: FloatArray) -> bool:

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fieldsid.logs.convert.frames import north_and_east
 from fieldsid.logs.convert.units import CLEARLY
@@ -29,7 +28,7 @@ from fieldsid.logs.mapping.vocabulary import COMMANDED, COMPASS, LATITUDE, LONGI
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import Samples
 from fieldsid.logs.run import Note, Run
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.arrays import ComplexArray, FloatArray
 
 LEAD_S = 1.0
 """Time over which a course is taken: in a longer one a vehicle turns more than once."""
@@ -106,7 +105,6 @@ NEAR = math.pi / 4
 ENU = "ENU"
 GEOGRAPHIC = frozenset({"north", "northing", "east", "easting", "n", "e", "utm"})
 """Words of a column of metres that say which way it counts."""
-ComplexArray = npt.NDArray[np.complex128]
 
 
 def true_north(samples: Samples, names: Sequence[str], signals: Mapping[str, Any]) -> list[Note]:
