@@ -102,9 +102,14 @@ def _explains_beyond_misfit(before: Sequence[Errors], now: Sequence[Errors], flo
     """Whether an addition explains enough compared with the misfit that the model still has with it, where that is visible.
 
     Any effect that varies in time can fit a part of the misfit of a wrong hull. So an effect is believed only for what it
-    explains beyond the misfit that remains.
+    explains beyond the misfit that remains. On the fitted runs none is larger with it: the motion without it is one of its own,
+    and a free run that follows them less comes of a likelihood that weighs a hull that is hardly stable by its next samples.
     """
-    was, left = (float(np.mean([max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in side])) for side in (before, now))
+
+    def excess(*of: Errors) -> float:
+        return float(np.mean([max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in of]))
+
+    was, left = excess(*before), excess(now[0], min(before[1], now[1], key=lambda errors: errors.over(floor)))
     visible = any(errors.over(floor) > SUFFICIENT_ERROR_RATIO for errors in now)
     return not visible or was - left > BELIEVED_SHARE_OF_MISFIT * left
 
