@@ -14,7 +14,7 @@ from fieldsid.rounding import RADIANS, Angles, number, with_error
 from fieldsid.views._words import joined, some, table, warned
 
 if TYPE_CHECKING:
-    from fieldsid.turning import TurnPrediction
+    from fieldsid.turning.prediction import TurnPrediction
 
 
 def line(found: TurnPrediction) -> str:

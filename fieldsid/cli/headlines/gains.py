@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from fieldsid.models.model import Model
     from fieldsid.results.gains import Design, Exported, Patched, Verified
     from fieldsid.results.turning import FittedLaws
-    from fieldsid.turning import TurnPrediction
+    from fieldsid.turning.prediction import TurnPrediction
 
 TARGET = "ros2"
 SLOWER = 60.0
