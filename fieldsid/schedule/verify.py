@@ -20,17 +20,17 @@ from fieldsid.schedule.flown.response import (
     FLIGHT_ERROR_SHARE,
     LIMIT_CYCLE_SHARE,
     SETTLING_BAND,
+    Flight,
     Steps,
     about_rest,
-    depth_response,
+    fly,
     overshoot,
     settling,
     steady_error,
-    step_response,
     swing,
     tightest,
 )
-from fieldsid.schedule.flown.straight_leg import straight_leg
+from fieldsid.schedule.flown.straight_leg import disturbance_moment
 from fieldsid.schedule.linear_plant import PARTS, LinearPlant
 from fieldsid.schedule.margins import HELD_SHARE, margins, worst_of
 from fieldsid.schedule.plants import Plants, models_plants, plants_of
@@ -237,10 +237,8 @@ def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) ->
     large = _with_what_is_known(large, flights[2], plant, flight.seen)
     known = [_trimmed(r, -FIN_OFFSET_RAD) for r in rows]
     one = plant.one()
-    bent, unknown = (
-        step_response(one, r, reference=0.0, seconds=pace.flight, offset=FIN_OFFSET_RAD, step_s=pace.step) for r in (known, rows)
-    )
-    leg = straight_leg(one, rows, flight.noise, pace)
+    bent, unknown = (fly(one, r, Flight(pace.flight, pace.step, offset=FIN_OFFSET_RAD)) for r in (known, rows))
+    leg = fly(one, rows, Flight(pace.leg, pace.step, push=disturbance_moment(flight.noise, pace)))
     depth_over, depth_settled = _depth(one, rows, pace) if schedule.depth else (float("nan"), float("nan"))
     check = Check(
         row.speed, flight.knot, row.supported, constant, phase, gain, delay, least_phase, least_gain, least_delay,
@@ -253,10 +251,10 @@ def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) ->
     return check, (flights[0].one(), flights[1].one(), flights[2].one()), leg
 
 
-def _flown_to_rest(plant: LinearPlant, rows: Sequence[Row] | Row, size: float, pace: Pace) -> Steps:
+def _flown_to_rest(plant: LinearPlant, rows: Sequence[Row], size: float, pace: Pace) -> Steps:
     """Return a step flown longer where it has not come to rest where it should: what is slow does then, what hunts goes on."""
     for times in LONGER:
-        flight = step_response(plant, rows, reference=size, seconds=times * pace.flight, step_s=pace.step)
+        flight = fly(plant, rows, Flight(times * pace.flight, pace.step, reference=size))
         there = np.isfinite(settling(flight.time, flight.angle[:, :1], size)[0])
         if there and worst_of(swing(flight.angle, size), most=True) <= AT_REST_SHARE:
             break
@@ -301,6 +299,6 @@ def _trimmed(row: Row, fin: float) -> Row:
 
 
 def _depth(one: LinearPlant, rows: Sequence[Row], pace: Pace) -> tuple[float, float]:
-    steps = depth_response(one, rows, step=DEPTH_STEP_M, seconds=pace.leg, pitch_limit=PITCH_LIMIT_RAD, step_s=pace.step)
+    steps = fly(one, rows, Flight(pace.leg, pace.step, depth=DEPTH_STEP_M, pitch_limit=PITCH_LIMIT_RAD))
     settled = settling(steps.time, steps.depth, DEPTH_STEP_M)
     return float(overshoot(steps.depth, DEPTH_STEP_M)[0]), float(settled[0])

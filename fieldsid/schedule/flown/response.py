@@ -88,50 +88,21 @@ def steady_error(values: FloatArray, wanted: float) -> FloatArray:
     return np.asarray(wanted - values[-tail:].mean(axis=0))
 
 
-def step_response(
-    plant: LinearPlant,
-    rows: Sequence[Row] | Row,
-    *,
-    reference: float,
-    seconds: float,
-    offset: float = 0.0,
-    step_s: float = STEP_S,
-) -> Steps:
-    """Return the response of every draw of a plant to a step of the reference (rad) at time 0, under a row's gains or rows'.
-
-    `offset` (rad) is added to the fin: a bent fin, on top of the plant's own trim. `step_s` (s) is the plant's time step.
-    """
-    return _run(plant, rows, _Flight(seconds, step_s, reference=reference, offset=offset))
-
-
-def depth_response(
-    plant: LinearPlant,
-    rows: Sequence[Row] | Row,
-    *,
-    step: float,
-    seconds: float,
-    pitch_limit: float,
-    step_s: float = STEP_S,
-) -> Steps:
-    """Return the response to a step of the wanted depth (m) through pitch, z' = -u theta, pitch asked within pitch_limit."""
-    return _run(plant, rows, _Flight(seconds, step_s, depth=step, pitch_limit=pitch_limit))
-
-
-def leg_response(plant: LinearPlant, rows: Sequence[Row] | Row, *, push: FloatArray, step_s: float = STEP_S) -> Steps:
-    """Return a straight leg under a disturbance moment push (t,) rad/s^2, a value for each time step of `step_s` s."""
-    return _run(plant, rows, _Flight(step_s * (push.size - 1), step_s), push)
-
-
 @dataclass(frozen=True, slots=True)
-class _Flight:
-    """What is flown for `seconds` in steps of `step` s: reference (rad), depth (m) within a pitch (rad), fin offset (rad)."""
+class Flight:
+    """What is flown for `seconds` in steps of `step` s: a step of the reference (rad) at time 0, or of the depth that is wanted.
+
+    The depth (m) goes through pitch, z' = -u theta, which is asked within `pitch_limit` rad. `offset` (rad) is added to the fin:
+    a bent fin, on top of the plant's own trim. `push` (t,) is a disturbance moment in rad/s^2, a value for each step.
+    """
 
     seconds: float
-    step: float
+    step: float = STEP_S
     reference: float = 0.0
     depth: float = 0.0
     pitch_limit: float = 0.0
     offset: float = 0.0
+    push: FloatArray | None = None
 
     def times(self, steps: float = 1.0) -> FloatArray:
         """Return the times (t,) s of a flight in steps of so many of its own."""
@@ -139,46 +110,30 @@ class _Flight:
         return whole * np.arange(round(self.seconds / whole) + 1, dtype=np.float64)
 
 
-def _run(plant: LinearPlant, rows: Sequence[Row] | Row, flight: _Flight, push: FloatArray | None = None) -> Steps:
-    if plant.hull is not None:
-        return _run_hulls(plant, plant.hull, rows, flight, push)
-    of_damping, of_authority, of_core, drag, fin_loss, turn_loss = (
-        np.ascontiguousarray(part) for part in (*plant.powers[:, :2].T, plant.powers[:, 2:], *plant.speed_loss.T)
-    )
-    plants = Plants(
-        plant.damping, plant.stiffness, plant.authority, plant.offset + flight.offset, np.ascontiguousarray(plant.core),
-        of_damping, of_authority, of_core, np.exp(-flight.step / np.maximum(plant.lag, FASTEST_LAG_S)),
-        np.round(plant.delay / flight.step), np.minimum(plant.fin_rate, 1e6) * flight.step, drag, fin_loss, turn_loss,
-    )  # fmt: skip
-    time = flight.times()
+def fly(plant: LinearPlant, rows: Sequence[Row], flight: Flight) -> Steps:
+    """Return a flight of every draw of a plant under the gains of rows; where the draws are of hulls, of these."""
+    coarser = 1.0 if plant.hull is None else HULL_STEPS
+    time, step, own = flight.times(coarser), coarser * flight.step, flight.times()
+    pushed = np.interp(time, own, np.zeros(own.size) if flight.push is None else flight.push)
     out = np.zeros((plant.count, time.size, OUT_COLUMNS))
-    pushed = np.zeros(time.size) if push is None else push
-    asked = (flight.reference, flight.depth, flight.pitch_limit)
-    close_loop(plants, _table(rows), *asked, plant.speed, flight.step, pushed, out)
-    return _steps(time, out)
-
-
-def _run_hulls(
-    plant: LinearPlant, hull: FloatArray, rows: Sequence[Row] | Row, flight: _Flight, push: FloatArray | None
-) -> Steps:
-    """Return the flights of a plant's vehicles in surge, sway and yaw."""
-    way = np.where(plant.authority < 0.0, 1.0, -1.0)
-    limited = np.minimum(plant.fin_rate, 1e6)
-    settings = np.column_stack([way, plant.offset + flight.offset, np.maximum(plant.lag, FASTEST_LAG_S), limited, plant.delay])
-    time, step = flight.times(HULL_STEPS), HULL_STEPS * flight.step
-    pushed = np.zeros(time.size) if push is None else np.interp(time, flight.times(), push)
-    out = np.zeros((plant.count, time.size, OUT_COLUMNS))
-    close_hull_loop(np.ascontiguousarray(hull), settings, _table(rows), flight.reference, plant.speed, step, pushed, out)
-    return _steps(time, out)
-
-
-def _steps(time: FloatArray, out: FloatArray) -> Steps:
-    angle, fin, deep, speed = (np.ascontiguousarray(out[:, :, j].T) for j in range(OUT_COLUMNS))
-    return Steps(time, angle, fin, deep, speed)
-
-
-def _table(rows: Sequence[Row] | Row) -> FloatArray:
-    return np.array([_gains(r) for r in ([rows] if isinstance(rows, Row) else rows)])
+    table = np.array([_gains(row) for row in rows])
+    lag, fin_rate = np.maximum(plant.lag, FASTEST_LAG_S), np.minimum(plant.fin_rate, 1e6)
+    offset = plant.offset + flight.offset
+    if plant.hull is None:
+        of_damping, of_authority, of_core, drag, fin_loss, turn_loss = (
+            np.ascontiguousarray(part) for part in (*plant.powers[:, :2].T, plant.powers[:, 2:], *plant.speed_loss.T)
+        )
+        plants = Plants(
+            plant.damping, plant.stiffness, plant.authority, offset, np.ascontiguousarray(plant.core), of_damping, of_authority,
+            of_core, np.exp(-step / lag), np.round(plant.delay / step), fin_rate * step, drag, fin_loss, turn_loss,
+        )  # fmt: skip
+        asked = (flight.reference, flight.depth, flight.pitch_limit)
+        close_loop(plants, table, *asked, plant.speed, step, pushed, out)
+    else:
+        way = np.where(plant.authority < 0.0, 1.0, -1.0)
+        settings = np.column_stack([way, offset, lag, fin_rate, plant.delay])
+        close_hull_loop(np.ascontiguousarray(plant.hull), settings, table, flight.reference, plant.speed, step, pushed, out)
+    return Steps(time, *(np.ascontiguousarray(out[:, :, j].T) for j in range(OUT_COLUMNS)))
 
 
 def _gains(row: Row) -> tuple[float, ...]:

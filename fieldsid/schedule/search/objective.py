@@ -26,10 +26,11 @@ from fieldsid.schedule.flown.response import (
     FLIGHT_ERROR_SHARE,
     LIMIT_CYCLE_SHARE,
     SETTLING_BAND,
+    Flight,
     about_rest,
+    fly,
     overshoot,
     settling,
-    step_response,
     swing,
 )
 from fieldsid.schedule.linear_plant import LinearPlant
@@ -213,7 +214,7 @@ class Place:
         """Return time (t,) and angle (t, d) of the step flown with gains, the trim of the estimate counted out."""
         plant, demand = self.plant, self.demand
         row = Row(plant.speed, gains, -float(plant.offset[0]), plant.reference_gain, demand.fin_limit)
-        steps = step_response(plant, row, reference=demand.step, seconds=demand.pace.flight, step_s=demand.pace.step)
+        steps = fly(plant, (row,), Flight(demand.pace.flight, demand.pace.step, reference=demand.step))
         return steps.time, steps.angle
 
     def held(self, gains: Gains) -> tuple[float, float]:
