@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan, nan
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from fieldsid.display import Displayed, Plotted
 from fieldsid.logs.run import Note
@@ -163,6 +163,20 @@ def settling_flight(because: tuple[str, ...], side: str, speed: float, rudder: f
     if not because:
         return "nothing more: the data reached this turn"
     return f"turning_circle to {side} at {speed:.2f} m/s with {rudder:.3g} rad: {HOW}"
+
+
+def predicted_row(speed: float, side: str, rudder: float, because: tuple[str, ...], **found: Any) -> TurnRow:
+    """Return the row of a turn at a speed (m/s) with a rudder (rad), of what was found of it, and of what it lacks."""
+    return TurnRow(
+        speed=speed,
+        side=side,
+        trust="extrapolated" if because else "identified",
+        because=because,
+        settle_with=settling_flight(because, side, speed, rudder),
+        predicted=found["radius"],
+        predicted95=found["interval95"],
+        **found,
+    )
 
 
 def _to(rows: Sequence[TurnRow], side: str) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +19,9 @@ from fieldsid.records.check import LARGEST_FIN_RAD
 from fieldsid.turning.believed_rows import believed_rows, doubts_of_draws
 from fieldsid.turning.flown_circles import against_rudder, circles_of, compared_with, turned_against, with_measurement
 from fieldsid.turning.maneuvering.belief import SEED, Belief, believe, not_fitted
-from fieldsid.turning.model_error import DataCoverage, data_coverage, model_error, model_error_draws
+from fieldsid.turning.model_error import DataCoverage, data_coverage, model_error
 from fieldsid.turning.paper_formulas import refuse_short_fin, refuse_unstable, u_turn
-from fieldsid.turning.prediction import SIDES, TurnPrediction, TurnRow, settling_flight
+from fieldsid.turning.prediction import SIDES, TurnPrediction, TurnRow, predicted_row
 from fieldsid.turning.steady.blended_turns import BlendedTurns, blended_turns
 from fieldsid.turning.steady.speed_loss import SurgeModel, fit_surge
 
@@ -134,13 +134,12 @@ def _formula_rows(
             turn = u_turn(speed, a, b, fin)
             radius = turn.radius if method == "u_turn" else turn.steady_radius
             coverage = _reach(source, speed, rudder, float(turn.yaw_rate_max[0]), float(turn.time[0]) / 2)
-            error = model_error((), coverage, formula=method == "u_turn")
-            spread = np.exp(model_error_draws(error, draws, np.random.default_rng(SEED)))
+            spread = model_error((), coverage, formula=method == "u_turn").factors(draws, SEED)
+            found = _found(coverage, radius, spread, turn.time, float(radius[0]))
             rows.append(
-                _row(
-                    speed, side, method, coverage, rudder, radius=radius, spread=spread, time=turn.time,
-                    steady=float(turn.steady_radius[0]), u_turn_radius=float(turn.radius[0]),
-                    rate=float(turn.yaw_rate_max[0]), turn_speed=speed,
+                predicted_row(
+                    float(speed), side, rudder, **found, method=method, steady_radius=float(turn.steady_radius[0]),
+                    u_turn_radius=float(turn.radius[0]), yaw_rate_max=float(turn.yaw_rate_max[0]), turn_speed=float(speed),
                 )
             )  # fmt: skip
     return _by_side(rows)
@@ -181,61 +180,27 @@ def _simulated_row(source: ParameterSource, turns: BlendedTurns, index: int, sid
         )
     time = turns.transient.time_180[index]
     coverage = _reach(source, speed, rudder, rate, float(np.nan_to_num(turns.transient.time_90[index], nan=60.0)))
-    error = model_error(turns.effects, coverage, formula=False)
-    spread = np.exp(model_error_draws(error, turns.radius.shape[0], np.random.default_rng(SEED + 1)))
+    spread = model_error(turns.effects, coverage, formula=False).factors(turns.radius.shape[0], SEED + 1)
     radius = turns.radius[:, index]
-    row = _row(
-        speed, side, "simulated", coverage, rudder, radius=radius, spread=spread, time=time * radius / radius[0],
-        steady=_median(radius * spread), u_turn_radius=float(turns.transient.path_180[index] / np.pi), rate=rate,
-        turn_speed=float(turns.path_speed[index]),
+    value = _median(radius * spread)
+    found = _found(coverage, radius, spread, time * radius / radius[0], value)
+    return predicted_row(
+        speed, side, rudder, **found, method="simulated", steady_radius=value, yaw_rate_max=rate,
+        turn_speed=float(turns.path_speed[index]), **turns.transient.of(index),
     )  # fmt: skip
-    after = turns.transient
-    return replace(
-        row,
-        advance=float(after.advance[index]),
-        transfer=float(after.transfer[index]),
-        tactical_diameter=float(after.tactical_diameter[index]),
-    )
 
 
-def _row(
-    speed: float,
-    side: str,
-    method: str,
-    coverage: DataCoverage,
-    rudder: float,
-    *,
-    radius: FloatArray,
-    spread: FloatArray,
-    time: FloatArray,
-    steady: float,
-    u_turn_radius: float,
-    rate: float,
-    turn_speed: float,
-) -> TurnRow:
-    simulated = method == "simulated"
-    value = _median(radius * spread) if simulated else float(radius[0])
+def _found(coverage: DataCoverage, radius: FloatArray, spread: FloatArray, time: FloatArray, value: float) -> dict[str, Any]:
+    """Return radius and time of a turn with their bands, by draws of them and of the form's error, and what the turn lacks."""
     interval = _interval(radius * spread, value)
-    because = (*coverage.missing, *doubts_of_draws(value, interval, float(np.mean(~np.isfinite(radius)))))
-    return TurnRow(
-        speed=float(speed),
-        side=side,
-        radius=value,
-        interval95=interval,
-        steady_radius=steady,
-        u_turn_radius=u_turn_radius,
-        u_turn_time=float(time[0]),
-        yaw_rate_max=rate,
-        method=method,
-        trust="extrapolated" if because else "identified",
-        because=because,
-        settle_with=settling_flight(because, side, speed, rudder),
-        turn_speed=float(turn_speed),
-        u_turn_time95=_interval(time * spread, float(time[0])),
-        predicted=value,
-        predicted95=interval,
-        of_model=float(radius[0]),
-    )
+    return {
+        "because": (*coverage.missing, *doubts_of_draws(value, interval, float(np.mean(~np.isfinite(radius))))),
+        "radius": value,
+        "interval95": interval,
+        "u_turn_time": float(time[0]),
+        "u_turn_time95": _interval(time * spread, float(time[0])),
+        "of_model": float(radius[0]),
+    }
 
 
 def _median(draws: FloatArray) -> float:
