@@ -158,8 +158,8 @@ def envelope_of(axis: Axis, limiting: EnvelopeLimits, vehicle: Vehicle | None) -
 
     `none` takes the default of heading or pitch away.
     """
-    area = parse_area(limiting.area) or (None, None)
-    band = parse_band(limiting.depth_band) or (None, None)
+    area = parse_area(limiting.area)
+    band = parse_band(limiting.depth_band)
     own = None if vehicle is None else vehicle.fin_max_rad(axis.value)
     fin = None if limiting.fin is None else angles.parse_angle(limiting.fin, "--fin-max", angles.FIN, LARGEST_FIN)
     if fin is not None and own is not None and fin > own:

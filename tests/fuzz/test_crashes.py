@@ -291,7 +291,7 @@ def test_a_position_of_one_column_is_refused(tmp_path):
 
 
 def test_a_prior_of_impossible_numbers_is_refused(tmp_path):
-    with pytest.raises(ArtifactError, match="must be a number up to"):
+    with pytest.raises(ArtifactError, match="not a complete prior"):
         load_prior(changed(tmp_path, "prior.yaml", "parameters", "b2", "std_error", to=1e300))
 
 

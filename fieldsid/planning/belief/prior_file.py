@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from fieldsid.effects import pick_effect
-from fieldsid.errors import ArtifactError, shortened
+from fieldsid.errors import ArtifactError
 from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model, Noise, load_model
 from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
-from fieldsid.records.check import LARGEST
+from fieldsid.planning.whole_file import whole_file
+from fieldsid.records.check import finite_number
 from fieldsid.records.reading import load_record, read_yaml
 from fieldsid.registry import near
 
@@ -32,16 +33,8 @@ def load_believed(path: Path) -> Model:
 def load_prior(path: Path) -> Model:
     """Read a prior file as a model with a diagonal covariance; raises ArtifactError naming what is missing or wrong."""
     body = load_record(path, KIND)
-    try:
+    with whole_file(path, "prior", "compare it with `templates/plan/priors/torpedo_yaw.yaml`"):
         return _model_of(body)
-    except ArtifactError as error:
-        raise ArtifactError(f"`{path}`: {error.what}", found=error.found, hint=error.hint) from error
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ArtifactError(
-            f"`{path}` is not a complete prior",
-            found=f"{type(error).__name__}: {error}",
-            hint="compare it with `templates/plan/priors/torpedo_yaw.yaml`",
-        ) from error
 
 
 def _model_of(body: Mapping[str, Any]) -> Model:
@@ -56,8 +49,8 @@ def _model_of(body: Mapping[str, Any]) -> Model:
     for name in given:
         if name not in known:
             raise ArtifactError(f"the prior has an unknown parameter `{name}`", found=", ".join(known), hint=near(name, known))
-    values = {n: _number(given[n]["value"], n) for n in known}
-    errors = {n: _number(given[n].get("std_error", 0.0), f"{n}: std_error") for n in known}
+    values = {n: finite_number(given[n]["value"], n) for n in known}
+    errors = {n: finite_number(given[n].get("std_error", 0.0), f"{n}: std_error") for n in known}
     free = tuple(n for n in known if errors[n] > 0)
     return Model(
         axis=axis,
@@ -67,9 +60,9 @@ def _model_of(body: Mapping[str, Any]) -> Model:
         free=free,
         covariance=np.diag([errors[n] ** 2 for n in free]) if free else np.zeros((0, 0)),
         law=SpeedLaw(
-            _number(body["reference_m_s"], "reference_m_s"),
-            _number(body.get("damping_exponent", 1.0), "damping_exponent"),
-            _number(body.get("authority_exponent", 2.0), "authority_exponent"),
+            finite_number(body["reference_m_s"], "reference_m_s"),
+            finite_number(body.get("damping_exponent", 1.0), "damping_exponent"),
+            finite_number(body.get("authority_exponent", 2.0), "authority_exponent"),
             trim_of_fin=TRIM_OF_FIN[axis],
         ),
         noise=_noise(body["noise"]),
@@ -83,17 +76,9 @@ def _noise(body: Mapping[str, Any]) -> Noise:
     for name in body:
         if name not in known:
             raise ArtifactError(f"the prior's noise has an unknown key `{name}`", found=", ".join(known), hint=near(name, known))
-    noise = Noise(**{k: _number(v, k) for k, v in body.items()})
+    noise = Noise(**{k: finite_number(v, k) for k, v in body.items()})
     if not (noise.angle > 0 and noise.rate > 0 and noise.disturbance >= 0):
         raise ArtifactError(
             "the prior's noise must be above zero", found=f"angle {noise.angle:g}, rate {noise.rate:g}", hint="in rad and rad/s"
         )
     return noise
-
-
-def _number(value: Any, name: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= LARGEST:
-        raise ArtifactError(
-            f"`{name}` must be a number up to {LARGEST:g}", found=shortened(value), hint=f"write a number after `{name}:`"
-        )
-    return float(value)

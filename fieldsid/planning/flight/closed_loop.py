@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
-from fieldsid.dynamics.assemble import KernelInputs, assemble, fin_path
-from fieldsid.dynamics.free_run import command_record
+from fieldsid.dynamics.assemble import KernelInputs, assemble
 from fieldsid.dynamics.nonlinear_kernel import over_interval
 from fieldsid.maneuvers import steer
 from fieldsid.models.hull import FIN, MOMENT_END, MOMENT_START, kinds_of, named
-from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import inner, jit
 from fieldsid.planning.flight.operating_point import OperatingPoint
-
-ACTUATOR_ROUNDS = 4
-"""Times the fin's own path is put back into the loop; each round removes what the one before left of its error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,42 +58,13 @@ def closed_loop(
         state = over_interval(k, kinds, drive, i, steps[i], pieces, -0.5 * steps[i], state)
 
 
-@dataclass(frozen=True, slots=True)
-class Prepared:
-    """What the loop needs of a scene and never changes: the core's arrays without fin, and the fin's push."""
-
-    time: FloatArray
-    steps: FloatArray
-    drive: FloatArray
-    constants: FloatArray
-    pieces: int
-    push: FloatArray
-
-
 @lru_cache(maxsize=16)
-def prepared(scene: OperatingPoint, count: int, rate_hz: float) -> Prepared:
-    """Return the arrays of a scene over `count` samples."""
-    time = np.arange(count) / rate_hz
-    idle = scene.record(time, np.zeros(count))
+def prepared(scene: OperatingPoint, count: int, rate_hz: float) -> tuple[KernelInputs, FloatArray]:
+    """Return the core's arrays of a scene over `count` samples, without fin, and what a rad of fin adds to its drives, (n-1, 2).
+
+    That is the moment at both ends of each interval.
+    """
+    idle = scene.record(np.arange(count) / rate_hz, np.zeros(count))
     arrays = assemble(idle, scene.effects, replace(scene.base, authority=0.0), scene.values, scene.scale)
-    return Prepared(time, idle.steps, arrays.drive, arrays.constants, arrays.pieces, fin_push(scene, arrays))
-
-
-def fin_push(scene: OperatingPoint, arrays: KernelInputs) -> FloatArray:
-    """Return the moments that a rad of fin adds to the drives at both ends of each interval, (n-1, 2)."""
-    n = arrays.drive.shape[0] + 1
-    factor = np.ones(n) if arrays.terms.authority_factor is None else arrays.terms.authority_factor
-    return scene.base.authority * np.column_stack([factor[:-1], factor[1:]])
-
-
-def idle_records(scenes: Sequence[OperatingPoint], time: FloatArray) -> dict[float, Record]:
-    """Return a record without a command at some times (n,) s for each speed of some scenes."""
-    none = np.zeros(time.size)
-    return {speed: command_record(scenes[0].axis, time, none, speed=speed) for speed in {s.speed for s in scenes}}
-
-
-def fin_offset(scene: OperatingPoint, idle: Mapping[float, Record], command: FloatArray) -> FloatArray:
-    """Return the fin's angle less its command (n,) about trim at both ends of every interval, (n-1, 2)."""
-    held = command[:-1] + scene.trim_fin
-    real = fin_path(idle[scene.speed].with_fin(command + scene.trim_fin), scene.effects, scene.values)
-    return np.column_stack([real.start - held, real.end - held])
+    factor = np.ones(count) if arrays.terms.authority_factor is None else arrays.terms.authority_factor
+    return arrays, scene.base.authority * np.column_stack([factor[:-1], factor[1:]])

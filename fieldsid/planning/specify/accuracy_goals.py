@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from math import ceil, floor, log10
 
 from fieldsid.errors import UsageError
+from fieldsid.planning.specify.quantities import read_number
 from fieldsid.registry import near
 
 MIN_RELATIVE_ERROR, MAX_RELATIVE_ERROR = 1e-4, 1.0
@@ -31,11 +32,8 @@ def parse_accuracy_goals(text: str, known: Sequence[str]) -> dict[str, float]:
 
 
 def _share(value: str, name: str, text: str) -> float:
-    try:
-        share = float(value.removesuffix("%")) * (0.01 if value.endswith("%") else 1.0)
-    except ValueError as error:
-        hint = f"write it like `--want {name}=5%`"
-        raise UsageError(f"{value!r} is not a number", found=f"--want {text}", hint=hint) from error
+    number = read_number(value.removesuffix("%"), "--want", text, f"write it like `--want {name}=5%`")
+    share = number * (0.01 if value.endswith("%") else 1.0)
     if not MIN_RELATIVE_ERROR <= share <= MAX_RELATIVE_ERROR:
         raise UsageError(
             f"a standard error of {100 * share:g}% of {name} cannot be meant",
