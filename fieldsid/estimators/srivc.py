@@ -29,8 +29,8 @@ from fieldsid.numerics.arrays import FloatArray
 
 MAX_SRIVC_ITERATIONS = 30
 CONVERGED_RELATIVE_CHANGE = 1e-7
-MIN_FILTER_DAMPING, MIN_FILTER_STIFFNESS = 0.05, 0.0
-"""Least damping (1/s) and stiffness (1/s^2) of the filter: an unstable estimate must not become an unstable filter."""
+MIN_FILTER_DAMPING = 0.05
+"""Least damping (1/s) of the filter: an unstable estimate must not become an unstable filter."""
 MAX_SIMULATION_STEP_S = 0.0125
 """Longest step of the simulation between samples."""
 
@@ -90,7 +90,7 @@ def filtered_rows(record: Record, theta: RegressionParameters, state: FloatArray
     part = np.tile(np.arange(pieces) / pieces, record.steps.size)
     start, change = np.repeat(path.start, pieces), np.repeat(path.end - path.start, pieces)
     fin = start + change * part, start + change * (part + 1.0 / pieces)
-    a, k = max(theta.damping, MIN_FILTER_DAMPING), max(theta.stiffness, MIN_FILTER_STIFFNESS)
+    a, k = max(theta.damping, MIN_FILTER_DAMPING), max(theta.stiffness, 0.0)
     push = [theta.authority * f + theta.trim for f in fin]
     motion = through(fine, a, k, push[0], push[1], state)[:, 0]
     every = slice(None, None, pieces)

@@ -8,7 +8,7 @@ from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters, amplit
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 
-SIDE, SENSE, LEFT = 0, 1, 2
+SIDE, SENSE, LEFT = range(3)
 """Columns of the memory: side of the fin, which way a positive fin turns (0 not known yet), reversals left."""
 
 

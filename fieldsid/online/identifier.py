@@ -35,7 +35,8 @@ from fieldsid.online.sample_filter import SampleFilter, present_step
 if TYPE_CHECKING:
     from fieldsid.schedule.search.of_one_model import GainsOfOne, Wanted
 
-NOISE_WINDOW, NOISE_EVERY = 1024, 256
+NOISE_WINDOW = 1024
+NOISE_EVERY = NOISE_WINDOW // 4
 """Samples that the sensors' noise is learnt from, and samples between two looks."""
 WAIT_FOR_RATE_S = 1.0
 """Time after which a vehicle that has sent no rate has none."""

@@ -9,7 +9,8 @@ import numpy as np
 from fieldsid.logs.convert.faults.spikes import spike_limit
 from fieldsid.numerics.arrays import FloatArray
 
-LOOKED_AT, EVERY = 256, 128
+LOOKED_AT = 256
+EVERY = LOOKED_AT // 2
 """Samples that the limit is learnt from, and samples between two looks."""
 
 

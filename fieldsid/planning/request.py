@@ -23,8 +23,7 @@ from fieldsid.planning.discriminate.rivals import rivals_from, rivals_named
 from fieldsid.planning.discriminate.separating_plan import separating_plan
 from fieldsid.planning.flight.excitation import Window
 from fieldsid.planning.safety.envelope import ACCEPTED_SHARE, LARGEST_FIN, Envelope
-from fieldsid.planning.specify.accuracy_goals import parse_accuracy_goals
-from fieldsid.planning.specify.quantities import parse_area, parse_band, parse_speeds
+from fieldsid.planning.specify.quantities import parse_accuracy_goals, parse_area, parse_band, parse_speeds
 from fieldsid.vehicle import Vehicle, find_vehicle, load_vehicle
 
 FIN_MAX = 0.26

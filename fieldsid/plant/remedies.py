@@ -12,8 +12,6 @@ from fieldsid.models.axis import NAMES
 from fieldsid.plant.parameter_source import ParameterSource, logs_of
 from fieldsid.records.named_inputs import inputs_of
 
-USUAL_FIN_DEG = 15.0
-
 
 def wider_fin(option: str, needed: float, source: ParameterSource) -> str:
     """Return the hint for a fin limit below `needed` rad: that of the models' runs where it does, else what it takes.
@@ -37,7 +35,7 @@ def wider_fin(option: str, needed: float, source: ParameterSource) -> str:
 
 def in_radians(option: str, given: float) -> str:
     """Return the hint for an angle in rad that no fin can have."""
-    return f"{given:.4g} rad is {degrees(given):.4g} deg; write it like `{option} {USUAL_FIN_DEG:g}deg`"
+    return f"{given:.4g} rad is {degrees(given):.4g} deg; write it like `{option} 15deg`"
 
 
 def damping_that_holds(source: ParameterSource, speed: float, effects: Collection[str] = ()) -> str:

@@ -15,7 +15,7 @@ from fieldsid.models.model import Noise
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.runtime.parallel_map import parallel_map
 from fieldsid.schedule.check import READ_OFF, Check, StepCheck
-from fieldsid.schedule.flown.pace import LONGER, Pace, pace_of
+from fieldsid.schedule.flown.pace import LONGER, Pace, disturbance_moment, pace_of
 from fieldsid.schedule.flown.response import (
     FLIGHT_ERROR_SHARE,
     LIMIT_CYCLE_SHARE,
@@ -30,15 +30,14 @@ from fieldsid.schedule.flown.response import (
     swing,
     tightest,
 )
-from fieldsid.schedule.flown.straight_leg import disturbance_moment
 from fieldsid.schedule.linear_plant import PARTS, LinearPlant
 from fieldsid.schedule.margins import HELD_SHARE, margins, worst_of
 from fieldsid.schedule.plants import Plants, models_plants, plants_of
 from fieldsid.schedule.record import Row, Schedule
 from fieldsid.schedule.rows import DESIGN_DRAWS, place_of
 from fieldsid.schedule.rows import SEED as DESIGN_SEED
-from fieldsid.schedule.search.best_constant import best_constant, multiples_of
 from fieldsid.schedule.search.objective import Place
+from fieldsid.schedule.search.optimum import best_constant, multiples_of
 from fieldsid.schedule.wish import STEP_ANGLE_RAD
 from fieldsid.turning.model_error import MIN_COVERED_SHARE
 
@@ -53,7 +52,7 @@ FIN_OFFSET_RAD = 0.05235987755982988
 """3 deg: the fin offset a schedule is tried with."""
 AT_REST_SHARE = 0.5 * LIMIT_CYCLE_SHARE
 DEPTH_STEP_M = 2.0
-PITCH_LIMIT_RAD = 0.3490658503988659
+PITCH_LIMIT_RAD = STEPS_RAD[Axis.PITCH][-1]
 
 
 @dataclass(frozen=True, slots=True, repr=False)

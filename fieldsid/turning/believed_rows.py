@@ -8,10 +8,9 @@ import numpy as np
 
 from fieldsid.errors import ModelError
 from fieldsid.plant.parameter_source import ParameterSource
-from fieldsid.turning.known_radius import MAX_KNOWN_WIDTH, is_band_only
 from fieldsid.turning.maneuvering.belief import Belief, BelievedTurn
 from fieldsid.turning.model_error import MIN_COVERED_SHARE
-from fieldsid.turning.prediction import SIDES, TurnRow, predicted_row
+from fieldsid.turning.prediction import MAX_KNOWN_WIDTH, SIDES, TurnRow, is_band_only, predicted_row
 from fieldsid.turning.steady.blended_turns import blended_radius
 from fieldsid.turning.steady.speed_loss import SurgeModel
 

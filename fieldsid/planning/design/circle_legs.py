@@ -12,7 +12,7 @@ from fieldsid.maneuvers import pick_maneuver
 from fieldsid.planning.design.best_leg import Setting, leg_of
 from fieldsid.planning.design.leg import CIRCLE, Leg
 from fieldsid.planning.design.objective import make_objective
-from fieldsid.planning.flight.excitation import Excitation
+from fieldsid.planning.flight.excitation import LONGEST_WINDOW_S, Excitation
 from fieldsid.planning.safety.envelope import MOST_TURNS
 from fieldsid.runtime.parallel_map import parallel_map
 
@@ -21,7 +21,6 @@ SETTLED_TURN = 2.5 * np.pi
 LARGEST_TURN = MOST_TURNS * 2.0 * np.pi
 """Heading (rad) at which a circle is ended: one that is flown by the clock turns farther the stronger the fin is."""
 SLACK = 1.6
-MAX_CIRCLE_S = 300.0
 
 
 def circle_legs(setting: Setting, speeds: Sequence[float]) -> list[Leg]:
@@ -38,10 +37,9 @@ def _circle(setting: Setting, speed: float, mirrored: float) -> Leg:
     probe = make_objective(setting.model, speed, free, setting.window, {}, setting.run_up_s)
     rate = abs(probe.scene.base.authority) * free.fin / max(probe.scene.base.damping, 0.02)
     maneuver = pick_maneuver("turning_circle")
-    pull_out = 8.0
-    length = float(np.clip(SLACK * SETTLED_TURN / rate + pull_out, 20.0, MAX_CIRCLE_S))
+    pull_out, around = 8.0, setting.window
+    length = float(np.clip(SLACK * SETTLED_TURN / rate + pull_out, 20.0, LONGEST_WINDOW_S - around.lead - around.recover))
     values = {"amplitude": free.fin, "turn": SETTLED_TURN, "pull_out": pull_out, "mirrored": mirrored, "duration": length}
-    around = setting.window
     window = replace(around, length=length + around.lead + around.recover)
     judge = make_objective(setting.model, speed, free, window, {}, setting.run_up_s)
     leg = leg_of(judge, setting, Excitation(maneuver.name, maneuver.checked(values)), purpose=CIRCLE)

@@ -18,8 +18,8 @@ from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.axis import NAMES
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.planning.flight.closed_loop import Response
 from fieldsid.planning.flight.operating_point import OperatingPoint
+from fieldsid.planning.flight.rule_flight import Response
 
 RIDGE = 1e-12
 SMALLEST_PIVOT = 1e-10

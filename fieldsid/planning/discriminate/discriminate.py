@@ -12,11 +12,12 @@ import numpy as np
 from fieldsid.errors import UsageError
 from fieldsid.maneuvers import RATE_HZ, pick_maneuver
 from fieldsid.models.model import Model
+from fieldsid.planning.design.best_leg import FINALISTS
 from fieldsid.planning.design.optimise import moves_of
 from fieldsid.planning.discriminate.t_optimality import MAX_REFIT_ITERATIONS, Rival, log_odds, rival_of
-from fieldsid.planning.flight.closed_loop import Response
 from fieldsid.planning.flight.excitation import Excitation, Window, fits, flown_all
 from fieldsid.planning.flight.operating_point import autopilot_of, operating_point
+from fieldsid.planning.flight.rule_flight import Response
 from fieldsid.planning.safety.envelope import Envelope, excursions_of, used
 from fieldsid.records.keys import Key, Number
 
@@ -27,7 +28,6 @@ Map = Callable[[Callable[[Excitation], Pairs], Sequence[Excitation]], list[Pairs
 LONGEST_WINDOW_S = 60.0
 """Length of the window unless another is requested: slow differences discriminate rivals as well."""
 MOST_LOG_ODDS = 300.0
-CANDIDATES_TUNED = 3
 FAST_HZ, FAST_ROUNDS, BEYOND_DOUBT = 10.0, 3, 50.0
 AT_ONCE = 2
 """Candidates that are evaluated at once, before it is asked whether one of them decides."""
@@ -202,7 +202,7 @@ def _at_speed(arena: _RivalFlights, candidates: Sequence[Excitation] | None, map
     if not scored:
         return None
     scored.sort(key=lambda s: -worth(s[1]))
-    tuned = scored if fast else [_tuned(arena, *s) for s in scored[:CANDIDATES_TUNED]]
+    tuned = scored if fast else [_tuned(arena, *s) for s in scored[:FINALISTS]]
     candidate, pairs = max(tuned, key=lambda s: worth(s[1]))
     window = _shortened(arena.window, arena.responses(candidate))
     return Separation(

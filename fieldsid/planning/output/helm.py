@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from fieldsid.planning.design.abort_conditions import Abort
-from fieldsid.planning.design.leg import Leg
+from fieldsid.planning.design.leg import Abort, Leg
 
 PUBLISHED = {"surge_m_s": "NAV_SPEED", "depth_m": "NAV_DEPTH", "pitch_rad": "NAV_PITCH", "roll_rad": "NAV_ROLL"}
 ANY = 1e6

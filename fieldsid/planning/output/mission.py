@@ -14,8 +14,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, TemplateError
 from fieldsid._version import __version__
 from fieldsid.errors import ArtifactError, UsageError
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.planning.design.abort_conditions import aborts_of
-from fieldsid.planning.design.leg import CIRCLE, Leg, commands_of
+from fieldsid.planning.design.leg import CIRCLE, Leg, aborts_of, commands_of
 from fieldsid.planning.design.plan import Plan
 from fieldsid.planning.output import helm
 from fieldsid.planning.safety.envelope import NOT_LIMITED, Envelope, limits_said

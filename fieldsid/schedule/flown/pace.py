@@ -1,4 +1,4 @@
-"""How finely and how long a loop is flown: by the time constants of its plant, not by a clock of its own.
+"""How finely and how long a loop is flown, and what disturbs it: by the time constants of its plant, not by a clock of its own.
 
 With the whole fin at the largest error a plant answers within 1/w, w^2 = k + |b| delta/e. Loops between the two bandwidths below
 are flown at one pace, for 60 s in steps of 0.02 s; slower and quicker ones for as many steps that are as much longer or shorter.
@@ -7,9 +7,12 @@ are flown at one pace, for 60 s in steps of 0.02 s; slower and quicker ones for 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 
+from fieldsid.models.model import Noise
+from fieldsid.numerics.arrays import FloatArray
 from fieldsid.schedule.linear_plant import LinearPlant
 
 STEP_S, FLIGHT_S = 0.02, 60.0
@@ -55,3 +58,16 @@ def pace_of(plant: LinearPlant, fin_limit: float, error: float) -> Pace:
     fastest = max(float(np.max(np.abs(part))) for part in own)
     most = max(LARGEST_TURN / max(fastest, LEAST_RAD_S), STEP_S)
     return Pace(STEP_S * times if times <= 1.0 else min(STEP_S * times, most), FLIGHT_S * times)
+
+
+LEG_SEED = 5
+
+
+def disturbance_moment(noise: Noise | None, pace: Pace) -> FloatArray:
+    """Return a moment (t,) in rad/s^2, one value for each time step of a pace: zero where no model has measured any."""
+    count = round(pace.leg / pace.step) + 1
+    if noise is None or not noise.disturbance > 0.0:
+        return np.zeros(count)
+    keep = float(np.exp(-pace.step / max(noise.disturbance_time, pace.step)))
+    white = np.random.default_rng(LEG_SEED).standard_normal(count) * np.sqrt(1.0 - keep**2)
+    return noise.disturbance * np.array(list(accumulate(white.tolist(), lambda moment, now: keep * moment + now)))

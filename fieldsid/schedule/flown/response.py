@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fieldsid.display import Brief
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.schedule.flown.closed_loop_kernel import OUT_COLUMNS, Plants, close_loop
+from fieldsid.schedule.flown.closed_loop_kernel import MOTION, Plants, close_loop
 from fieldsid.schedule.flown.hull_kernel import close_hull_loop
 from fieldsid.schedule.flown.pace import STEP_S
 from fieldsid.schedule.linear_plant import LinearPlant
@@ -115,7 +115,7 @@ def fly(plant: LinearPlant, rows: Sequence[Row], flight: Flight) -> Steps:
     coarser = 1.0 if plant.hull is None else HULL_STEPS
     time, step, own = flight.times(coarser), coarser * flight.step, flight.times()
     pushed = np.interp(time, own, np.zeros(own.size) if flight.push is None else flight.push)
-    out = np.zeros((plant.count, time.size, OUT_COLUMNS))
+    out = np.zeros((plant.count, time.size, len(MOTION)))
     table = np.array([_gains(row) for row in rows])
     lag, fin_rate = np.maximum(plant.lag, FASTEST_LAG_S), np.minimum(plant.fin_rate, 1e6)
     offset = plant.offset + flight.offset
@@ -133,7 +133,7 @@ def fly(plant: LinearPlant, rows: Sequence[Row], flight: Flight) -> Steps:
         way = np.where(plant.authority < 0.0, 1.0, -1.0)
         settings = np.column_stack([way, offset, lag, fin_rate, plant.delay])
         close_hull_loop(np.ascontiguousarray(plant.hull), settings, table, flight.reference, plant.speed, step, pushed, out)
-    return Steps(time, *(np.ascontiguousarray(out[:, :, j].T) for j in range(OUT_COLUMNS)))
+    return Steps(time, *(np.ascontiguousarray(out[:, :, j].T) for j in MOTION))
 
 
 def _gains(row: Row) -> tuple[float, ...]:

@@ -43,8 +43,8 @@ DRAWS_MARGIN_SHARE = 0.5
 """Share of the wished phase margin that a draw of the errors has to leave: the estimate has all of it."""
 SEARCHED_RAD_S = np.geomspace(5e-3, 100.0, 240)
 """Coarser than the margins' own grid: it is interpolated between, and the row found is checked on the fine one."""
-LACK_ROUNDING = 1e-3
-"""What is lacked of a requirement that counts as met."""
+ROUNDING = 1e-3
+"""What is lacked of a requirement that counts as met, and to how much of an e-fold the least is found: gains to a thousandth."""
 BETTER_SHARE = 0.01
 """Gains are better than others where they settle sooner, or ask for less fin, by more than this."""
 FLOWN_TIMES, LEAST_SHARE = 25.0, 1.0 / 3.0
@@ -100,13 +100,13 @@ class Outcome:
     @property
     def serves(self) -> bool:
         """Whether nothing is lacked."""
-        return sum(self.own) <= LACK_ROUNDING and sum(self.drawn) <= LACK_ROUNDING
+        return sum(self.own) <= ROUNDING and sum(self.drawn) <= ROUNDING
 
     def cost(self, demand: Demand) -> float:
         """Return what of two gains at one speed is smaller for the better, as long as it is not the fin that tells them apart."""
-        if sum(self.own) > LACK_ROUNDING:
+        if sum(self.own) > ROUNDING:
             return 2.0 * FORBIDDEN + sum(self.own)
-        if sum(self.drawn) > LACK_ROUNDING:
+        if sum(self.drawn) > ROUNDING:
             return FORBIDDEN + sum(self.drawn)
         return self._late(demand)
 
@@ -199,7 +199,7 @@ class Place:
     def _outcome(self, gains: Gains) -> Outcome:
         demand, (own, drawn) = self.demand, self.linear_lacks(gains)
         fin, kp = demand.fin_of(gains), abs(gains.kp)
-        if sum(own) > LACK_ROUNDING:
+        if sum(own) > ROUNDING:
             return Outcome(tuple(own), tuple(drawn), inf, fin, kp)
         time, angle = self.step(gains)
         moved = about_rest(angle, demand.step)
@@ -221,10 +221,10 @@ class Place:
         """Return the share of the draws that come to rest with the margin asked of draws, and the settling (s) of 95 %."""
         time, angle = self.step(gains)
         demand, moved = self.demand, about_rest(angle, self.demand.step)
-        rests = (overshoot(moved, demand.step) <= demand.draws_overshoot + LACK_ROUNDING) & (
-            swing(angle, demand.step) <= LIMIT_CYCLE_SHARE + LACK_ROUNDING
+        rests = (overshoot(moved, demand.step) <= demand.draws_overshoot + ROUNDING) & (
+            swing(angle, demand.step) <= LIMIT_CYCLE_SHARE + ROUNDING
         )
-        asked = (DRAWS_MARGIN_SHARE - 2.0 * LACK_ROUNDING) * demand.phase_margin_deg
+        asked = (DRAWS_MARGIN_SHARE - 2.0 * ROUNDING) * demand.phase_margin_deg
         damped = margins(self.plant, gains).phase_deg >= asked
         return float(np.mean(rests & damped)), worst_of(settling(time, moved, demand.step), most=True)
 

@@ -15,15 +15,13 @@ import numpy.typing as npt
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 from fieldsid.turning.maneuvering.equations import longest_step, simulate
-from fieldsid.turning.maneuvering.flown import HEADING, RATE, SURGE, SWAY, FlownRun
+from fieldsid.turning.maneuvering.flown import HEADING, RATE, STATE_SD, SURGE, SWAY, FlownRun
 from fieldsid.turning.steady.transient import LEAST_SURGE_M_S
 
 OWN = 3
 """Nuisances of a run before its segments': straight speed, bias of the rate, bias of the sway."""
 SWAY_BIAS_SD = 0.02
 """m/s: what a Doppler log may be off by across the hull."""
-STATE_SD = 0.3
-"""Prior of a segment's first state about that measured: m/s, and rad/s."""
 LARGEST_RESIDUAL = 1e6
 """Weighted residuals are clipped here where a simulation has left the water."""
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.turning.correlated import inflation
+from fieldsid.numerics.ljung_box import inflation
 from fieldsid.turning.maneuvering.cut_run import OWN, CutRun, cut_run
 from fieldsid.turning.maneuvering.equations import NAMES, coefficients, growth_rate
 from fieldsid.turning.maneuvering.flown import FlownRun

@@ -21,7 +21,7 @@ from fieldsid.schedule.controller import KINDS, Gains, closed_poles, least_dampi
 from fieldsid.schedule.flown.closed_loop_kernel import close_loop
 from fieldsid.schedule.flown.hull_kernel import close_hull_loop
 from fieldsid.schedule.flown.jit_warmup import compile_loops
-from fieldsid.schedule.flown.pace import Pace
+from fieldsid.schedule.flown.pace import Pace, disturbance_moment
 from fieldsid.schedule.flown.response import (
     LIMIT_CYCLE_SHARE,
     Flight,
@@ -31,7 +31,6 @@ from fieldsid.schedule.flown.response import (
     steady_error,
     swing,
 )
-from fieldsid.schedule.flown.straight_leg import disturbance_moment
 from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, not_counted, plants_at
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.margins import margins
