@@ -76,10 +76,8 @@ def solve(problem: Problem, options: Options) -> Solution:
         state = np.array([found[-1], found[-2] - damping * found[-1]])
     residual = rows.target[use] - phi @ found
     series = Series(z, residual, Transfer(np.ones(1), np.ones(1)), median_step(record))
-    small = coloured_covariance([series], inverse_of_normal(z.T @ z, np.zeros((len(keep), len(keep)))))
-    covariance = np.zeros((problem.layout.shared, problem.layout.shared))
-    covariance[np.ix_(slots, slots)] = small[: len(slots), : len(slots)]
-    return finished(problem, x, covariance, ESTIMATOR.name, notes_of(rounds, moved))
+    known = coloured_covariance([series], inverse_of_normal(z.T @ z, np.zeros((len(keep), len(keep)))))
+    return finished(problem, x, known, ESTIMATOR.name, notes_of(rounds, moved))
 
 
 def filtered_rows(record: Record, theta: RegressionParameters, state: FloatArray) -> tuple[Rows, Rows]:

@@ -11,8 +11,8 @@ from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.turning.maneuvering.belief import Belief, BelievedTurn
 from fieldsid.turning.model_error import MIN_COVERED_SHARE
 from fieldsid.turning.prediction import MAX_KNOWN_WIDTH, SIDES, TurnRow, is_band_only, predicted_row
-from fieldsid.turning.steady.blended_turns import blended_radius
 from fieldsid.turning.steady.speed_loss import SurgeModel
+from fieldsid.turning.steady.steady_turn import blended_radius
 
 LEAST_EFFECTIVE = 10.0
 """Independent draws: with fewer the median is off by more than 0.4 of the spread, and the spread itself by more than a fifth."""

@@ -22,8 +22,8 @@ from fieldsid.turning.maneuvering.belief import SEED, Belief, believe, not_fitte
 from fieldsid.turning.model_error import DataCoverage, data_coverage, model_error
 from fieldsid.turning.paper_formulas import refuse_short_fin, refuse_unstable, u_turn
 from fieldsid.turning.prediction import SIDES, TurnPrediction, TurnRow, predicted_row
-from fieldsid.turning.steady.blended_turns import BlendedTurns, blended_turns
 from fieldsid.turning.steady.speed_loss import SurgeModel, fit_surge
+from fieldsid.turning.steady.steady_turn import BlendedTurns, blended_turns
 
 RADIUS_DRAWS = 500
 METHODS = ("auto", "u_turn", "steady", "simulated", "maneuvering")
