@@ -104,7 +104,7 @@ def _values(path: Path, text: str) -> dict[str, Any]:
         ) from error
 
 
-def _find(path: Path, tree: Node, key: str) -> tuple[Node, Node, Node]:
+def _find(path: Path, tree: Node, key: str) -> tuple[Any, Node, Node]:
     """Return the mapping that holds a dotted key, the key's own node and that of its value."""
     parts = _parts(key)
     for depth, part in enumerate(parts):
@@ -126,7 +126,7 @@ def _parts(key: str) -> list[str]:
     return [p for p in key.split(".") if p]
 
 
-def _replaced(text: str, parent: Node, name: Node, value: Node, columns: Mapping[str, Sequence[float]]) -> str:
+def _replaced(text: str, parent: Any, name: Node, value: Node, columns: Mapping[str, Sequence[float]]) -> str:
     """Return the text with the columns as a key's value; keys that are there already keep their place and comments."""
     rows = {n: f": [{', '.join(decimal(v) for v in vs)}]" for n, vs in columns.items()}
     begin, end = name.end_mark.index, _end(text, name, value)

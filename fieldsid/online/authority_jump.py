@@ -101,7 +101,9 @@ class AuthorityJump:
         self._sum_up()
         seconds = self._seconds
         while seconds and (len(seconds) >= KEPT_S or time < seconds[-1].begin):
-            self._put_before(seconds.popleft())
+            gone = seconds.popleft()
+            self._before.products += gone.products
+            self._before.count += gone.count
         found = self._found()
         if found is not None:
             kept = [s for s in seconds if s.begin >= found.time]
@@ -115,10 +117,6 @@ class AuthorityJump:
             self._seconds[-1].products += rows.T @ rows
             self._seconds[-1].count += len(rows)
             self._rows.clear()
-
-    def _put_before(self, one: _Sums) -> None:
-        self._before.products += one.products
-        self._before.count += one.count
 
     def _found(self) -> Jump | None:
         """Return the jump at the place that explains all rows best, once it lies LEAST_S back.

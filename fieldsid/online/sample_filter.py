@@ -235,8 +235,3 @@ def _check_times(state: Mapping[str, Any]) -> None:
 
 def _line(saved: Sequence[float] | None) -> Line | None:
     return None if saved is None else (float(saved[0]), float(saved[1]))
-
-
-def present_step(memory: FloatArray) -> float:
-    """Return the sampling interval of the newest step in s, 0 before there is one."""
-    return float(memory[H])

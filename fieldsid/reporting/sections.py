@@ -11,7 +11,7 @@ from fieldsid._version import __version__
 from fieldsid.comparison.compare import Channel, Comparison, left_in_words
 from fieldsid.comparison.sufficient import is_noise, pooled
 from fieldsid.display import page_of, view_of
-from fieldsid.extension.loop import Loop
+from fieldsid.extension.lineage import Loop
 from fieldsid.logs import Run
 from fieldsid.page import Block, counted
 from fieldsid.reporting import figures

@@ -15,23 +15,26 @@ from fieldsid.models.model import Noise
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.runtime.parallel_map import parallel_map
 from fieldsid.schedule.check import READ_OFF, Check, StepCheck
-from fieldsid.schedule.flown.pace import LONGER, Pace, disturbance_moment, pace_of
+from fieldsid.schedule.controller import HELD_SHARE, margins, worst_of
 from fieldsid.schedule.flown.response import (
     FLIGHT_ERROR_SHARE,
     LIMIT_CYCLE_SHARE,
+    LONGER,
     SETTLING_BAND,
     Flight,
+    Pace,
     Steps,
     about_rest,
+    disturbance_moment,
     fly,
     overshoot,
+    pace_of,
     settling,
     steady_error,
     swing,
     tightest,
 )
 from fieldsid.schedule.linear_plant import PARTS, LinearPlant
-from fieldsid.schedule.margins import HELD_SHARE, margins, worst_of
 from fieldsid.schedule.plants import Plants, models_plants, plants_of
 from fieldsid.schedule.record import Row, Schedule
 from fieldsid.schedule.rows import DESIGN_DRAWS, place_of
@@ -234,7 +237,7 @@ def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) ->
     flights = [_flown_to_rest(plant, rows, size, pace) for size in sizes]
     small, usual, large = (_step(s, size) for s, size in zip(flights, sizes, strict=True))
     large = _with_what_is_known(large, flights[2], plant, flight.seen)
-    known = [_trimmed(r, -FIN_OFFSET_RAD) for r in rows]
+    known = [replace(r, feed_forward=r.feed_forward - FIN_OFFSET_RAD) for r in rows]
     one = plant.one()
     bent, unknown = (fly(one, r, Flight(pace.flight, pace.step, offset=FIN_OFFSET_RAD)) for r in (known, rows))
     leg = fly(one, rows, Flight(pace.leg, pace.step, push=disturbance_moment(flight.noise, pace)))
@@ -291,10 +294,6 @@ def _with_what_is_known(step: StepCheck, flown: Steps, plant: LinearPlant, seen:
     return replace(
         step, overshoot=nan, overshoot_most=nan, settling=nan, settling_most=nan, settling_median=nan, settling95=(nan, nan)
     )
-
-
-def _trimmed(row: Row, fin: float) -> Row:
-    return replace(row, feed_forward=row.feed_forward + fin)
 
 
 def _depth(one: LinearPlant, rows: Sequence[Row], pace: Pace) -> tuple[float, float]:

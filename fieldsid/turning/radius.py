@@ -142,7 +142,7 @@ def _formula_rows(
                     u_turn_radius=float(turn.radius[0]), yaw_rate_max=float(turn.yaw_rate_max[0]), turn_speed=float(speed),
                 )
             )  # fmt: skip
-    return _by_side(rows)
+    return [row for side in SIDES for row in rows if row.side == side]
 
 
 def _refuse_turns(source: ParameterSource, speeds: Sequence[float], rudder: float) -> None:
@@ -234,10 +234,6 @@ def _reach(source: ParameterSource, speed: float, rudder: float, rate: float, qu
     slowest = model.values.get("cross_damping", np.inf) * model.law.scale(speed)
     seen = slowest * model.trained.get("held_s", 0.0) >= 1.0
     return data_coverage(model.trained, fin=rudder, rate=abs(rate), quarter_s=quarter_s, speed_flown=flown, sway_settles=seen)
-
-
-def _by_side(rows: Sequence[TurnRow]) -> list[TurnRow]:
-    return [r for side in SIDES for r in rows if r.side == side]
 
 
 def _chosen(source: ParameterSource, method: str) -> str:

@@ -28,7 +28,7 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import load_model
 from fieldsid.models.record import record_of
-from fieldsid.planning.belief.prior_file import load_prior
+from fieldsid.planning.belief.prior_model import load_prior
 from fieldsid.plant.laws.axis_laws import carried_models, load_laws
 from fieldsid.records.reading import read_yaml
 from fieldsid.results.logs import inspected

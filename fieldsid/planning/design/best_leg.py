@@ -13,9 +13,8 @@ from fieldsid.maneuvers import Schedule, pick_maneuver
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.belief.prior_model import draws_of, scales_of
-from fieldsid.planning.design.information import information_of
 from fieldsid.planning.design.leg import CIRCLE, Expected, Leg, turn_back_s
-from fieldsid.planning.design.objective import Objective, make_objective
+from fieldsid.planning.design.objective import Objective, information_of, make_objective
 from fieldsid.planning.design.optimise import SMALLEST, Scored, as_switched, catalogue, largest_paying, switching
 from fieldsid.planning.flight.excitation import LONGEST_WINDOW_S, Excitation, Window, fits, flown
 from fieldsid.planning.flight.operating_point import operating_point
@@ -56,7 +55,8 @@ def best_leg(setting: Setting, speed: float, known: Sequence[Excitation] = ()) -
     straight = fly_list(crowd.first(COARSE_DRAWS), np.zeros(0), judge.envelope, judge.autopilot, judge.run_up)
     if np.mean(straight.outside(judge.envelope)) > setting.envelope.share:
         raise _nothing_inside(judge)  # as the autopilot steers straight on
-    scored = _known_again(judge, known) if known else catalogue(judge)
+    # what was best elsewhere, each at the angle that pays here
+    scored = [largest_paying(judge, c) for c in known if fits(c, judge.window)] if known else catalogue(judge)
     scored = [s for s in scored if s.candidate.record.rule is None or not setting.open_loop]
     seeds = [s for s in (as_switched(judge, c.candidate) for c in scored) if s is not None]
     scored.append(switching(judge, seeds, setting.seed))
@@ -97,7 +97,8 @@ def ensemble_at(judge: Objective, setting: Setting) -> Ensemble:
 def risk_of(judge: Objective, crowd: Ensemble, candidate: Excitation) -> tuple[float, dict[str, float]]:
     """Return the share of draws that leave the envelope, and each excursion's 95 % quantile."""
     flights = fly_ensemble(crowd, candidate, judge.envelope, judge.autopilot, judge.run_up)
-    return float(np.mean(flights.outside(judge.envelope))), flights.quantiles(0.95)
+    excursions = {name: float(np.quantile(values, 0.95)) for name, values in flights.excursions.items()}
+    return float(np.mean(flights.outside(judge.envelope))), excursions
 
 
 def leg_of(
@@ -151,7 +152,7 @@ def expected_errors(judge: Objective, setting: Setting, candidate: Excitation) -
     base = pulses(judge)
     before = {} if base is None else judge.expected(base).std_errors()
     scales = scales_of(setting.model, judge.scene.base, judge.envelope.fin)
-    values = values_at(judge)
+    values = {**judge.scene.model.values, **judge.scene.model.at_speed(speed)}
     high = {n: _high([e[n] for e in spread]) for n in mean.names}
     errors = mean.std_errors()
     return {n: Expected(values[n], e, high[n], e / scales[n], before.get(n, float("nan"))) for n, e in errors.items()}
@@ -171,16 +172,6 @@ def pulses(judge: Objective) -> Excitation | None:
         return None
     values = {"amplitude": min(0.26, fin), "second": min(0.15, fin), "recovery": min(maneuver.defaults["recovery"], spare)}
     return Excitation(maneuver.name, maneuver.checked(values))
-
-
-def values_at(judge: Objective) -> dict[str, float]:
-    """Return every shared parameter's value at the objective's speed."""
-    return {**judge.scene.model.values, **judge.scene.model.at_speed(judge.scene.speed)}
-
-
-def _known_again(judge: Objective, known: Sequence[Excitation]) -> list[Scored]:
-    """Return maneuvers that were best elsewhere, each at the angle that pays here, best first."""
-    return sorted((largest_paying(judge, c) for c in known if fits(c, judge.window)), key=lambda s: s.cost)
 
 
 def enforce_envelope(judge: Objective, setting: Setting, crowd: Ensemble, candidate: Excitation) -> Excitation | None:

@@ -200,11 +200,7 @@ def _repeated(leg: Leg, want: Mapping[str, float], envelope: Envelope) -> Leg:
             if possible
             else envelope.widening(),
         )
-    return with_passes(leg, max(passes, 1))
-
-
-def with_passes(leg: Leg, passes: int) -> Leg:
-    """Return a leg of one pass flown several times."""
+    passes = max(passes, 1)
     return replace(leg, passes=passes, expected={n: e.over(passes) for n, e in leg.expected.items()})
 
 

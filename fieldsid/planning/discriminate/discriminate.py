@@ -15,7 +15,7 @@ from fieldsid.models.model import Model
 from fieldsid.planning.design.best_leg import FINALISTS
 from fieldsid.planning.design.optimise import moves_of
 from fieldsid.planning.discriminate.t_optimality import MAX_REFIT_ITERATIONS, Rival, log_odds, rival_of
-from fieldsid.planning.flight.excitation import Excitation, Window, fits, flown_all
+from fieldsid.planning.flight.excitation import Excitation, Window, fits, flown
 from fieldsid.planning.flight.operating_point import autopilot_of, operating_point
 from fieldsid.planning.flight.rule_flight import Response
 from fieldsid.planning.safety.envelope import Envelope, excursions_of, used
@@ -102,9 +102,7 @@ class _RivalFlights:
         """Return every rival's flight, None where one leaves the envelope."""
         limits = self.envelope.limits
         pilot = autopilot_of(self.rivals[0].scene.base, limits)
-        flights: list[Response] = []
-        for rival in self.rivals:
-            flights += flown_all([rival.scene], candidate, self.window, limits, pilot)
+        flights = [flown(rival.scene, candidate, self.window, limits, pilot) for rival in self.rivals]
         for rival, flight in zip(self.rivals, flights, strict=True):
             far = excursions_of(
                 rival.scene.axis, flight.angle[:, None], flight.rate[:, None], speed=self.speed, step=1.0 / self.window.rate_hz,
@@ -129,10 +127,6 @@ class _RivalFlights:
         return found
 
 
-def _in_turn(function: Callable[[Excitation], Pairs], candidates: Sequence[Excitation]) -> list[Pairs]:
-    return [function(c) for c in candidates]
-
-
 def separate(
     models: Sequence[Model],
     envelope: Envelope,
@@ -143,7 +137,7 @@ def separate(
     run_up_s: float = 0.0,
     candidates: Sequence[Excitation] | None = None,
     fast: bool = False,
-    mapped: Map = _in_turn,
+    mapped: Map = lambda function, candidates: list(map(function, candidates)),
 ) -> Separation:
     """Return the maneuver inside the envelope that discriminates rival models best, at the best of the speeds (m/s).
 

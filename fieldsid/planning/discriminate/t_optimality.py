@@ -16,7 +16,7 @@ from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.planning.design.information import problem_of
+from fieldsid.planning.design.objective import problem_of
 from fieldsid.planning.flight.operating_point import OperatingPoint
 from fieldsid.planning.flight.rule_flight import Response
 

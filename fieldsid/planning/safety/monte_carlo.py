@@ -53,10 +53,6 @@ class Flights:
         """Return which draws left the envelope, (m,)."""
         return np.asarray(used(self.excursions, envelope) > 1.0)
 
-    def quantiles(self, share: float) -> dict[str, float]:
-        """Return a quantile of every excursion."""
-        return {k: float(np.quantile(v, share)) for k, v in self.excursions.items()}
-
 
 def draw_ensemble(model: Model, speed: float, window: Window, count: int, seed: int) -> Ensemble:
     """Return draws of a prior at a speed (m/s), ready to be flown over a window."""

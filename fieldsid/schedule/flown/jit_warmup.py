@@ -8,7 +8,7 @@ from fieldsid.dynamics.steady_kernel import settled_rates, straight_slopes
 from fieldsid.models.hull import CONSTANTS
 from fieldsid.schedule.flown.closed_loop_kernel import GAINS, MOTION, Plants, close_loop
 from fieldsid.schedule.flown.hull_kernel import close_hull_loop
-from fieldsid.schedule.flown.pace import STEP_S
+from fieldsid.schedule.flown.response import STEP_S
 from fieldsid.turning.maneuvering.equations import NAMES, about_straight, settle, simulate
 from fieldsid.turning.steady.speed_loss import simulated
 

@@ -15,9 +15,8 @@ import numpy as np
 
 from fieldsid.errors import ModelError
 from fieldsid.rounding import number
-from fieldsid.schedule.controller import Gains
+from fieldsid.schedule.controller import FREQUENCY_GRID_RAD_S, HELD_SHARE, Gains, margins, worst_of
 from fieldsid.schedule.linear_plant import LinearPlant
-from fieldsid.schedule.margins import FREQUENCY_GRID_RAD_S, HELD_SHARE, margins, worst_of
 from fieldsid.schedule.record import Row
 from fieldsid.schedule.search.formulas import bandwidth_of
 from fieldsid.schedule.search.objective import BETTER_SHARE, DRAWS_MARGIN_SHARE, ROUNDING, Demand, Place, demand_of

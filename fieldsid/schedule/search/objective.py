@@ -20,21 +20,22 @@ import numpy as np
 
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.records.keys import Key, Number
-from fieldsid.schedule.controller import Gains
-from fieldsid.schedule.flown.pace import Pace, full_bandwidth, pace_of
+from fieldsid.schedule.controller import HELD_SHARE, Gains, PlantResponse, margins, margins_of, plant_response, worst_of
 from fieldsid.schedule.flown.response import (
     FLIGHT_ERROR_SHARE,
     LIMIT_CYCLE_SHARE,
     SETTLING_BAND,
     Flight,
+    Pace,
     about_rest,
     fly,
+    full_bandwidth,
     overshoot,
+    pace_of,
     settling,
     swing,
 )
 from fieldsid.schedule.linear_plant import LinearPlant
-from fieldsid.schedule.margins import HELD_SHARE, PlantResponse, margins, margins_of, plant_response, worst_of
 from fieldsid.schedule.record import Row
 from fieldsid.schedule.search.formulas import bandwidth_of
 from fieldsid.schedule.wish import QUICKEST, Wish, overshoot_of

@@ -17,14 +17,15 @@ from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.plant.laws.axis_laws import save_laws
 from fieldsid.plant.parameter_source import ParameterSource, load_parameter_source
-from fieldsid.schedule.controller import KINDS, Gains, closed_poles, least_damping
+from fieldsid.schedule.controller import KINDS, Gains, closed_poles, least_damping, margins
 from fieldsid.schedule.flown.closed_loop_kernel import close_loop
 from fieldsid.schedule.flown.hull_kernel import close_hull_loop
 from fieldsid.schedule.flown.jit_warmup import compile_loops
-from fieldsid.schedule.flown.pace import Pace, disturbance_moment
 from fieldsid.schedule.flown.response import (
     LIMIT_CYCLE_SHARE,
     Flight,
+    Pace,
+    disturbance_moment,
     fly,
     overshoot,
     settling,
@@ -33,7 +34,6 @@ from fieldsid.schedule.flown.response import (
 )
 from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, not_counted, plants_at
 from fieldsid.schedule.make import design_schedule
-from fieldsid.schedule.margins import margins
 from fieldsid.schedule.record import load_schedule, save_schedule
 from fieldsid.schedule.search.design import design_gains, row_of
 from fieldsid.schedule.verdict import against_constant, lost

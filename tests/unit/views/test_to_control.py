@@ -11,10 +11,9 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.plant.parameter_source import source_of_models
-from fieldsid.schedule.controller import Gains, closed_poles
+from fieldsid.schedule.controller import Gains, closed_poles, margins
 from fieldsid.schedule.flown.response import Flight, fly
 from fieldsid.schedule.linear_plant import FinLimits, plants_at
-from fieldsid.schedule.margins import margins
 from fieldsid.schedule.record import Row, Schedule
 
 PATHS = {

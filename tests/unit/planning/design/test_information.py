@@ -12,7 +12,7 @@ from fieldsid.maneuvers import Limits, parse_spec
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.planning.belief.prior_model import named_prior
-from fieldsid.planning.design.information import Information, information_of
+from fieldsid.planning.design.objective import Information, information_of
 from fieldsid.planning.flight.excitation import Excitation, Window, flown
 from fieldsid.planning.flight.operating_point import autopilot_of, operating_point
 
