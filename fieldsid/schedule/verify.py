@@ -120,12 +120,6 @@ class Verification(Plotted):
         sign, read = READ_OFF[name]
         return min(self.scheduled, key=lambda c: sign * read(c))
 
-    @property
-    def slowest(self) -> tuple[float, float]:
-        """The longest settling of the standard step over speeds and 95 % of the draws, s: schedule and constant gain."""
-        own, other = (max(c.settling_most for c in part) for part in (self.scheduled, self.constant))
-        return own, other
-
 
 def verify_schedule(
     schedule: Schedule,

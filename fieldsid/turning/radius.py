@@ -14,8 +14,7 @@ from fieldsid.logs.several.sifting import Refused
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.parameter_source import ParameterSource
-from fieldsid.plant.remedies import damping_that_holds, in_radians, wider_fin
-from fieldsid.records.check import LARGEST_FIN_RAD
+from fieldsid.plant.remedies import damping_that_holds, refuse_no_fin, wider_fin
 from fieldsid.turning.believed_rows import believed_rows, doubts_of_draws
 from fieldsid.turning.flown_circles import against_rudder, circles_of, compared_with, turned_against, with_measurement
 from fieldsid.turning.maneuvering.belief import SEED, Belief, believe, not_fitted
@@ -249,12 +248,7 @@ def _check(source: ParameterSource, speeds: Sequence[float], rudder_max: float, 
         raise UsageError(f"there is no method {method!r}", found=", ".join(METHODS), hint="leave `--method` out")
     if method in ("simulated", "maneuvering") and not source.models:
         raise UsageError("a table cannot be simulated", found="no model", hint="give model files, or `--method u_turn`")
-    if not 0.0 < rudder_max <= LARGEST_FIN_RAD:
-        raise UsageError(
-            "the rudder held in a turn lies above 0 and at most at 90 deg",
-            found=f"--fin-max {rudder_max:g}",
-            hint=in_radians("--fin-max", rudder_max),
-        )
+    refuse_no_fin("the rudder held in a turn", rudder_max)
     if not len(speeds) or not all(s > 0 and np.isfinite(s) for s in speeds):
         raise UsageError("speeds must be above zero", found=f"{list(speeds)}", hint="write `--speeds 0.5:2.5:0.1` or `1.0,1.5`")
 

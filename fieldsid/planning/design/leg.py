@@ -174,11 +174,10 @@ def aborts_of(leg: Leg, envelope: Envelope) -> tuple[Abort, ...]:
         Abort("time_s", "time", leg.window.length + GRACE_S, "s", "the window is over"),
         Abort("surge_m_s", "below", SLOWEST_SHARE * leg.speed, "m/s", "too slow to steer as planned"),
     ]
-    for signal, limit, says in (("yaw_rad", limits.heading, "heading"), ("pitch_rad", limits.pitch, "pitch")):
+    tilts = (("yaw_rad", limits.heading, "heading"), ("pitch_rad", limits.pitch, "pitch"), ("roll_rad", limits.roll, "roll"))
+    for signal, limit, says in tilts:
         if limit is not None:
             found.append(Abort(signal, "deviation", limit, "rad", f"{says} left the envelope"))
-    if limits.roll is not None:
-        found.append(Abort("roll_rad", "deviation", limits.roll, "rad", "roll left the envelope"))
     if limits.depth_low is not None and limits.depth_high is not None:
         found.append(Abort("depth_m", "above", limits.depth_high, "m", "too deep"))
         found.append(Abort("depth_m", "below", limits.depth_low, "m", "too shallow"))

@@ -40,14 +40,6 @@ class Information:
     names: tuple[str, ...]
     matrix: FloatArray
 
-    def times(self, repeats: int) -> Information:
-        """Return the information of the same flight flown several times."""
-        return Information(self.names, self.matrix * repeats)
-
-    def plus(self, other: Information) -> Information:
-        """Return the information of two flights of the same parameters."""
-        return Information(self.names, self.matrix + other.matrix)
-
     def std_errors(self) -> dict[str, float]:
         """Return the standard error of every parameter, infinite where the flight cannot tell it from others."""
         errors = np.full(len(self.names), np.inf)

@@ -64,15 +64,6 @@ def test_a_disturbance_makes_every_parameter_worse():
         assert errors[0][name] < errors[1][name] < errors[2][name]
 
 
-def test_four_passes_halve_the_error():
-    scene = operating_point(named_prior("torpedo", Axis.YAW), 1.4)
-    once = information_of(scene, flight(scene))
-    for name, error in once.times(4).std_errors().items():
-        assert error == pytest.approx(0.5 * once.std_errors()[name], rel=1e-9)
-    for name, error in once.plus(once).std_errors().items():
-        assert error == pytest.approx(once.std_errors()[name] / np.sqrt(2), rel=1e-9)
-
-
 def test_what_a_flight_cannot_tell_apart_has_no_finite_error():
     twin = Information(("a", "b", "c"), np.array([[4.0, 4.0, 0.0], [4.0, 4.0, 0.0], [0.0, 0.0, 25.0]]))
     assert twin.std_errors() == {"a": np.inf, "b": np.inf, "c": pytest.approx(0.2)}
