@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from fieldsid.comparison.compare import Comparison
     from fieldsid.diagnosis import Candidate, Diagnosis
     from fieldsid.errors import FieldsidError
-    from fieldsid.extension import Extension
+    from fieldsid.extension.extend import Extension
     from fieldsid.face.files import load_model, save
     from fieldsid.face.fits import compare, diagnose, extend, identify
     from fieldsid.face.gains import design_schedule, fit_laws, turn_radius, verify_schedule
@@ -36,15 +36,17 @@ if TYPE_CHECKING:
     from fieldsid.models.model import Model
     from fieldsid.online.estimate import OnlineEstimate
     from fieldsid.online.identifier import OnlineIdentifier
-    from fieldsid.schedule import Schedule, Verification
-    from fieldsid.turning import Laws, TurnPrediction
+    from fieldsid.plant.laws.axis_laws import Laws
+    from fieldsid.schedule.record import Schedule
+    from fieldsid.schedule.verify import Verification
+    from fieldsid.turning.prediction import TurnPrediction
 
 _ROOMS = {
     "fieldsid.change.record": ("Change",),
     "fieldsid.comparison.compare": ("Comparison",),
     "fieldsid.diagnosis": ("Candidate", "Diagnosis"),
     "fieldsid.errors": ("FieldsidError",),
-    "fieldsid.extension": ("Extension",),
+    "fieldsid.extension.extend": ("Extension",),
     "fieldsid.face.files": ("load_model", "save"),
     "fieldsid.face.fits": ("compare", "diagnose", "extend", "identify"),
     "fieldsid.face.gains": ("design_schedule", "fit_laws", "turn_radius", "verify_schedule"),
@@ -57,8 +59,10 @@ _ROOMS = {
     "fieldsid.models.model": ("Model",),
     "fieldsid.online.estimate": ("OnlineEstimate",),
     "fieldsid.online.identifier": ("OnlineIdentifier",),
-    "fieldsid.schedule": ("Schedule", "Verification"),
-    "fieldsid.turning": ("Laws", "TurnPrediction"),
+    "fieldsid.plant.laws.axis_laws": ("Laws",),
+    "fieldsid.schedule.record": ("Schedule",),
+    "fieldsid.schedule.verify": ("Verification",),
+    "fieldsid.turning.prediction": ("TurnPrediction",),
 }
 """Where the names are: the same as above, which is for mypy and editors alone."""
 

@@ -16,10 +16,9 @@ from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.flight.dry_run import dry_run
 from fieldsid.plant.parameter_source import ParameterSource
-from fieldsid.schedule.controller import least_damping
+from fieldsid.schedule.controller import least_damping, margins
 from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, family_at
 from fieldsid.schedule.make import design_schedule
-from fieldsid.schedule.margins import margins
 from fieldsid.schedule.record import Row, Schedule
 from fieldsid.schedule.wish import Wish
 from fieldsid.turning.radius import turn_radius

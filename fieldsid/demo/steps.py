@@ -20,7 +20,7 @@ from fieldsid.maneuvers import pick_maneuver
 from fieldsid.models.axis import Axis
 from fieldsid.planning.design.leg import error_in_words
 from fieldsid.rounding import number, with_error
-from fieldsid.turning.known_radius import turn_words
+from fieldsid.turning.prediction import turn_words
 
 Result = briefs.Result
 CHECKED = " ".join(f"--validate {{runs}}/check_{speed:.1f}.parquet" for speed in CHECK_SPEEDS)

@@ -34,17 +34,18 @@ from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S
 from fieldsid.noise.whiten import noise_vector
 from fieldsid.numerics.arrays import FloatArray
 
-MAX_REWEIGHTINGS = 12
-"""Descents with the weights of the residuals before them. From weights of the wrong proportion each takes away most of what is
-left, not all: two ended up to 50 units of log likelihood short of the optimum (a delay of 0.6 s)."""
+MAX_ROUNDS = 12
+"""Descents with the weights of the residuals before them, and searches for other times of events. From weights of the wrong
+proportion each descent takes away most of what is left, not all: two ended up to 50 units of log likelihood
+short of the optimum (a delay of 0.6 s)."""
 PROVISIONAL_COST_TOLERANCE = 1e-3
 """Relative change of the cost at which a descent under provisional weights ends."""
 NEGLIGIBLE_LIKELIHOOD_GAIN = 0.01
 """Log likelihood that the last descent may have gained."""
 NEGLIGIBLE_LOG_WEIGHT_CHANGE = 0.02
 """Change of both weights on a long record, in logs, that does not move the minimum."""
-MAX_RESCANS, MIN_RESCAN_GAIN = 12, 0.5
-"""Searches of the nuisances' grids at the minimum found, and the log likelihood below which another is not worth it."""
+MIN_RESCAN_GAIN = 0.5
+"""Log likelihood below which another search of the nuisances' grids at the minimum found is not worth it."""
 MAX_STARTS = 6
 """Other times of events that a solution is left for, the most promising first."""
 START_COST_TOLERANCE = 1e-5
@@ -74,7 +75,7 @@ def minimise(problem: Problem, start: FloatArray, noise: Noise) -> tuple[Minimum
     """Return the output-error minimum from a start, with weights from its own residuals."""
     found = levenberg_marquardt(problem, start, noise, tolerance=PROVISIONAL_COST_TOLERANCE)
     cost = negative_log_likelihood(problem, found.x)
-    for _ in range(MAX_REWEIGHTINGS):
+    for _ in range(MAX_ROUNDS):
         noise = residual_noise(problem, found.x, len(found.free))
         found = levenberg_marquardt(problem, found.x, noise)
         before, cost = cost, negative_log_likelihood(problem, found.x)
@@ -93,7 +94,7 @@ def _rescanned(problem: Problem, found: Minimum, weights: Noise) -> tuple[Minimu
     if not timed:
         return found, weights
     cost = negative_log_likelihood(problem, found.x)
-    for _ in range(MAX_RESCANS):
+    for _ in range(MAX_ROUNDS):
         before, x = cost, found.x
         for start in _starts_at_other_times(problem, x, timed, weights):
             # what a start before this one has gained stays: it is of another event

@@ -29,8 +29,8 @@ from fieldsid.numerics.arrays import FloatArray
 
 MAX_SRIVC_ITERATIONS = 30
 CONVERGED_RELATIVE_CHANGE = 1e-7
-MIN_FILTER_DAMPING, MIN_FILTER_STIFFNESS = 0.05, 0.0
-"""Least damping (1/s) and stiffness (1/s^2) of the filter: an unstable estimate must not become an unstable filter."""
+MIN_FILTER_DAMPING = 0.05
+"""Least damping (1/s) of the filter: an unstable estimate must not become an unstable filter."""
 MAX_SIMULATION_STEP_S = 0.0125
 """Longest step of the simulation between samples."""
 
@@ -76,10 +76,8 @@ def solve(problem: Problem, options: Options) -> Solution:
         state = np.array([found[-1], found[-2] - damping * found[-1]])
     residual = rows.target[use] - phi @ found
     series = Series(z, residual, Transfer(np.ones(1), np.ones(1)), median_step(record))
-    small = coloured_covariance([series], inverse_of_normal(z.T @ z, np.zeros((len(keep), len(keep)))))
-    covariance = np.zeros((problem.layout.shared, problem.layout.shared))
-    covariance[np.ix_(slots, slots)] = small[: len(slots), : len(slots)]
-    return finished(problem, x, covariance, ESTIMATOR.name, notes_of(rounds, moved))
+    known = coloured_covariance([series], inverse_of_normal(z.T @ z, np.zeros((len(keep), len(keep)))))
+    return finished(problem, x, known, ESTIMATOR.name, notes_of(rounds, moved))
 
 
 def filtered_rows(record: Record, theta: RegressionParameters, state: FloatArray) -> tuple[Rows, Rows]:
@@ -90,7 +88,7 @@ def filtered_rows(record: Record, theta: RegressionParameters, state: FloatArray
     part = np.tile(np.arange(pieces) / pieces, record.steps.size)
     start, change = np.repeat(path.start, pieces), np.repeat(path.end - path.start, pieces)
     fin = start + change * part, start + change * (part + 1.0 / pieces)
-    a, k = max(theta.damping, MIN_FILTER_DAMPING), max(theta.stiffness, MIN_FILTER_STIFFNESS)
+    a, k = max(theta.damping, MIN_FILTER_DAMPING), max(theta.stiffness, 0.0)
     push = [theta.authority * f + theta.trim for f in fin]
     motion = through(fine, a, k, push[0], push[1], state)[:, 0]
     every = slice(None, None, pieces)

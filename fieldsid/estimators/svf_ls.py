@@ -15,7 +15,7 @@ from fieldsid.errors import DataError
 from fieldsid.estimators.output_error import residual_noise
 from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
 from fieldsid.fitting.predict.predict import refit_nuisances
-from fieldsid.fitting.problem.estimator import Estimator, Options, Solution
+from fieldsid.fitting.problem.estimator import Estimator, History, Options, Solution
 from fieldsid.fitting.problem.parameters import group_name
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.fitting.regression.bias_compensation import inverse_of_normal, noise_can_go, noise_share, transfer_of
@@ -39,7 +39,7 @@ def solve(problem: Problem, options: Options) -> Solution:
 
 
 def regress(problem: Problem, bandwidth: float) -> tuple[FloatArray, FloatArray, list[Measured]]:
-    """Return the vector (N,), covariance (S, S) of its shared parameters, and the signals of each run."""
+    """Return the vector (N,), covariance of its base parameters and start terms, and the signals of each run."""
     signals = [measured_signals(r, bandwidth) for r in problem.records]
     slots = base_slots(problem)
     theta: list[RegressionParameters] | None = None
@@ -59,11 +59,7 @@ def regress(problem: Problem, bandwidth: float) -> tuple[FloatArray, FloatArray,
         Series(rows.matrix[part], residual[part], transfer_of(s.order, bandwidth, median_step(r), t), median_step(r))
         for part, s, r, t in zip(rows.parts, signals, problem.records, theta or [], strict=True)
     ]
-    small = coloured_covariance(series, inverse)
-    covariance = np.zeros((problem.layout.shared, problem.layout.shared))
-    places = list(slots.values())
-    covariance[np.ix_(places, places)] = small[: len(places), : len(places)]
-    return x, covariance, signals
+    return x, coloured_covariance(series, inverse), signals
 
 
 def median_step(record: Record) -> float:
@@ -163,18 +159,29 @@ def parameters_of(problem: Problem, x: FloatArray, run: int) -> RegressionParame
     return RegressionParameters(base.damping, base.stiffness, base.authority, base.trim)
 
 
-def finished(problem: Problem, x: FloatArray, covariance: FloatArray, method: str, notes: tuple[Note, ...]) -> Solution:
+def finished(
+    problem: Problem,
+    x: FloatArray,
+    known: FloatArray,
+    method: str,
+    notes: tuple[Note, ...],
+    history: History | None = None,
+) -> Solution:
     """Return the solution with every run's initial state at its best and the noise of its free run.
+
+    `known` is the covariance of the base parameters, and of what may come after them.
 
     Raises DivergenceError when the motion that was found grows without bound.
     """
-    layout = problem.layout
+    layout, slots = problem.layout, list(base_slots(problem).values())
+    covariance = np.zeros((layout.shared, layout.shared))
+    covariance[np.ix_(slots, slots)] = known[: len(slots), : len(slots)]
     x = np.clip(x, layout.low, layout.high)
     for run, record in enumerate(problem.records):
         x = refit_nuisances(problem, x, run, white_noise_floor([record]))
     refuse_unbounded_motion(problem, x, method, instead="use `--method output_error`, which keeps to motions that stay bounded")
-    noise = residual_noise(problem, x, len(base_slots(problem)))
-    return Solution(x, covariance, noise, method, notes)
+    noise = residual_noise(problem, x, len(slots))
+    return Solution(x, covariance, noise, method, notes, history=history)
 
 
 def bandwidth_notes(signals: list[Measured], bandwidth: float) -> tuple[Note, ...]:

@@ -57,11 +57,8 @@ def solve(problem: Problem, options: Options) -> Solution:
     small, plain = errors_of(problem, x, rows[used], signals, options)
     wider = np.sqrt(np.diag(small) / np.maximum(np.diag(plain), 1e-300))
     history = history_of(record, list(slots), values, spread * wider)
-    covariance = np.zeros((problem.layout.shared, problem.layout.shared))
-    covariance[np.ix_(list(slots.values()), list(slots.values()))] = small
     notes = (*bandwidth_notes([signals], options.bandwidth), *settle_notes(record, history))
-    done = finished(problem, x, covariance, ESTIMATOR.name, notes)
-    return Solution(done.x, done.covariance, done.noise, done.method, done.notes, history=history)
+    return finished(problem, x, small, ESTIMATOR.name, notes, history)
 
 
 def share_of(record: Record, signals: Measured, bandwidth: float) -> NoiseShare:

@@ -1,24 +1,21 @@
 """Put a schedule under a key of an existing YAML file: comments and order kept, nothing else touched, the difference shown.
 
-The file is round-tripped with the indentation that gives back its own text byte for byte; where no indentation does, the lines
-of the key's block alone are replaced. The result is read again and must differ under that key alone.
+The text of the key's value alone is replaced. The result is read again and must differ under that key alone.
 """
 
 from __future__ import annotations
 
 import difflib
-import io
 import os
+import re
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.representer import RoundTripRepresenter
+from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
 from fieldsid.artifacts import replacing
 from fieldsid.errors import ArtifactError, UsageError
@@ -26,20 +23,7 @@ from fieldsid.exports._target import decimal
 from fieldsid.records.reading import read_bytes, yaml_mapping
 from fieldsid.registry import near
 
-INDENTS = tuple(product((2, 4), ((2, 0), (4, 2), (2, 2), (6, 4), (4, 4))))
-LARGEST_PATCHED = 1 << 17
-"""Letters of a file that is patched: it is read with its comments, and written in each of the indentations, in a few seconds."""
 BY_HAND = "export with `-o FILE`, and copy the numbers"
-
-
-class _Decimals(RoundTripRepresenter):
-    """Writes plain floats, which are only ours (the file's own are ScalarFloat), with a decimal point and no exponent.
-
-    A class of its own: a representer is registered for the class, and so for every YAML file of the process.
-    """
-
-
-_Decimals.add_representer(float, lambda r, v: r.represent_scalar("tag:yaml.org,2002:float", decimal(v)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,17 +51,11 @@ def patch_yaml(path: Path, key: str, columns: Mapping[str, Sequence[float]]) -> 
     """
     before = _text(path)
     _values(path, before)
-    yaml, tree, regular = _parsed(before)
-    parent, last = _find(path, tree, key)
-    if regular:
-        _put(parent, last, columns)
-        stream = io.StringIO()
-        yaml.dump(tree, stream)
-        after = stream.getvalue()
-    else:
-        after = _spliced(path, before.replace("\r\n", "\n"), parent, last, columns)
+    text = before.replace("\r\n", "\n")
+    parent, name, value = _find(path, YAML(typ="safe", pure=True).compose(text), key)
+    after = _replaced(text, parent, name, value, columns)
     if "\r\n" in before:
-        after = after.replace("\r\n", "\n").replace("\n", "\r\n")
+        after = after.replace("\n", "\r\n")
     patch = Patch(path, before, after)
     _check(patch, key, columns)
     return patch
@@ -118,9 +96,6 @@ def _text(path: Path) -> str:
 
 def _values(path: Path, text: str) -> dict[str, Any]:
     """Return what the text says; raises ArtifactError where it is none of what is read, as with tags of its own."""
-    if len(text) > LARGEST_PATCHED:
-        found = f"{len(text)} letters, more than {LARGEST_PATCHED}"
-        raise ArtifactError(f"`{path}` could not be patched safely", found=found, hint=BY_HAND)
     try:
         return yaml_mapping(text.replace("\r\n", "\n"), path)
     except ArtifactError as error:
@@ -129,113 +104,61 @@ def _values(path: Path, text: str) -> dict[str, Any]:
         ) from error
 
 
-def _parsed(text: str) -> tuple[YAML, CommentedMap, bool]:
-    """Return a parser, the tree, and whether the parser's indentation gives the text back."""
-    source = text.replace("\r\n", "\n")
-    for quotes in (True, False):
-        tree = _parser(2, 2, 0, quotes=quotes).load(source)
-        for mapping, (sequence, offset) in INDENTS:
-            yaml = _parser(mapping, sequence, offset, quotes=quotes)
-            if _gives_back(yaml, tree, source):
-                return yaml, tree, True
-    yaml = _parser(2, 2, 0, quotes=True)
-    return yaml, yaml.load(source), False
-
-
-def _gives_back(yaml: YAML, tree: CommentedMap, source: str) -> bool:
-    stream = _Same(source)
-    try:
-        yaml.dump(tree, stream)
-    except _OtherError:
-        return False
-    return stream.tell() == len(source)
-
-
-class _OtherError(Exception):
-    """Text that is written is not the one it is to be."""
-
-
-class _Same(io.StringIO):
-    """Takes a text as long as it is one that is given: most indentations are wrong from the first lines on."""
-
-    def __init__(self, wanted: str) -> None:
-        super().__init__()
-        self._wanted = wanted
-
-    def write(self, text: str) -> int:
-        """Take a piece of text; raises _OtherError where it is not what stands at its place."""
-        if not self._wanted.startswith(text, self.tell()):
-            raise _OtherError
-        return super().write(text)
-
-
-def _spliced(path: Path, text: str, parent: CommentedMap, last: str, columns: Mapping[str, Sequence[float]]) -> str:
-    """Return the text with the lines of the key's block replaced; raises ArtifactError inside a flow mapping."""
-    if parent.fa.flow_style():
-        raise ArtifactError(
-            f"`{path}`: `{last}` stands inside braces and cannot be replaced alone",
-            found=f"line {parent.lc.line + 1}",
-            hint="write that mapping in block style, one key per line",
-        )
-    row, column = parent.lc.key(last)
-    lines = text.splitlines(keepends=True)
-    end = row + 1
-    for i in range(row + 1, len(lines)):
-        words = lines[i].strip()
-        if not words or words.startswith("#"):
-            continue
-        depth = len(lines[i]) - len(lines[i].lstrip())
-        if depth < column or (depth == column and not words.startswith("- ")):
-            break
-        end = i + 1
-    head = lines[row][: lines[row].index(":", column) + 1] + "\n"
-    own = [f"{' ' * (column + 2)}{n}: [{', '.join(decimal(v) for v in vs)}]\n" for n, vs in columns.items()]
-    return "".join([*lines[:row], head, *own, *lines[end:]])
-
-
-def _parser(mapping: int, sequence: int, offset: int, *, quotes: bool) -> YAML:
-    yaml = YAML()
-    yaml.preserve_quotes = quotes
-    yaml.width = 100_000
-    yaml.indent(mapping=mapping, sequence=sequence, offset=offset)
-    yaml.Representer = _Decimals
-    return yaml
-
-
-def _find(path: Path, tree: CommentedMap, key: str) -> tuple[CommentedMap, Any]:
-    here: Any = tree
+def _find(path: Path, tree: Node, key: str) -> tuple[Any, Node, Node]:
+    """Return the mapping that holds a dotted key, the key's own node and that of its value."""
     parts = _parts(key)
     for depth, part in enumerate(parts):
-        if not isinstance(here, CommentedMap) or part not in here:
-            known = [str(k) for k in here] if isinstance(here, CommentedMap) else []
+        held = {name.value: (name, value) for name, value in tree.value} if isinstance(tree, MappingNode) else {}
+        if part not in held:
             place = ".".join(parts[:depth]) or "the top"
             raise UsageError(
                 f"key `{key}` is not in `{path}`: nothing named `{part}` under {place}",
-                found=", ".join(known) or "no keys there",
-                hint=near(part, known) if known else "name a key that holds a mapping",
+                found=", ".join(held) or "no keys there",
+                hint=near(part, list(held)) if held else "name a key that holds a mapping",
             )
-        if depth == len(parts) - 1:
-            return here, part
-        here = here[part]
-    raise UsageError("`--key` is empty", found=repr(key), hint="write `--key control.heading.gains`")
+        parent, (name, tree) = tree, held[part]
+    if not parts:
+        raise UsageError("`--key` is empty", found=repr(key), hint="write `--key control.heading.gains`")
+    return parent, name, tree
 
 
 def _parts(key: str) -> list[str]:
     return [p for p in key.split(".") if p]
 
 
-def _put(parent: CommentedMap, last: str, columns: Mapping[str, Sequence[float]]) -> None:
-    """Set the columns under the key; keys that are there already keep their place and comments."""
-    held = parent[last]
-    if not isinstance(held, CommentedMap) or held.fa.flow_style():
-        held = CommentedMap()
-        parent[last] = held
-    for name in [k for k in held if k not in columns]:
-        del held[name]
-    for name, values in columns.items():
-        row = CommentedSeq([float(v) for v in values])
-        row.fa.set_flow_style()
-        held[name] = row
+def _replaced(text: str, parent: Any, name: Node, value: Node, columns: Mapping[str, Sequence[float]]) -> str:
+    """Return the text with the columns as a key's value; keys that are there already keep their place and comments."""
+    rows = {n: f": [{', '.join(decimal(v) for v in vs)}]" for n, vs in columns.items()}
+    begin, end = name.end_mark.index, _end(text, name, value)
+    if parent.flow_style:
+        return f"{text[:begin]}: {{{', '.join(n + row for n, row in rows.items())}}}{text[end:]}"
+    inside = isinstance(value, MappingNode) and not value.flow_style and value.start_mark.index > begin
+    held = value.value if inside else []
+    indent = " " * (held[0][0].start_mark.column if held else name.start_mark.column + 2)
+    new = "".join(f"\n{indent}{n}{row}" for n, row in rows.items() if n not in {own.value for own, _ in held})
+    if not held:
+        return f"{text[:begin]}:{new}{text[end:]}"
+    line = text.find("\n", end)
+    text = text[:line] + new + text[line:] if line >= 0 else text + new
+    for own, row in reversed(held):
+        start, stop = own.end_mark.index, _end(text, own, row)
+        if own.value not in rows:
+            start, stop = text.rfind("\n", 0, start), (text + "\n").find("\n", stop)
+        text = text[:start] + rows.get(own.value, "") + text[stop:]
+    return text
+
+
+def _end(text: str, name: Node, value: Node) -> int:
+    """Return the place where a key's value ends: of a block where its last value does, before what comments follow."""
+    if value.start_mark.index == value.end_mark.index:  # nothing
+        return text.index(":", name.end_mark.index) + 1
+    if value.start_mark.index < name.end_mark.index:  # an alias, whose value stands elsewhere
+        return re.compile(r"\s*:\s*\*[^\s,\]}]+").match(text, name.end_mark.index).end()  # type: ignore[union-attr]
+    if isinstance(value, MappingNode) and value.value and not value.flow_style:
+        return _end(text, *value.value[-1])
+    if isinstance(value, SequenceNode) and value.value and not value.flow_style:
+        return _end(text, name, value.value[-1])
+    return int(value.end_mark.index)
 
 
 def _check(patch: Patch, key: str, columns: Mapping[str, Sequence[float]]) -> None:

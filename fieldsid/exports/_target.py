@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,11 @@ class Target:
     render: Callable[[Schedule, str, Path | None], str]
     node: str
     template: str | None = None
+
+
+def templated(name: str, says: str, template: str, node: str) -> Target:
+    """Return the target whose file is a template's, of its kind."""
+    return Target(name, says, Path(template).suffix, partial(from_template, template), node, template)
 
 
 def decimal(value: float) -> str:

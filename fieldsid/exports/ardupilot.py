@@ -6,15 +6,6 @@ ArduPilot has no table of gains over speed; a Lua script that declares the table
 
 from __future__ import annotations
 
-from functools import partial
+from fieldsid.exports._target import templated
 
-from fieldsid.exports._target import Target, from_template
-
-EXPORT = Target(
-    name="ardupilot",
-    says="ArduPilot .param lines for a scripted table",
-    suffix=".param",
-    render=partial(from_template, "ardupilot.param"),
-    node="SCH",
-    template="ardupilot.param",
-)
+EXPORT = templated("ardupilot", "ArduPilot .param lines for a scripted table", "ardupilot.param", node="SCH")

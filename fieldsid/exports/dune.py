@@ -2,15 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
+from fieldsid.exports._target import templated
 
-from fieldsid.exports._target import Target, from_template
-
-EXPORT = Target(
-    name="dune",
-    says="DUNE ini section, a list per column",
-    suffix=".ini",
-    render=partial(from_template, "dune.ini"),
-    node="Control.AUV.GainSchedule",
-    template="dune.ini",
-)
+EXPORT = templated("dune", "DUNE ini section, a list per column", "dune.ini", node="Control.AUV.GainSchedule")

@@ -2,15 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
+from fieldsid.exports._target import templated
 
-from fieldsid.exports._target import Target, from_template
-
-EXPORT = Target(
-    name="moos",
-    says="MOOS ProcessConfig block, a line per speed",
-    suffix=".moos",
-    render=partial(from_template, "schedule.moos"),
-    node="pGainSchedule",
-    template="schedule.moos",
-)
+EXPORT = templated("moos", "MOOS ProcessConfig block, a line per speed", "schedule.moos", node="pGainSchedule")

@@ -14,7 +14,6 @@ from fieldsid.exports._target import Target, decimal, notes_of
 from fieldsid.records.keys import body_of
 from fieldsid.schedule.record import Row, Schedule
 
-MAV, COMPONENT, REAL32 = 1, 1, 9
 LEFT_OUT = (
     "UUV_TORQUE_SAT has to be 1.0, and a torque of one the fin at fin_limit_rad, the fin's sense in the allocation (CA_SV_CS*)",
     "PX4 has no place for ki and reference_gain; feed_forward_rad / fin_limit_rad is the surface's trim (CA_SV_CS*_TRIM)",
@@ -34,11 +33,14 @@ def render(schedule: Schedule, node: str, template: Path | None) -> str:
 
 
 def _parameters(schedule: Schedule, row: Row, node: str) -> list[str]:
-    """Return a row's lines; both gains of a loop have the sign of the authority, and PX4's have none."""
+    """Return a row's lines, of MAV 1, component 1 and type 9, a real of 32 bits.
+
+    Both gains of a loop have the sign of the authority, and PX4's have none.
+    """
     way = -1.0 if row.gains.kp < 0.0 else 1.0
     gains = {"P": row.gains.kp, "D": row.gains.kd}
     name = f"{node}_{schedule.axis.value.upper()}"
-    return [f"{MAV}\t{COMPONENT}\t{name}_{k}\t{decimal(way * v / row.fin_limit)}\t{REAL32}" for k, v in gains.items()]
+    return [f"1\t1\t{name}_{k}\t{decimal(way * v / row.fin_limit)}\t9" for k, v in gains.items()]
 
 
 EXPORT = Target(name="px4", says="PX4 .params of uuv_att_control, one set of gains", suffix=".params", render=render, node="UUV")

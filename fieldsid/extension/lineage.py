@@ -1,23 +1,31 @@
-"""Where an extended model comes from: its parents with the error before and after each addition, their hashes checked."""
+"""Where an extended model comes from: its parents with the error before and after each addition, their hashes checked.
+
+And the loop in one record: where the first model of a line fails, what was added, and how the error fell, an effect a step.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import degrees
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+from fieldsid.comparison.compare import Comparison
+from fieldsid.comparison.localize import Place
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.display import Brief
 from fieldsid.errors import ArtifactError
 from fieldsid.extension.extend import Extension, Gain
 from fieldsid.logs.run import Run
 from fieldsid.models.model import KIND, Noise, load_model, save_model
+from fieldsid.numerics.arrays import known
 from fieldsid.records.check import ShapeError, check
-from fieldsid.records.keys import INLINE, Key, body_of
+from fieldsid.records.keys import INLINE, Key, Number, body_of
 from fieldsid.records.model import EXTENSION
 from fieldsid.records.named_inputs import beside, sha256_of, sha256_of_named
 from fieldsid.records.reading import load_record
+from fieldsid.rounding import MANY
 
 INTACT, CHANGED, MISSING = "intact", "changed", "missing"
 
@@ -146,7 +154,8 @@ def history_of(path: Path) -> tuple[Generation, ...]:
 def _with_logs(generation: Generation, logs: Sequence[tuple[Path, str]]) -> Generation:
     """Return a generation that knows which of its logs are no longer what they were."""
     trial = generation.path.resolve().parent.parent
-    changed = tuple(str(path) for path, digest in logs if _differs(path, digest, trial))
+    there = [(path, digest) for path, digest in logs if beside([path], trial) is not None]
+    changed = tuple(str(path) for path, digest in there if sha256_of_named(path) not in (None, digest))
     return generation if generation.step is None else replace(generation, step=replace(generation.step, changed_data=changed))
 
 
@@ -171,22 +180,99 @@ def _gain(body: Mapping[str, Any]) -> Gain:
         added=tuple(str(n) for n in body["added"]),
         before=_pair(body["before"]),
         after=_pair(body["after"]),
-        noise_floor=Noise(_number(floor["angle_rad"]), _number(floor["rate_rad_s"])),
+        noise_floor=Noise(known(floor["angle_rad"]), known(floor["rate_rad_s"])),
         unseen=bool(body["unseen"]),
         learned_on=tuple(str(n) for n in body["learned_on"]),
         judged_on=tuple(str(n) for n in body["judged_on"]),
     )
 
 
-def _differs(path: Path, digest: str, trial: Path) -> bool:
-    return beside([path], trial) is not None and sha256_of_named(path) not in (None, digest)
-
-
 def _pair(body: Mapping[str, Any]) -> Pair:
     sides = (body["train"], body["validation"])
-    train, validation = (Errors(_number(s["angle_rms_rad"]), _number(s["rate_rms_rad_s"])) for s in sides)
+    train, validation = (Errors(known(s["angle_rms_rad"]), known(s["rate_rms_rad_s"])) for s in sides)
     return Pair(train, validation)
 
 
-def _number(value: float | None) -> float:
-    return float("nan") if value is None else float(value)
+@dataclass(frozen=True, slots=True)
+class LoopStep:
+    """A model of the line: what was added, and its error over the noise floor on the runs fitted to and on unseen ones.
+
+    In a log without noise the errors are over those of the first model; `says` has them in their units there.
+    """
+
+    added: Annotated[str, Key("What was added; of the first model its effects.")]
+    fitted: Annotated[Number, Key("The error on the runs fitted to.")]
+    unseen: Annotated[Number, Key("The error on unseen runs.")]
+    says: tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Loop(Brief):
+    """The same run by the first model of a line and by its last, and the line."""
+
+    before: Comparison
+    after: Comparison
+    line: tuple[Generation, ...]
+
+    @property
+    def run(self) -> Annotated[str, Key()]:
+        """The run that it is shown on."""
+        return self.before.run
+
+    @property
+    def start(self) -> str:
+        """The first model in words."""
+        return ", ".join(self.before.model.effects) or "plain model"
+
+    @property
+    def added(self) -> Annotated[tuple[str, ...], Key()]:
+        """The effects that were added, in their order."""
+        return tuple(name for g in self.line if g.step for name in g.step.gain.added)
+
+    @property
+    def where(self) -> Annotated[tuple[Place, ...], Key()]:
+        """Where the first model's leading channel fails, the most first."""
+        return tuple(p for p in self.before.where if p.beyond > 0.0)
+
+    @property
+    def is_noiseless(self) -> bool:
+        """Whether there is no noise floor that errors could be told over."""
+        return self.before.over_noise >= MANY
+
+    @property
+    def steps(self) -> Annotated[tuple[LoopStep, ...], Key()]:
+        """The errors before the first addition and after each."""
+        gains = [g.step.gain for g in self.line if g.step]
+        pairs = [(self.start, gains[0].before, gains[0].noise_floor)]
+        pairs += [(f"+ {', '.join(g.added)}", g.after, g.noise_floor) for g in gains]
+        return tuple(_loop_step(name, pair, floor, gains[0].before if self.is_noiseless else None) for name, pair, floor in pairs)
+
+    def left_by(self, found: Comparison) -> str:
+        """Return in words what one of the two models leaves of the run."""
+        if not self.is_noiseless:
+            return f"error {found.over_noise:.2f} x the noise"
+        leading = next(c for c in found.channels if c.name == self.before.leading.name)
+        return f"{leading.name} fit {leading.fit:.1f} %"
+
+
+def _loop_step(name: str, pair: Pair, floor: Noise, first: Pair | None) -> LoopStep:
+    def side(errors: Errors, of: Errors | None) -> tuple[float, str]:
+        over = errors.over(floor if of is None else Noise(of.angle_rms_rad, of.rate_rms_rad_s))
+        return over, f"{over:.2f} x" if of is None else errors.sized("deg", degrees(1.0))
+
+    fitted, fitted_says = side(pair.train, None if first is None else first.train)
+    unseen, unseen_says = side(pair.validation, None if first is None else first.validation)
+    return LoopStep(name, fitted, unseen, (fitted_says, unseen_says))
+
+
+def loop_of(line: Sequence[Generation], first: Sequence[Comparison], last: Sequence[Comparison]) -> Loop | None:
+    """Return the loop of a line by the comparisons of its first and of its last model with the same runs; None where it has none.
+
+    It is shown on the run that the first model fails most on, of those that the last was not fitted to where there are any.
+    """
+    pairs = [(b, a) for b in first for a in last if a.run == b.run]
+    unseen = [(b, a) for b, a in pairs if b.run not in a.model.runs]
+    if not pairs or not any(g.step for g in line):
+        return None
+    before, after = max(unseen or pairs, key=lambda pair: pair[0].badness)
+    return Loop(before, after, tuple(line))

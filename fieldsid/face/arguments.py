@@ -19,9 +19,8 @@ from fieldsid.vehicle import Vehicle, find_vehicle, load_vehicle
 if TYPE_CHECKING:
     from fieldsid.logs.channels import ChannelMap
     from fieldsid.logs.run import Run
-    from fieldsid.plant.parameter_source import NamedLog
-    from fieldsid.schedule import Schedule
-    from fieldsid.turning import ParameterSource
+    from fieldsid.plant.parameter_source import NamedLog, ParameterSource
+    from fieldsid.schedule.record import Schedule
 
 File: TypeAlias = "str | PathLike[str]"
 OWN_EFFECTS = Path("effects")

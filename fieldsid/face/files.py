@@ -14,10 +14,10 @@ from fieldsid.models.model import Model
 
 if TYPE_CHECKING:
     from fieldsid.diagnosis import Diagnosis
-    from fieldsid.extension import Extension
+    from fieldsid.extension.extend import Extension
     from fieldsid.fitting.fit import Fit
-    from fieldsid.schedule import Schedule
-    from fieldsid.turning import Laws
+    from fieldsid.plant.laws.axis_laws import Laws
+    from fieldsid.schedule.record import Schedule
 
 Kept: TypeAlias = "Run | Model | Fit | Diagnosis | Extension | Laws | Schedule"
 
@@ -33,8 +33,8 @@ def save(record: Kept, path: File, *, inputs: Sequence[File] = (), force: bool =
     Of a fit, a diagnosis and an extension the model is written. inputs: the files it was made from, whose hashes are kept. force:
     replace an existing file. Raises ArtifactError where the file exists or cannot be written, UsageError for another record.
     """
-    from fieldsid.schedule import Schedule, save_schedule
-    from fieldsid.turning import Laws, save_laws
+    from fieldsid.plant.laws.axis_laws import Laws, save_laws
+    from fieldsid.schedule.record import Schedule, save_schedule
 
     place, sources = Path(path), [Path(p) for p in inputs]
     if isinstance(record, Run):

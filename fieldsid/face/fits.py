@@ -14,7 +14,7 @@ from fieldsid.face.several import Several
 if TYPE_CHECKING:
     from fieldsid.comparison.compare import Comparison
     from fieldsid.diagnosis import Diagnosis
-    from fieldsid.extension import Extension
+    from fieldsid.extension.extend import Extension
     from fieldsid.fitting.fit import Fit
     from fieldsid.logs import ChannelMap, Run
     from fieldsid.models.axis import Axis
@@ -121,7 +121,7 @@ def extend(
     validate: runs that no fit sees, to judge by; without them a part of the runs is held back. Raises UsageError for an effect
     that is unknown, of the other axis or in the model already, DataError for runs that cannot be used, and as `load` does.
     """
-    from fieldsid.extension import extend_in_steps, whole_of
+    from fieldsid.extension.extend import extend_in_steps, whole_of
 
     own_effects()
     known = model_of(model)

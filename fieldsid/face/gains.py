@@ -25,9 +25,11 @@ from fieldsid.face.speeds import speeds_of
 
 if TYPE_CHECKING:
     from fieldsid.logs import ChannelMap, Run
+    from fieldsid.plant.laws.axis_laws import Laws
     from fieldsid.plant.parameter_source import ParameterSource
-    from fieldsid.schedule import Schedule, Verification
-    from fieldsid.turning import Laws, TurnPrediction
+    from fieldsid.schedule.record import Schedule
+    from fieldsid.schedule.verify import Verification
+    from fieldsid.turning.prediction import TurnPrediction
     from fieldsid.vehicle import Vehicle
 
 _say = logging.getLogger("fieldsid").info
@@ -65,7 +67,7 @@ def turn_radius(
     the files that the models name; the loss of speed in a turn is identified from them. fin_zero: offsets of the fin (rad) below
     it are not counted. Raises UsageError, ModelError for an unstable model, DataError for a measured run without a circle.
     """
-    from fieldsid.turning import turn_radius as radius_over_speed
+    from fieldsid.turning.radius import turn_radius as radius_over_speed
 
     own_effects()
     source, known = source_of(models, law), vehicle_of(vehicle)
@@ -118,9 +120,10 @@ def design_schedule(
     fin_lag, delay (s): without them the models'. latency (s): the autopilot's own, on top. depth: the loop above pitch.
     Raises UsageError for what cannot be meant, ModelError where no gain holds the loop.
     """
-    from fieldsid.schedule import FinLimits, Wish
-    from fieldsid.schedule import design_schedule as design
+    from fieldsid.schedule.linear_plant import FinLimits
+    from fieldsid.schedule.make import design_schedule as design
     from fieldsid.schedule.make import usual_controller
+    from fieldsid.schedule.wish import Wish
 
     own_effects()
     source, known = source_of(models, law), vehicle_of(vehicle)
@@ -142,8 +145,8 @@ def verify_schedule(schedule: Schedule | File, models: Models | None = None) -> 
 
     models: those to verify on, without them the files it was designed from. Raises ArtifactError where these are not there.
     """
-    from fieldsid.schedule import Schedule, load_schedule
-    from fieldsid.schedule import verify_schedule as verify
+    from fieldsid.schedule.record import Schedule, load_schedule
+    from fieldsid.schedule.verify import verify_schedule as verify
 
     own_effects()
     known = schedule if isinstance(schedule, Schedule) else load_schedule(Path(schedule))

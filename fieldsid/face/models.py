@@ -12,9 +12,10 @@ from fieldsid.models.model import Model, load_model
 
 if TYPE_CHECKING:
     from fieldsid.diagnosis import Diagnosis
-    from fieldsid.extension import Extension
+    from fieldsid.extension.extend import Extension
     from fieldsid.fitting.fit import Fit
-    from fieldsid.turning import Laws, ParameterSource
+    from fieldsid.plant.laws.axis_laws import Laws
+    from fieldsid.plant.parameter_source import ParameterSource
 
 OneModel: TypeAlias = "Model | Fit | Extension | Diagnosis | str | PathLike[str]"
 AnyModel: TypeAlias = "OneModel | Sequence[Model] | Sequence[Fit]"
@@ -35,8 +36,8 @@ def source_of(given: Models, law: str | Sequence[str] = ()) -> ParameterSource:
 
     law: laws of one's own, `NAME=c0[,c1]`, as the option. Raises UsageError, DataError and ArtifactError.
     """
+    from fieldsid.plant.laws.axis_laws import Laws
     from fieldsid.plant.parameter_source import load_parameter_source, source_of_laws, source_of_models
-    from fieldsid.turning import Laws
 
     own = (law,) if isinstance(law, str) else tuple(law)
     items = [given] if isinstance(given, (str, PathLike, Model)) or not isinstance(given, Iterable) else list(given)

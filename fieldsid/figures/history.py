@@ -10,7 +10,8 @@ from textwrap import fill
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fieldsid.extension import Gain, Generation
+from fieldsid.extension.extend import Gain
+from fieldsid.extension.lineage import Generation
 from fieldsid.figures import canvas
 from fieldsid.rounding import MANY
 

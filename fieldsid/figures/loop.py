@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fieldsid.comparison.compare import Comparison
-from fieldsid.extension.loop import Loop
+from fieldsid.extension.lineage import Loop
 from fieldsid.figures import canvas, where
 from fieldsid.figures.history import folded
 from fieldsid.rounding import DEGREES

@@ -8,10 +8,6 @@ from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters, amplit
 from fieldsid.numerics.arrays import FloatArray
 
 
-def _duration(p: Parameters) -> float:
-    return (2.0 * p["width"] + p["pause"]) * p["repeats"] - p["pause"]
-
-
 def _command(p: Parameters, time: FloatArray) -> FloatArray:
     count = round(p["repeats"])
     widths = np.tile([p["width"], p["width"], p["pause"]], count)[:-1]
@@ -28,7 +24,7 @@ MANEUVER = Maneuver(
         Parameter("pause", "s", 0.0, 30.0, 2.0, "fin at trim between two doublets"),
         Parameter("repeats", "", 1, 10, 2, "number of doublets", whole=True),
     ),
-    duration=_duration,
+    duration=lambda p: (2.0 * p["width"] + p["pause"]) * p["repeats"] - p["pause"],
     command=_command,
     source="Klein and Morelli 2006, Aircraft System Identification, chapter 9",
 )

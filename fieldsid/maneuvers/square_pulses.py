@@ -8,10 +8,6 @@ from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters, amplit
 from fieldsid.numerics.arrays import FloatArray
 
 
-def _duration(p: Parameters) -> float:
-    return 4.0 * p["width"] + p["recovery"]
-
-
 def _command(p: Parameters, time: FloatArray) -> FloatArray:
     first, second, width = p["amplitude"], p["second"], p["width"]
     widths = np.array([width, width, p["recovery"], width, width])
@@ -27,7 +23,7 @@ MANEUVER = Maneuver(
         Parameter("width", "s", 0.2, 20.0, 2.0, "length of each pulse"),
         Parameter("recovery", "s", 0.0, 60.0, 13.0, "autopilot between the pairs"),
     ),
-    duration=_duration,
+    duration=lambda p: 4.0 * p["width"] + p["recovery"],
     command=_command,
     source="rapid on-board identification of the STARFISH AUV, section on experiments",
 )

@@ -8,10 +8,6 @@ from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters, amplit
 from fieldsid.numerics.arrays import FloatArray
 
 
-def _duration(p: Parameters) -> float:
-    return 2.0 * p["hold"] * p["steps"]
-
-
 def _command(p: Parameters, time: FloatArray) -> FloatArray:
     count = round(p["steps"])
     lowest = min(p["lowest"], p["amplitude"])
@@ -29,7 +25,7 @@ MANEUVER = Maneuver(
         Parameter("steps", "", 1, 12, 5, "number of pairs", whole=True),
         Parameter("hold", "s", 0.5, 20.0, 2.5, "length of each pulse"),
     ),
-    duration=_duration,
+    duration=lambda p: 2.0 * p["hold"] * p["steps"],
     command=_command,
     source="Isermann and Muenchhof 2011, section 6.3 (amplitude-modulated binary signals)",
 )

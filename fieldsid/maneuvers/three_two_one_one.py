@@ -11,10 +11,6 @@ LENGTHS = np.array([3.0, 2.0, 1.0, 1.0])
 SIDES = np.array([1.0, -1.0, 1.0, -1.0])
 
 
-def _duration(p: Parameters) -> float:
-    return float(LENGTHS.sum() * p["unit"] * p["repeats"])
-
-
 def _command(p: Parameters, time: FloatArray) -> FloatArray:
     count = round(p["repeats"])
     # Every other repeat is mirrored: the pattern leaves a net turn of one unit, two of them leave none.
@@ -30,7 +26,7 @@ MANEUVER = Maneuver(
         Parameter("unit", "s", 0.1, 10.0, 1.0, "length of the shortest pulse"),
         Parameter("repeats", "", 1, 10, 2, "number of patterns, every other one mirrored", whole=True),
     ),
-    duration=_duration,
+    duration=lambda p: float(LENGTHS.sum() * p["unit"] * p["repeats"]),
     command=_command,
     source="Plaetschke and Schulz 1979, AGARD LS-104; Jategaonkar 2006, section 2.3",
 )

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters, amplitude
+from fieldsid.maneuvers._contract import Maneuver, Parameter, amplitude
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 
 
-def _memory(_: Parameters) -> tuple[float, ...]:
-    return (np.inf,)  # the time at which the pull-out began
-
-
 @jit
 def _rule(values: FloatArray, time: float, angle: FloatArray, rate: FloatArray, memory: FloatArray, fin: FloatArray) -> None:
+    """Fill the fins; the memory is the time at which the pull-out began."""
     most, turn, pull_out, mirrored, duration = values[0], values[1], values[2], values[3], values[4]
     limit = turn if time < duration - pull_out else 0.0
     for i in range(fin.shape[0]):
@@ -38,6 +35,6 @@ MANEUVER = Maneuver(
     ),
     duration=lambda p: p["duration"],
     rule=_rule,
-    memory=_memory,
+    memory=lambda _: (np.inf,),
     source="ITTC 7.5-04-02-01, turning circle and pull-out tests",
 )

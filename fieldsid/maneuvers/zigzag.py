@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters, amplitude, side
+from fieldsid.maneuvers._contract import Maneuver, Parameter, amplitude, side
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 
-SIDE, SENSE, LEFT = 0, 1, 2
+SIDE, SENSE, LEFT = range(3)
 """Columns of the memory: side of the fin, which way a positive fin turns (0 not known yet), reversals left."""
-
-
-def _memory(p: Parameters) -> tuple[float, ...]:
-    return (side(p), 0.0, p["reversals"])
 
 
 @jit
@@ -42,6 +38,6 @@ MANEUVER = Maneuver(
     ),
     duration=lambda p: p["duration"],
     rule=_rule,
-    memory=_memory,
+    memory=lambda p: (side(p), 0.0, p["reversals"]),
     source="ITTC 7.5-04-02-01, zig-zag test; IMO MSC.137(76)",
 )

@@ -6,11 +6,11 @@ import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
-
 BoolArray = npt.NDArray[np.bool_]
-
-
 IntArray = npt.NDArray[np.intp]
-
-
 ComplexArray = npt.NDArray[np.complex128]
+
+
+def known(value: float | None) -> float:
+    """Return a number as it was before it was written: NaN is written as nothing."""
+    return float("nan") if value is None else float(value)

@@ -1,8 +1,8 @@
-"""Are series white? The Ljung-Box statistic, pooled over runs, and its chi-square tail."""
+"""Are series white? The Ljung-Box statistic, pooled over runs, and its chi-square tail; and what those are worth that are not."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -30,3 +30,13 @@ def ljung_box_p(series: Iterable[FloatArray]) -> float:
     """Return the p-value of several series being white, their statistics summed; one where all are too short to say."""
     told = [ljung_box(e) for e in series if e.size >= FEWEST_SAMPLES]
     return chi_square_tail(sum(told), LJUNG_BOX_LAGS * len(told)) if told else 1.0
+
+
+MAX_RHO = 0.98
+
+
+def inflation(parts: Sequence[FloatArray]) -> float:
+    """Return how many residuals, in parts of (n,) each, hold one independent one: (1 + rho) / (1 - rho)."""
+    power = sum(float(p @ p) for p in parts)
+    rho = min(max(sum(float(p[1:] @ p[:-1]) for p in parts) / max(power, 1e-30), 0.0), MAX_RHO)
+    return (1.0 + rho) / (1.0 - rho)

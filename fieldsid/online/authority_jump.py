@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import floor, isfinite, log, nan
 from typing import Annotated, Any
 
@@ -34,10 +34,10 @@ LEAST_DRAWS = 20
 """Seconds that the noise of the scores is told from."""
 LEAST_EXCITED, LEAST_MOVED = 1e-6, 0.05
 """Least eigenvalue, scaled to ones, of all columns before and of fin and trim since: a fin that is held tells neither."""
-WIDTH, FIN, ONE = 6, 3, 4
-FREE = (0, FIN, ONE)
+COLUMNS = RATE, _, _, FIN, ONE, _ = tuple(range(6))
+FREE = (RATE, FIN, ONE)
 """Columns: rate, rate with its size, angle, fin, one, target; rate, fin and one are free after a jump."""
-_UPPER = np.triu_indices(WIDTH)
+_UPPER = np.triu_indices(len(COLUMNS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +53,8 @@ class Jump:
 class _Sums:
     """Products of rows [phi, target] (5, 5) over a while from `begin` s on, and how many they are."""
 
-    begin: float
-    products: FloatArray
+    begin: float = nan
+    products: FloatArray = field(default_factory=lambda: np.zeros((len(COLUMNS), len(COLUMNS))))
     count: float = 0.0
 
 
@@ -66,7 +66,7 @@ class AuthorityJump:
     def __init__(self, *, stiff: bool) -> None:
         self._keep = np.array([0, 1, 2, FIN, ONE] if stiff else [0, 1, FIN, ONE])
         self._free = np.flatnonzero(np.isin(self._keep, FREE))
-        self._before = _Sums(nan, np.zeros((WIDTH, WIDTH)))
+        self._before = _Sums()
         self._seconds: deque[_Sums] = deque()
         self._rows: list[tuple[float, ...]] = []
         self._noise, self._usual, self._speed = nan, nan, nan
@@ -76,7 +76,7 @@ class AuthorityJump:
         found = None
         if not self._seconds or floor(time) != floor(self._seconds[-1].begin):
             found = self._close(time)
-            self._seconds.append(_Sums(time, np.zeros((WIDTH, WIDTH))))
+            self._seconds.append(_Sums(time))
         self._speed = speed if isfinite(speed) and speed > 0.0 else self._speed
         self._usual = self._usual if isfinite(self._usual) else self._speed
         faster = self._speed / self._usual if isfinite(self._speed) else 1.0
@@ -101,11 +101,13 @@ class AuthorityJump:
         self._sum_up()
         seconds = self._seconds
         while seconds and (len(seconds) >= KEPT_S or time < seconds[-1].begin):
-            self._put_before(seconds.popleft())
+            gone = seconds.popleft()
+            self._before.products += gone.products
+            self._before.count += gone.count
         found = self._found()
         if found is not None:
             kept = [s for s in seconds if s.begin >= found.time]
-            self._before, self._seconds, self._noise = _Sums(nan, np.zeros((WIDTH, WIDTH))), deque(kept), nan
+            self._before, self._seconds, self._noise = _Sums(), deque(kept), nan
         return found
 
     def _sum_up(self) -> None:
@@ -115,10 +117,6 @@ class AuthorityJump:
             self._seconds[-1].products += rows.T @ rows
             self._seconds[-1].count += len(rows)
             self._rows.clear()
-
-    def _put_before(self, one: _Sums) -> None:
-        self._before.products += one.products
-        self._before.count += one.count
 
     def _found(self) -> Jump | None:
         """Return the jump at the place that explains all rows best, once it lies LEAST_S back.
@@ -203,6 +201,6 @@ def _plain(sums: _Sums) -> list[Any]:
 
 def _sums(saved: Sequence[Any]) -> _Sums:
     begin, count, upper = saved
-    products = np.zeros((WIDTH, WIDTH))
-    products[_UPPER] = np.array(upper, dtype=np.float64)
-    return _Sums(nan if begin is None else float(begin), products + np.triu(products, 1).T, float(count))
+    made = _Sums(nan if begin is None else float(begin), count=float(count))
+    made.products[_UPPER] = made.products.T[_UPPER] = np.array(upper, dtype=np.float64)
+    return made

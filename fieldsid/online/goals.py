@@ -8,7 +8,7 @@ from fieldsid.errors import DataError, UsageError
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.online.progress import Goal, default_goals
 from fieldsid.planning.design.plan import Plan
-from fieldsid.planning.specify.accuracy_goals import parse_accuracy_goals
+from fieldsid.planning.specify.quantities import parse_accuracy_goals
 
 
 def asked_goals(axis: Axis, text: str) -> dict[str, Goal]:

@@ -20,7 +20,7 @@ import numpy as np
 
 from fieldsid.errors import DataError
 from fieldsid.fitting.regression.bias_compensation import inverse_of_normal, noise_share
-from fieldsid.fitting.regression.recursive_ls import INITIAL_VARIANCE, MAX_VARIANCE_SHARE, WEIGHT, corrected, noise_of
+from fieldsid.fitting.regression.recursive_ls import INITIAL_VARIANCE, MAX_VARIANCE_SHARE, WEIGHT, H, corrected, noise_of
 from fieldsid.logs.doctor.angle_and_rate import contradiction
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import NAMES, Axis
@@ -30,12 +30,13 @@ from fieldsid.numerics.white_noise import white_noise_std
 from fieldsid.online.authority_jump import AuthorityJump, Jump
 from fieldsid.online.estimate import OnlineEstimate
 from fieldsid.online.progress import LOOK_BACK_S, Progress
-from fieldsid.online.sample_filter import SampleFilter, present_step
+from fieldsid.online.sample_filter import SampleFilter
 
 if TYPE_CHECKING:
     from fieldsid.schedule.search.of_one_model import GainsOfOne, Wanted
 
-NOISE_WINDOW, NOISE_EVERY = 1024, 256
+NOISE_WINDOW = 1024
+NOISE_EVERY = NOISE_WINDOW // 4
 """Samples that the sensors' noise is learnt from, and samples between two looks."""
 WAIT_FOR_RATE_S = 1.0
 """Time after which a vehicle that has sent no rate has none."""
@@ -299,7 +300,7 @@ class OnlineIdentifier:
 
     def _noise_share(self) -> Any:
         fed = self._filter
-        step = present_step(fed.memory) if fed is not None else 0.0
+        step = float(fed.memory[H]) if fed is not None else 0.0  # zero before there is one
         if step <= 0.0 or self._seen < NOISE_EVERY:
             return None
         return noise_share(1 if self._by_rate else 2, self._settings["bandwidth"], step, *self._noise)

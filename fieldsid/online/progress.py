@@ -13,6 +13,7 @@ from math import inf, isfinite, nan, sqrt
 from typing import Annotated, Any, Literal
 
 from fieldsid.models.axis import NAMES, Axis
+from fieldsid.numerics.arrays import known
 from fieldsid.online.estimate import OnlineEstimate
 from fieldsid.records.keys import Key, Number
 
@@ -112,7 +113,7 @@ class RecentExcitation:
 
     def recall(self, state: Mapping[str, Any]) -> None:
         """Take up what another had remembered."""
-        self._time = _number(state["time"])
+        self._time = known(state["time"])
         self._weights, self._means, self._squares = (list(map(float, state[k])) for k in ("weights", "means", "squares"))
 
     def rms(self) -> tuple[float, float]:
@@ -159,11 +160,11 @@ class Watch:
         self._looks = [
             OnlineEstimate(
                 axis,
-                _number(e["time"]),
+                known(e["time"]),
                 _numbers(e["values"]),
                 _numbers(e["std_errors"]),
                 int(e["used"]),
-                _number(e["speed"]),
+                known(e["speed"]),
                 {},
             )
             for e in state["looks"]
@@ -220,10 +221,5 @@ class Watch:
         return "not_excited" if isfinite(fin) and fin < QUIET_FIN_RAD else "collecting"
 
 
-def _number(value: float | None) -> float:
-    """Return a number as it was before it was written: NaN is written as nothing."""
-    return nan if value is None else float(value)
-
-
 def _numbers(values: Mapping[str, float | None]) -> dict[str, float]:
-    return {name: _number(v) for name, v in values.items()}
+    return {name: known(v) for name, v in values.items()}

@@ -27,11 +27,9 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.online.samples import LONGEST_LINE, MessageReader, Sample, samples_of
 
 TICK_S = 0.2
-POLL_S = 0.5
 READING_SHARE = 0.25
 """Share of the time that reading a log that grows may take: it is read again as a whole, less often the longer that takes."""
 LOCALHOST = "127.0.0.1"
-LARGEST_DATAGRAM = 65536
 WAITING_LINES = 10_000
 PIECE_BYTES = 1 << 18
 
@@ -57,13 +55,13 @@ def followed(
     The newest row waits for the one behind it, for it may be half written. Raises MappingError and LogError as reading does;
     a log that holds nothing yet is waited for.
     """
-    seen, grown, pause = (-1, -1), clock.monotonic(), POLL_S
+    seen, grown, pause = (-1, -1), clock.monotonic(), TICK_S
     while clock.monotonic() - grown < idle_s:
         size = _size(path)
         if size != seen:
             begin = clock.monotonic()
             run = _so_far(path, mapping)
-            pause = max(POLL_S, (clock.monotonic() - begin) / READING_SHARE)
+            pause = max(TICK_S, (clock.monotonic() - begin) / READING_SHARE)
             seen = size
             if run is not None:
                 for sample in samples_of(run.between(-inf, _complete(run, axis)), axis, after):
@@ -131,7 +129,7 @@ def datagrams(port: int, reader: MessageReader, *, idle_s: float = inf) -> Itera
         heard = clock.monotonic()
         while clock.monotonic() - heard < idle_s:
             try:
-                data = door.recv(LARGEST_DATAGRAM)
+                data = door.recv(PIECE_BYTES)
             except TimeoutError:
                 yield None
                 continue

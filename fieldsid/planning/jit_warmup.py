@@ -8,18 +8,17 @@ from fieldsid.dynamics.linear_kernel import linear_sensitivities
 from fieldsid.maneuvers import Autopilot, Limits, Schedule, all_maneuvers, fly
 from fieldsid.models.hull import CONSTANTS, DRIVES
 from fieldsid.noise.kalman.univariate import three_states
-from fieldsid.planning.flight.closed_loop import closed_loop
-from fieldsid.planning.flight.rule_flight import OperatingPointPlant
+from fieldsid.planning.flight.rule_flight import OperatingPointPlant, closed_loop
 
 SHARED_KERNELS = (linear_sensitivities, three_states)
 """What planning calls of what every fit needs."""
-SCENES, SAMPLES = 2, 3
-"""More than one of each, so that what is handed over lies in memory as it does when planning."""
 
 
 def compile_planning() -> None:
     """Call once, on vehicles that do not move, what planning calls thousands of times."""
-    m, n, steps, zero = SCENES, SAMPLES, np.full(SAMPLES - 1, 0.05), np.zeros
+    # more than one of each, so that what is handed over lies in memory as it does when planning
+    m, n, zero = 2, 3, np.zeros
+    steps = np.full(n - 1, 0.05)
     drive, c = zero((m, n - 1, len(DRIVES))), zero((m, len(CONSTANTS)))
     push, off = zero((m, n - 1, 2)), zero((m, n - 1, 2))
     closed_loop(steps, drive[0].copy(), c[0], 1, zero(n), off[0], push[0], zero(3), zero(4), zero(n), zero((n, 3)))

@@ -14,8 +14,7 @@ from fieldsid.errors import UsageError
 from fieldsid.maneuvers import RATE_HZ
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
-from fieldsid.planning.belief.prior_file import load_believed
-from fieldsid.planning.belief.prior_model import checked_prior, named_prior
+from fieldsid.planning.belief.prior_model import checked_prior, load_believed, named_prior
 from fieldsid.planning.design.best_leg import RUN_UP_S
 from fieldsid.planning.design.plan import WINDOW, Plan, Request, make_plan
 from fieldsid.planning.discriminate.discriminate import LONGEST_WINDOW_S, Separation
@@ -23,8 +22,7 @@ from fieldsid.planning.discriminate.rivals import rivals_from, rivals_named
 from fieldsid.planning.discriminate.separating_plan import separating_plan
 from fieldsid.planning.flight.excitation import Window
 from fieldsid.planning.safety.envelope import ACCEPTED_SHARE, LARGEST_FIN, Envelope
-from fieldsid.planning.specify.accuracy_goals import parse_accuracy_goals
-from fieldsid.planning.specify.quantities import parse_area, parse_band, parse_speeds
+from fieldsid.planning.specify.quantities import parse_accuracy_goals, parse_area, parse_band, parse_speeds
 from fieldsid.vehicle import Vehicle, find_vehicle, load_vehicle
 
 FIN_MAX = 0.26
@@ -158,8 +156,8 @@ def envelope_of(axis: Axis, limiting: EnvelopeLimits, vehicle: Vehicle | None) -
 
     `none` takes the default of heading or pitch away.
     """
-    area = parse_area(limiting.area) or (None, None)
-    band = parse_band(limiting.depth_band) or (None, None)
+    area = parse_area(limiting.area)
+    band = parse_band(limiting.depth_band)
     own = None if vehicle is None else vehicle.fin_max_rad(axis.value)
     fin = None if limiting.fin is None else angles.parse_angle(limiting.fin, "--fin-max", angles.FIN, LARGEST_FIN)
     if fin is not None and own is not None and fin > own:

@@ -52,7 +52,9 @@ def of_known_sign(axis: Axis, models: Sequence[Model], points: Sequence[Sequence
     """
     name = NAMES[axis].authority
     everywhere = [p for of_model in points for p in of_model if name in p.values]
-    known = {float(np.sign(p.values[name])) for p in everywhere if _sign_is_known(p, name)} or _sign_of_runs(models)
+    known = {
+        float(np.sign(p.values[name])) for p in everywhere if abs(p.values[name]) >= SIGN_STD_ERRORS * p.std_errors.get(name, 0.0)
+    } or _sign_of_runs(models)
     if len(known) != 1:
         return list(range(len(points)))
     (sign,) = known
@@ -65,10 +67,6 @@ def _sign_of_runs(models: Sequence[Model]) -> set[float]:
     told = [t for m in models if np.isfinite(t := m.trained.get("fin_t", float("nan")))]
     together = float(np.sum(told) / np.sqrt(len(told))) if told else 0.0
     return {float(np.sign(together))} if abs(together) >= SIGN_STD_ERRORS else set()
-
-
-def _sign_is_known(point: Point, name: str) -> bool:
-    return abs(point.values[name]) >= SIGN_STD_ERRORS * point.std_errors.get(name, 0.0)
 
 
 def distinct_speeds(speeds: FloatArray) -> int:

@@ -8,11 +8,11 @@ from shlex import quote
 
 from fieldsid.angles import FIN
 from fieldsid.dynamics.free_run import LIMITING_EFFECT
+from fieldsid.errors import UsageError
 from fieldsid.models.axis import NAMES
 from fieldsid.plant.parameter_source import ParameterSource, logs_of
+from fieldsid.records.check import LARGEST_FIN_RAD
 from fieldsid.records.named_inputs import inputs_of
-
-USUAL_FIN_DEG = 15.0
 
 
 def wider_fin(option: str, needed: float, source: ParameterSource) -> str:
@@ -35,9 +35,14 @@ def wider_fin(option: str, needed: float, source: ParameterSource) -> str:
     )
 
 
-def in_radians(option: str, given: float) -> str:
-    """Return the hint for an angle in rad that no fin can have."""
-    return f"{given:.4g} rad is {degrees(given):.4g} deg; write it like `{option} {USUAL_FIN_DEG:g}deg`"
+def refuse_no_fin(what: str, given: float) -> None:
+    """Raise UsageError for an angle in rad that no fin can have."""
+    if not 0.0 < given <= LARGEST_FIN_RAD:
+        raise UsageError(
+            f"{what} lies above 0 and at most at 90 deg",
+            found=f"--fin-max {given:g}",
+            hint=f"{given:.4g} rad is {degrees(given):.4g} deg; write it like `--fin-max 15deg`",
+        )
 
 
 def damping_that_holds(source: ParameterSource, speed: float, effects: Collection[str] = ()) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from fieldsid.comparison.compare import Comparison
 from fieldsid.comparison.localize import Place
-from fieldsid.extension import Loop
+from fieldsid.extension.lineage import Loop
 from fieldsid.models.axis import NAMES
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.reporting.chart import Band, Panel, Series, bars, chart, legend, thinned

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from fieldsid.comparison.compare import Comparison, compare_one
 from fieldsid.display import Brief
 from fieldsid.errors import FieldsidError, UsageError
-from fieldsid.extension import Generation, Loop, history_of, loop_of
+from fieldsid.extension.lineage import Generation, Loop, history_of, loop_of
 from fieldsid.logs import Run, load_run
 from fieldsid.logs.segments import may_show
 from fieldsid.models.model import Model, load_model

@@ -11,7 +11,7 @@ from fieldsid._version import __version__
 from fieldsid.comparison.compare import Channel, Comparison, left_in_words
 from fieldsid.comparison.sufficient import is_noise, pooled
 from fieldsid.display import page_of, view_of
-from fieldsid.extension import Loop
+from fieldsid.extension.lineage import Loop
 from fieldsid.logs import Run
 from fieldsid.page import Block, counted
 from fieldsid.reporting import figures
@@ -23,7 +23,7 @@ from fieldsid.trial_folder.journal import Entry
 from fieldsid.trial_folder.next_step import REPORT, verification_of
 from fieldsid.trial_folder.patterns import shortened
 from fieldsid.trial_folder.state import FolderState, Item
-from fieldsid.turning.known_radius import turn_words
+from fieldsid.turning.prediction import turn_words
 from fieldsid.views._candidates import candidates
 from fieldsid.views._words import merit_blocks, parameter_block
 from fieldsid.views.schedule import blocks_of

@@ -13,7 +13,7 @@ from fieldsid.comparison.localize import Place, Stretch
 from fieldsid.comparison.metrics import Metrics
 from fieldsid.comparison.residuals import Companion
 from fieldsid.diagnosis.records import Errors
-from fieldsid.extension.loop import Loop
+from fieldsid.extension.lineage import Loop
 from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis

@@ -66,7 +66,7 @@ class Worker:
     def __exit__(self, error: object, *_more: object) -> None:
         if error is None and not self._has_died:
             self._stream.close()
-            wait_later(self.process)
+            _ending.append(self.process)
         else:
             self.kill()
 
@@ -119,11 +119,6 @@ def fork() -> int | None:
     if process == 0:
         _enter_worker(parent)
     return process
-
-
-def wait_later(process: int) -> None:
-    """Have the end of a worker that ends waited for when the next one is forked."""
-    _ending.append(process)
 
 
 def _enter_worker(parent: int) -> None:

@@ -1,18 +1,5 @@
-"""Gains per speed: `design_schedule` and `verify_schedule` are `sysid schedule design` and `verify`."""
+"""Gains per speed: designed, verified, flown. A copy of the node of `templates/ros2` takes `load_schedule` from here."""
 
-from fieldsid.schedule.linear_plant import FinLimits
-from fieldsid.schedule.make import design_schedule
-from fieldsid.schedule.record import Schedule, load_schedule, save_schedule
-from fieldsid.schedule.verify import Verification, verify_schedule
-from fieldsid.schedule.wish import Wish
+from fieldsid.schedule.record import load_schedule
 
-__all__ = [
-    "FinLimits",
-    "Schedule",
-    "Verification",
-    "Wish",
-    "design_schedule",
-    "load_schedule",
-    "save_schedule",
-    "verify_schedule",
-]
+__all__ = ["load_schedule"]

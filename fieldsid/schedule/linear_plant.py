@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fieldsid.dynamics.free_run import effects_of
 from fieldsid.dynamics.steady_kernel import straight_slopes
@@ -69,12 +68,8 @@ class LinearPlant:
 
     def one(self, index: int = 0) -> LinearPlant:
         """Return one draw alone."""
-        return self.pick(np.array([index]))
-
-    def pick(self, index: npt.NDArray[np.int_]) -> LinearPlant:
-        """Return some draws."""
-        parts: dict[str, Any] = {n: getattr(self, n)[index] for n in PARTS}
-        return replace(self, **parts, hull=None if self.hull is None else self.hull[index])
+        parts: dict[str, Any] = {n: getattr(self, n)[[index]] for n in PARTS}
+        return replace(self, **parts, hull=None if self.hull is None else self.hull[[index]])
 
     def joined(self, other: LinearPlant) -> LinearPlant:
         """Return the draws of both."""

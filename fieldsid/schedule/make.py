@@ -13,8 +13,7 @@ from fieldsid.logs.run import Note, Run
 from fieldsid.models.allocation import PlaneFins
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.plant.parameter_source import ParameterSource
-from fieldsid.plant.remedies import in_radians, wider_fin
-from fieldsid.records.check import LARGEST_FIN_RAD
+from fieldsid.plant.remedies import refuse_no_fin, wider_fin
 from fieldsid.records.keys import body_of
 from fieldsid.records.named_inputs import sha256_of
 from fieldsid.schedule.linear_plant import FinLimits, not_counted, plants_at
@@ -56,9 +55,7 @@ def design_schedule(
     knots = _knots(source, speeds)
     if depth and source.axis is not Axis.PITCH:
         raise UsageError("depth is held through pitch", found="axis: yaw", hint="give the pitch models")
-    if not 0.0 < fin_limit <= LARGEST_FIN_RAD:
-        hint = in_radians("--fin-max", fin_limit)
-        raise UsageError("a fin's limit lies above 0 and at most at 90 deg", found=f"--fin-max {fin_limit:g}", hint=hint)
+    refuse_no_fin("a fin's limit", fin_limit)
     if fins is not None and not fins.follows(fin_limit):
         raise UsageError(
             "the fin's limit is more than the fins reach",

@@ -10,15 +10,77 @@ import numpy as np
 from fieldsid.errors import ModelError
 from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import Axis
+from fieldsid.models.hull import QUADRATIC, STRIP_MOMENT, Core
 from fieldsid.models.model import Noise
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.records.keys import body_of
-from fieldsid.schedule.believed_plant import LAG, RATE, believed_plant
-from fieldsid.schedule.flown.speed_kept import slowing, speed_kept_said
 from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, between, family_at, plants_at
 from fieldsid.turning.maneuvering.belief import Belief, believe, fitted_to, like_no_vehicle, not_fitted
-from fieldsid.turning.maneuvering.equations import coefficients
-from fieldsid.turning.steady.speed_loss import SurgeModel, fit_surge
+from fieldsid.turning.maneuvering.equations import NAMES, about_straight, coefficients
+from fieldsid.turning.steady.speed_loss import TYPICAL_LOSS, SurgeModel, draw_speed_loss, fit_surge
+
+LAG, RATE = NAMES.index("lag"), NAMES.index("rate_limit")
+
+
+def believed_plant(belief: Belief, near: LinearPlant, limits: FinLimits, draws: int) -> LinearPlant:
+    """Return a belief's plant at the speed of `near`, the plant of the models there: `draws` of it, the likeliest first.
+
+    Which way the fin turns, its trim and its delay are the models': a trim is the speed's own, and a delay is one of the path
+    that the belief has been given. Lag and rate are the belief's, unless they are stated.
+    """
+    drawn = belief.posterior.vectors
+    taken = drawn[np.linspace(0, drawn.shape[0] - 1, draws - 1).round().astype(int)] if draws > 1 else drawn[:0]
+    hull = np.array([coefficients(v) for v in (belief.fitted.vector, *taken)])
+    which = np.arange(draws) % near.count
+    zero = np.zeros(draws)
+    way = -float(np.sign(near.authority[0]))  # as the runs were read: what a model's sway makes of it in the end may differ
+    (sway, sway_by_rate, sway_by_fin), (by_sway, by_rate, by_fin) = about_straight(hull, near.speed).transpose(1, 2, 0)
+    # the cross state is the moment that sway makes
+    states = zip(-sway, -by_sway * sway_by_rate, way * by_sway * sway_by_fin, strict=True)
+    core = np.array([Core(cross_damping=c, cross_rate=r, cross_fin=f) for c, r, f in states])
+    return LinearPlant(
+        axis=Axis.YAW,
+        speed=near.speed,
+        damping=-by_rate,
+        stiffness=zero,
+        authority=way * by_fin,
+        offset=near.offset[which],
+        core=core,
+        lag=hull[:, LAG] if limits.lag is None else zero + limits.lag,
+        delay=near.delay[which],
+        fin_rate=hull[:, RATE] if limits.rate is None else zero + limits.rate,
+        powers=np.zeros((draws, near.powers.shape[1])),
+        speed_loss=np.zeros((draws, near.speed_loss.shape[1])),
+        hull=hull,
+    )
+
+
+def slowing(plant: LinearPlant, surge: SurgeModel | None, fin_limit: float, seed: int) -> LinearPlant:
+    """Return a yaw plant that loses speed in its turns, a draw of the loss for each of its own; a pitch plant as it is."""
+    if plant.axis is not Axis.YAW:
+        return plant
+    curvature = abs(_full_rate(plant.one(), fin_limit)) / plant.speed
+    loss = draw_speed_loss(surge, max(curvature, 1e-3), plant.count, np.random.default_rng(seed))
+    return replace(plant, speed_loss=np.column_stack([loss.drag, loss.fin, loss.turn]))
+
+
+def _full_rate(one: LinearPlant, fin_limit: float) -> float:
+    """Return the steady rate (rad/s) of a fin at its limit, r of a r + q r^2 = |b| delta; one that nothing holds by q alone."""
+    a, q = float(one.slow_damping[0]), float(one.core[0, QUADRATIC] + one.core[0, STRIP_MOMENT])
+    push = abs(float(one.slow_authority[0])) * fin_limit
+    if q > 0.0:
+        return float((-a + np.sqrt(a * a + 4.0 * q * push)) / (2.0 * q))
+    return push / max(a, 0.05)
+
+
+def speed_kept_said(axis: Axis, surge: SurgeModel | None) -> str:
+    """Return where the loss of speed comes from, in words."""
+    if axis is not Axis.YAW:
+        return "speed held"
+    if surge is not None and surge.surge_measured:
+        return "speed lost in the turn as measured in the runs"
+    return f"no run to measure the speed lost in the turn: {100 * TYPICAL_LOSS:.0f} % assumed at full fin"
+
 
 BELIEVED = "speed lost in the turn, sway and drag as all runs together have them"
 

@@ -11,9 +11,9 @@ from fieldsid.runtime.parallel_map import parallel_map
 from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.plants import Plants
 from fieldsid.schedule.record import Row
-from fieldsid.schedule.search.best_constant import best_constant, improved, multiples_of
 from fieldsid.schedule.search.design import Sought, answering, quickest, row_of, with_bandwidth
 from fieldsid.schedule.search.objective import BETTER_SHARE, Place, demand_of
+from fieldsid.schedule.search.optimum import best_constant, improved, multiples_of
 from fieldsid.schedule.wish import QUICKEST, Wish
 
 DESIGN_DRAWS = 24

@@ -11,9 +11,9 @@ from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.records.keys import Key, Number
 from fieldsid.rounding import beside, number
 from fieldsid.schedule.check import READ_OFF, Check, StepCheck
+from fieldsid.schedule.controller import HELD_SHARE
 from fieldsid.schedule.flown.response import steady_error, swing
 from fieldsid.schedule.linear_plant import not_counted
-from fieldsid.schedule.margins import HELD_SHARE
 from fieldsid.schedule.record import Schedule
 from fieldsid.schedule.verify import AT_REST_SHARE, DEPTH_STEP_M, Verification, steps_of
 

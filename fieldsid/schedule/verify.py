@@ -15,30 +15,32 @@ from fieldsid.models.model import Noise
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.runtime.parallel_map import parallel_map
 from fieldsid.schedule.check import READ_OFF, Check, StepCheck
-from fieldsid.schedule.flown.pace import LONGER, Pace, pace_of
+from fieldsid.schedule.controller import HELD_SHARE, margins, worst_of
 from fieldsid.schedule.flown.response import (
     FLIGHT_ERROR_SHARE,
     LIMIT_CYCLE_SHARE,
+    LONGER,
     SETTLING_BAND,
+    Flight,
+    Pace,
     Steps,
     about_rest,
-    depth_response,
+    disturbance_moment,
+    fly,
     overshoot,
+    pace_of,
     settling,
     steady_error,
-    step_response,
     swing,
     tightest,
 )
-from fieldsid.schedule.flown.straight_leg import straight_leg
 from fieldsid.schedule.linear_plant import PARTS, LinearPlant
-from fieldsid.schedule.margins import HELD_SHARE, margins, worst_of
 from fieldsid.schedule.plants import Plants, models_plants, plants_of
 from fieldsid.schedule.record import Row, Schedule
 from fieldsid.schedule.rows import DESIGN_DRAWS, place_of
 from fieldsid.schedule.rows import SEED as DESIGN_SEED
-from fieldsid.schedule.search.best_constant import best_constant, multiples_of
 from fieldsid.schedule.search.objective import Place
+from fieldsid.schedule.search.optimum import best_constant, multiples_of
 from fieldsid.schedule.wish import STEP_ANGLE_RAD
 from fieldsid.turning.model_error import MIN_COVERED_SHARE
 
@@ -53,7 +55,7 @@ FIN_OFFSET_RAD = 0.05235987755982988
 """3 deg: the fin offset a schedule is tried with."""
 AT_REST_SHARE = 0.5 * LIMIT_CYCLE_SHARE
 DEPTH_STEP_M = 2.0
-PITCH_LIMIT_RAD = 0.3490658503988659
+PITCH_LIMIT_RAD = STEPS_RAD[Axis.PITCH][-1]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -117,12 +119,6 @@ class Verification(Plotted):
         """Return the schedule's check where one of these numbers is worst."""
         sign, read = READ_OFF[name]
         return min(self.scheduled, key=lambda c: sign * read(c))
-
-    @property
-    def slowest(self) -> tuple[float, float]:
-        """The longest settling of the standard step over speeds and 95 % of the draws, s: schedule and constant gain."""
-        own, other = (max(c.settling_most for c in part) for part in (self.scheduled, self.constant))
-        return own, other
 
 
 def verify_schedule(
@@ -235,12 +231,10 @@ def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) ->
     flights = [_flown_to_rest(plant, rows, size, pace) for size in sizes]
     small, usual, large = (_step(s, size) for s, size in zip(flights, sizes, strict=True))
     large = _with_what_is_known(large, flights[2], plant, flight.seen)
-    known = [_trimmed(r, -FIN_OFFSET_RAD) for r in rows]
+    known = [replace(r, feed_forward=r.feed_forward - FIN_OFFSET_RAD) for r in rows]
     one = plant.one()
-    bent, unknown = (
-        step_response(one, r, reference=0.0, seconds=pace.flight, offset=FIN_OFFSET_RAD, step_s=pace.step) for r in (known, rows)
-    )
-    leg = straight_leg(one, rows, flight.noise, pace)
+    bent, unknown = (fly(one, r, Flight(pace.flight, pace.step, offset=FIN_OFFSET_RAD)) for r in (known, rows))
+    leg = fly(one, rows, Flight(pace.leg, pace.step, push=disturbance_moment(flight.noise, pace)))
     depth_over, depth_settled = _depth(one, rows, pace) if schedule.depth else (float("nan"), float("nan"))
     check = Check(
         row.speed, flight.knot, row.supported, constant, phase, gain, delay, least_phase, least_gain, least_delay,
@@ -253,10 +247,10 @@ def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) ->
     return check, (flights[0].one(), flights[1].one(), flights[2].one()), leg
 
 
-def _flown_to_rest(plant: LinearPlant, rows: Sequence[Row] | Row, size: float, pace: Pace) -> Steps:
+def _flown_to_rest(plant: LinearPlant, rows: Sequence[Row], size: float, pace: Pace) -> Steps:
     """Return a step flown longer where it has not come to rest where it should: what is slow does then, what hunts goes on."""
     for times in LONGER:
-        flight = step_response(plant, rows, reference=size, seconds=times * pace.flight, step_s=pace.step)
+        flight = fly(plant, rows, Flight(times * pace.flight, pace.step, reference=size))
         there = np.isfinite(settling(flight.time, flight.angle[:, :1], size)[0])
         if there and worst_of(swing(flight.angle, size), most=True) <= AT_REST_SHARE:
             break
@@ -296,11 +290,7 @@ def _with_what_is_known(step: StepCheck, flown: Steps, plant: LinearPlant, seen:
     )
 
 
-def _trimmed(row: Row, fin: float) -> Row:
-    return replace(row, feed_forward=row.feed_forward + fin)
-
-
 def _depth(one: LinearPlant, rows: Sequence[Row], pace: Pace) -> tuple[float, float]:
-    steps = depth_response(one, rows, step=DEPTH_STEP_M, seconds=pace.leg, pitch_limit=PITCH_LIMIT_RAD, step_s=pace.step)
+    steps = fly(one, rows, Flight(pace.leg, pace.step, depth=DEPTH_STEP_M, pitch_limit=PITCH_LIMIT_RAD))
     settled = settling(steps.time, steps.depth, DEPTH_STEP_M)
     return float(overshoot(steps.depth, DEPTH_STEP_M)[0]), float(settled[0])

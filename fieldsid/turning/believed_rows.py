@@ -8,12 +8,11 @@ import numpy as np
 
 from fieldsid.errors import ModelError
 from fieldsid.plant.parameter_source import ParameterSource
-from fieldsid.turning.known_radius import MAX_KNOWN_WIDTH, is_band_only
 from fieldsid.turning.maneuvering.belief import Belief, BelievedTurn
 from fieldsid.turning.model_error import MIN_COVERED_SHARE
-from fieldsid.turning.prediction import SIDES, TurnRow, settling_flight
-from fieldsid.turning.steady.blended_turns import blended_radius
+from fieldsid.turning.prediction import MAX_KNOWN_WIDTH, SIDES, TurnRow, is_band_only, predicted_row
 from fieldsid.turning.steady.speed_loss import SurgeModel
+from fieldsid.turning.steady.steady_turn import blended_radius
 
 LEAST_EFFECTIVE = 10.0
 """Independent draws: with fewer the median is off by more than 0.4 of the spread, and the spread itself by more than a fifth."""
@@ -46,30 +45,23 @@ def _believed_row(
             hint="fly a turning circle there, and give it with `--measured`",
         )
     because = _missing(turn, flown=source.supports(speed), usual=belief.fitted.is_usual)
-    after = turn.transient
-    time = float(after.time_180[0])
+    time = float(turn.transient.time_180[0])
     low, high = turn.interval95
-    return TurnRow(
-        speed=speed,
-        side=side,
+    return predicted_row(
+        speed,
+        side,
+        rudder,
+        because,
         radius=turn.radius,
         interval95=turn.interval95,
         steady_radius=turn.radius,
-        u_turn_radius=float(after.path_180[0] / np.pi),
         u_turn_time=time,
         yaw_rate_max=turn.rate,
         method="maneuvering",
-        trust="extrapolated" if because else "identified",
-        because=because,
-        settle_with=settling_flight(because, side, speed, rudder),
         turn_speed=turn.path_speed,
         u_turn_time95=(time * low / turn.radius, time * high / turn.radius),
-        advance=float(after.advance[0]),
-        transfer=float(after.transfer[0]),
-        tactical_diameter=float(after.tactical_diameter[0]),
-        predicted=turn.radius,
-        predicted95=turn.interval95,
         of_model=of_model,
+        **turn.transient.of(0),
     )
 
 

@@ -52,11 +52,10 @@ def compared_with(
     turn: MeasuredTurn, rows_at: Callable[[Sequence[float], float], list[TurnRow]], least: Callable[[float], float]
 ) -> MeasuredRow:
     """Return a measured turn with its prediction; there is none where its fin is below the least one predicted at its speed."""
-    speed = turn.entry_speed if np.isfinite(turn.entry_speed) else turn.path_speed
-    if not (np.isfinite(turn.fin) and abs(turn.fin) > max(LEAST_HELD_FIN_RAD, least(speed))):
+    if not (np.isfinite(turn.fin) and abs(turn.fin) > max(LEAST_HELD_FIN_RAD, least(turn.flown_at))):
         nan = float("nan")
         return MeasuredRow(turn, nan, (nan, nan))
-    row = next(r for r in rows_at([speed], abs(turn.fin)) if r.side == turn.side)
+    row = next(r for r in rows_at([turn.flown_at], abs(turn.fin)) if r.side == turn.side)
     return MeasuredRow(turn, row.radius, row.interval95)
 
 

@@ -37,6 +37,10 @@ class ModelError:
     mean: float
     sd: float
 
+    def factors(self, count: int, seed: int) -> FloatArray:
+        """Return draws (count,) of true over predicted."""
+        return np.exp(self.mean + self.sd * np.random.default_rng(seed).standard_normal(count))
+
 
 @dataclass(frozen=True, slots=True)
 class DataCoverage:
@@ -94,8 +98,3 @@ def model_error(effects: tuple[str, ...], reach: DataCoverage, *, formula: bool)
 
 def _share(value: float, *, unknown: float) -> float:
     return float(np.clip(value, 0.0, 1.0)) if np.isfinite(value) else unknown
-
-
-def model_error_draws(error: ModelError, count: int, rng: np.random.Generator) -> FloatArray:
-    """Return draws (count,) of log(true / predicted)."""
-    return np.asarray(error.mean + error.sd * rng.standard_normal(count))

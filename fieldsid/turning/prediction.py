@@ -1,18 +1,41 @@
-"""One row of a turning prediction, the whole of it, and their plain records."""
+"""One row of a turning prediction, the whole of it, their plain records, and how a radius is told."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan, nan
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from fieldsid.display import Displayed, Plotted
 from fieldsid.logs.run import Note
 from fieldsid.records.keys import INLINE, Interval, Key, Number, Side
-from fieldsid.turning.known_radius import is_band_only
+from fieldsid.rounding import number
 from fieldsid.turning.measured.measured_turn import MeasuredTurn
 from fieldsid.turning.steady.speed_loss import SurgeModel
+
+MAX_KNOWN_WIDTH = 0.35
+"""Widest 95 % band of a turn that counts as identified, over the radius: beyond it no number is known, but the band."""
+BRACKETED = "radius in brackets: these runs tell the band, not the number"
+
+
+def is_band_only(radius: float, band: tuple[float, float]) -> bool:
+    """Return whether a band (m, m) is too wide for the radius (m) in it to be known."""
+    return band[1] - band[0] > MAX_KNOWN_WIDTH * radius
+
+
+def radius_cell(radius: float, band: tuple[float, float]) -> str:
+    """Return a radius (m) for a table, in brackets where the band alone is known."""
+    return f"({number(radius, 3)})" if is_band_only(radius, band) else number(radius, 3)
+
+
+def turn_words(radius: float, band: tuple[float, float], where: str) -> str:
+    """Return `4.90 m to port, 95 % 4.39 .. 5.48 m` of a turn somewhere, or `between 4.39 and 9.48 m (95 %) to port`."""
+    low, high = number(band[0], 3), number(band[1], 3)
+    if is_band_only(radius, band):
+        return f"between {low} and {high} m (95 %) {where}"
+    return f"{number(radius, 3)} m {where}, 95 % {low} .. {high} m"
+
 
 SIDES: Mapping[str, float] = {"port": -1.0, "starboard": 1.0}
 EQUAL_TURN_SHARE = 0.05
@@ -163,6 +186,20 @@ def settling_flight(because: tuple[str, ...], side: str, speed: float, rudder: f
     if not because:
         return "nothing more: the data reached this turn"
     return f"turning_circle to {side} at {speed:.2f} m/s with {rudder:.3g} rad: {HOW}"
+
+
+def predicted_row(speed: float, side: str, rudder: float, because: tuple[str, ...], **found: Any) -> TurnRow:
+    """Return the row of a turn at a speed (m/s) with a rudder (rad), of what was found of it, and of what it lacks."""
+    return TurnRow(
+        speed=speed,
+        side=side,
+        trust="extrapolated" if because else "identified",
+        because=because,
+        settle_with=settling_flight(because, side, speed, rudder),
+        predicted=found["radius"],
+        predicted95=found["interval95"],
+        **found,
+    )
 
 
 def _to(rows: Sequence[TurnRow], side: str) -> bool:

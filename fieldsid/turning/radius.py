@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -14,16 +14,15 @@ from fieldsid.logs.several.sifting import Refused
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.parameter_source import ParameterSource
-from fieldsid.plant.remedies import damping_that_holds, in_radians, wider_fin
-from fieldsid.records.check import LARGEST_FIN_RAD
+from fieldsid.plant.remedies import damping_that_holds, refuse_no_fin, wider_fin
 from fieldsid.turning.believed_rows import believed_rows, doubts_of_draws
 from fieldsid.turning.flown_circles import against_rudder, circles_of, compared_with, turned_against, with_measurement
 from fieldsid.turning.maneuvering.belief import SEED, Belief, believe, not_fitted
-from fieldsid.turning.model_error import DataCoverage, data_coverage, model_error, model_error_draws
+from fieldsid.turning.model_error import DataCoverage, data_coverage, model_error
 from fieldsid.turning.paper_formulas import refuse_short_fin, refuse_unstable, u_turn
-from fieldsid.turning.prediction import SIDES, TurnPrediction, TurnRow, settling_flight
-from fieldsid.turning.steady.blended_turns import BlendedTurns, blended_turns
+from fieldsid.turning.prediction import SIDES, TurnPrediction, TurnRow, predicted_row
 from fieldsid.turning.steady.speed_loss import SurgeModel, fit_surge
+from fieldsid.turning.steady.steady_turn import BlendedTurns, blended_turns
 
 RADIUS_DRAWS = 500
 METHODS = ("auto", "u_turn", "steady", "simulated", "maneuvering")
@@ -134,16 +133,15 @@ def _formula_rows(
             turn = u_turn(speed, a, b, fin)
             radius = turn.radius if method == "u_turn" else turn.steady_radius
             coverage = _reach(source, speed, rudder, float(turn.yaw_rate_max[0]), float(turn.time[0]) / 2)
-            error = model_error((), coverage, formula=method == "u_turn")
-            spread = np.exp(model_error_draws(error, draws, np.random.default_rng(SEED)))
+            spread = model_error((), coverage, formula=method == "u_turn").factors(draws, SEED)
+            found = _found(coverage, radius, spread, turn.time, float(radius[0]))
             rows.append(
-                _row(
-                    speed, side, method, coverage, rudder, radius=radius, spread=spread, time=turn.time,
-                    steady=float(turn.steady_radius[0]), u_turn_radius=float(turn.radius[0]),
-                    rate=float(turn.yaw_rate_max[0]), turn_speed=speed,
+                predicted_row(
+                    float(speed), side, rudder, **found, method=method, steady_radius=float(turn.steady_radius[0]),
+                    u_turn_radius=float(turn.radius[0]), yaw_rate_max=float(turn.yaw_rate_max[0]), turn_speed=float(speed),
                 )
             )  # fmt: skip
-    return _by_side(rows)
+    return [row for side in SIDES for row in rows if row.side == side]
 
 
 def _refuse_turns(source: ParameterSource, speeds: Sequence[float], rudder: float) -> None:
@@ -181,61 +179,27 @@ def _simulated_row(source: ParameterSource, turns: BlendedTurns, index: int, sid
         )
     time = turns.transient.time_180[index]
     coverage = _reach(source, speed, rudder, rate, float(np.nan_to_num(turns.transient.time_90[index], nan=60.0)))
-    error = model_error(turns.effects, coverage, formula=False)
-    spread = np.exp(model_error_draws(error, turns.radius.shape[0], np.random.default_rng(SEED + 1)))
+    spread = model_error(turns.effects, coverage, formula=False).factors(turns.radius.shape[0], SEED + 1)
     radius = turns.radius[:, index]
-    row = _row(
-        speed, side, "simulated", coverage, rudder, radius=radius, spread=spread, time=time * radius / radius[0],
-        steady=_median(radius * spread), u_turn_radius=float(turns.transient.path_180[index] / np.pi), rate=rate,
-        turn_speed=float(turns.path_speed[index]),
+    value = _median(radius * spread)
+    found = _found(coverage, radius, spread, time * radius / radius[0], value)
+    return predicted_row(
+        speed, side, rudder, **found, method="simulated", steady_radius=value, yaw_rate_max=rate,
+        turn_speed=float(turns.path_speed[index]), **turns.transient.of(index),
     )  # fmt: skip
-    after = turns.transient
-    return replace(
-        row,
-        advance=float(after.advance[index]),
-        transfer=float(after.transfer[index]),
-        tactical_diameter=float(after.tactical_diameter[index]),
-    )
 
 
-def _row(
-    speed: float,
-    side: str,
-    method: str,
-    coverage: DataCoverage,
-    rudder: float,
-    *,
-    radius: FloatArray,
-    spread: FloatArray,
-    time: FloatArray,
-    steady: float,
-    u_turn_radius: float,
-    rate: float,
-    turn_speed: float,
-) -> TurnRow:
-    simulated = method == "simulated"
-    value = _median(radius * spread) if simulated else float(radius[0])
+def _found(coverage: DataCoverage, radius: FloatArray, spread: FloatArray, time: FloatArray, value: float) -> dict[str, Any]:
+    """Return radius and time of a turn with their bands, by draws of them and of the form's error, and what the turn lacks."""
     interval = _interval(radius * spread, value)
-    because = (*coverage.missing, *doubts_of_draws(value, interval, float(np.mean(~np.isfinite(radius)))))
-    return TurnRow(
-        speed=float(speed),
-        side=side,
-        radius=value,
-        interval95=interval,
-        steady_radius=steady,
-        u_turn_radius=u_turn_radius,
-        u_turn_time=float(time[0]),
-        yaw_rate_max=rate,
-        method=method,
-        trust="extrapolated" if because else "identified",
-        because=because,
-        settle_with=settling_flight(because, side, speed, rudder),
-        turn_speed=float(turn_speed),
-        u_turn_time95=_interval(time * spread, float(time[0])),
-        predicted=value,
-        predicted95=interval,
-        of_model=float(radius[0]),
-    )
+    return {
+        "because": (*coverage.missing, *doubts_of_draws(value, interval, float(np.mean(~np.isfinite(radius))))),
+        "radius": value,
+        "interval95": interval,
+        "u_turn_time": float(time[0]),
+        "u_turn_time95": _interval(time * spread, float(time[0])),
+        "of_model": float(radius[0]),
+    }
 
 
 def _median(draws: FloatArray) -> float:
@@ -271,10 +235,6 @@ def _reach(source: ParameterSource, speed: float, rudder: float, rate: float, qu
     return data_coverage(model.trained, fin=rudder, rate=abs(rate), quarter_s=quarter_s, speed_flown=flown, sway_settles=seen)
 
 
-def _by_side(rows: Sequence[TurnRow]) -> list[TurnRow]:
-    return [r for side in SIDES for r in rows if r.side == side]
-
-
 def _chosen(source: ParameterSource, method: str) -> str:
     if method != "auto":
         return method
@@ -288,12 +248,7 @@ def _check(source: ParameterSource, speeds: Sequence[float], rudder_max: float, 
         raise UsageError(f"there is no method {method!r}", found=", ".join(METHODS), hint="leave `--method` out")
     if method in ("simulated", "maneuvering") and not source.models:
         raise UsageError("a table cannot be simulated", found="no model", hint="give model files, or `--method u_turn`")
-    if not 0.0 < rudder_max <= LARGEST_FIN_RAD:
-        raise UsageError(
-            "the rudder held in a turn lies above 0 and at most at 90 deg",
-            found=f"--fin-max {rudder_max:g}",
-            hint=in_radians("--fin-max", rudder_max),
-        )
+    refuse_no_fin("the rudder held in a turn", rudder_max)
     if not len(speeds) or not all(s > 0 and np.isfinite(s) for s in speeds):
         raise UsageError("speeds must be above zero", found=f"{list(speeds)}", hint="write `--speeds 0.5:2.5:0.1` or `1.0,1.5`")
 

@@ -13,8 +13,7 @@ from fieldsid.rounding import RADIANS, Angles, noise_fall, number
 from fieldsid.views._words import parameter_block, parameter_rows, table, warned
 
 if TYPE_CHECKING:
-    from fieldsid.extension import Extension
-    from fieldsid.extension.extend import Gain
+    from fieldsid.extension.extend import Extension, Gain
 
 
 def line(found: Extension) -> str:

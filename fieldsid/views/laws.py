@@ -13,8 +13,8 @@ from fieldsid.rounding import number, with_error
 from fieldsid.views._words import joined, some, table, warned
 
 if TYPE_CHECKING:
+    from fieldsid.plant.laws.axis_laws import Laws
     from fieldsid.plant.laws.parameter_law import ParameterLaw, PointCheck
-    from fieldsid.turning import Laws
 
 WORDS = {"through_zero": "through zero", "power": "power law"}
 

@@ -14,7 +14,7 @@ from fieldsid.views._words import speed_words, table
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from fieldsid.turning import MeasuredTurn
+    from fieldsid.turning.measured.measured_turn import MeasuredTurn
 
 
 def line(turn: MeasuredTurn) -> str:

@@ -14,7 +14,7 @@ from fieldsid.rounding import RADIANS, Angles, number
 from fieldsid.views._words import table
 
 if TYPE_CHECKING:
-    from fieldsid.schedule import Schedule
+    from fieldsid.schedule.record import Schedule
 
 SLOWED_SHARE = 0.995
 """Below it a row's share is not printed as 1.00."""

@@ -14,7 +14,7 @@ from fieldsid.rounding import RADIANS, Angles, number, with_error
 from fieldsid.views._words import joined, some, table, warned
 
 if TYPE_CHECKING:
-    from fieldsid.turning import TurnPrediction
+    from fieldsid.turning.prediction import TurnPrediction
 
 
 def line(found: TurnPrediction) -> str:
@@ -47,8 +47,7 @@ def page(found: TurnPrediction, angles: Angles = RADIANS) -> Page:
 
 def turns_of(body: Mapping[str, Any], angles: Angles) -> tuple[Block, str]:
     """Return a row for each speed and side, of the JSON that a file of it holds too, and what its brackets are."""
-    from fieldsid.turning.known_radius import BRACKETED, is_band_only, radius_cell
-    from fieldsid.turning.prediction import found_by
+    from fieldsid.turning.prediction import BRACKETED, found_by, is_band_only, radius_cell
 
     rows = tuple(
         (

@@ -14,8 +14,8 @@ from fieldsid.rounding import number
 from fieldsid.views._words import table
 
 if TYPE_CHECKING:
-    from fieldsid.schedule import Verification
     from fieldsid.schedule.check import Check, StepCheck
+    from fieldsid.schedule.verify import Verification
 
 
 def line(found: Verification) -> str:

@@ -152,7 +152,7 @@ def test_an_interrupt_is_130(run_cli, monkeypatch):
 
 
 def test_an_interrupt_inside_a_command_says_so(run_cli, monkeypatch, tmp_path):
-    monkeypatch.setattr("fieldsid.extension.history_of", Broken(KeyboardInterrupt()))
+    monkeypatch.setattr("fieldsid.extension.lineage.history_of", Broken(KeyboardInterrupt()))
     answer = run_cli("history", trial.model_file(tmp_path))
     assert (answer.code, answer.err) == (130, "interrupted\n")
 

@@ -10,7 +10,7 @@ import pytest
 
 from fieldsid.cli.headlines.missing import Searched, of_diagnosis, of_extension
 from fieldsid.diagnosis.records import Candidate, Diagnosis, Errors, NextManeuver, Pair
-from fieldsid.extension import Gain
+from fieldsid.extension.extend import Gain
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise

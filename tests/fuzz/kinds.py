@@ -296,7 +296,7 @@ def effect_read(path):
 
 
 def prior_read(path):
-    from fieldsid.planning.belief.prior_file import load_believed
+    from fieldsid.planning.belief.prior_model import load_believed
 
     load_believed(path)
 

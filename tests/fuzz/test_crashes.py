@@ -28,7 +28,7 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import load_model
 from fieldsid.models.record import record_of
-from fieldsid.planning.belief.prior_file import load_prior
+from fieldsid.planning.belief.prior_model import load_prior
 from fieldsid.plant.laws.axis_laws import carried_models, load_laws
 from fieldsid.records.reading import read_yaml
 from fieldsid.results.logs import inspected
@@ -291,7 +291,7 @@ def test_a_position_of_one_column_is_refused(tmp_path):
 
 
 def test_a_prior_of_impossible_numbers_is_refused(tmp_path):
-    with pytest.raises(ArtifactError, match="must be a number up to"):
+    with pytest.raises(ArtifactError, match="not a complete prior"):
         load_prior(changed(tmp_path, "prior.yaml", "parameters", "b2", "std_error", to=1e300))
 
 

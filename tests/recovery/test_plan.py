@@ -17,8 +17,7 @@ from fieldsid.maneuvers import parse_spec
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
 from fieldsid.planning.belief.prior_model import named_prior
-from fieldsid.planning.design.best_leg import Setting, best_leg, pulses
-from fieldsid.planning.design.circle_legs import circle_legs
+from fieldsid.planning.design.best_leg import Setting, best_leg, circle_legs, pulses
 from fieldsid.planning.design.objective import make_objective
 from fieldsid.planning.design.plan import Request, make_plan
 from fieldsid.planning.flight.excitation import Excitation, Window

@@ -11,7 +11,7 @@ from played import ardupilot, dune, moos, ros2
 from truth.pilots import Autopilot
 from truth.vehicle import CALM, QUIET, Fins, Sea, fly_vehicle
 
-from fieldsid.planning.design.abort_conditions import aborts_of
+from fieldsid.planning.design.leg import aborts_of
 from fieldsid.planning.output.command_files import write_all
 
 COURSE = np.radians(90.0)

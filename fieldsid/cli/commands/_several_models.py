@@ -23,7 +23,7 @@ from fieldsid.records.keys import body_of
 if TYPE_CHECKING:
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.comparison.compare import Comparison
-    from fieldsid.extension import Loop
+    from fieldsid.extension.lineage import Loop
     from fieldsid.results.comparisons import ComparedSeveral
 
 MOST_PLACES = 3
@@ -97,7 +97,7 @@ def several_models(
 
 def _loop(paths: Sequence[Path], found_of: Sequence[Sequence[Comparison]]) -> Loop | None:
     """Return the loop from one of the models to another that was extended from it, over the longest line of any."""
-    from fieldsid.extension import history_of, loop_of
+    from fieldsid.extension.lineage import history_of, loop_of
 
     lines = {i: history_of(path) for i, path in enumerate(paths)}
     last = max(lines, key=lambda i: len(lines[i]))

@@ -132,7 +132,8 @@ def _applied(
     from fieldsid.cli.commands.extend import step_files
     from fieldsid.cli.headlines.missing import MODELS
     from fieldsid.cli.inputs import files_of
-    from fieldsid.extension import extend_in_steps, save_steps
+    from fieldsid.extension.extend import extend_in_steps
+    from fieldsid.extension.lineage import save_steps
     from fieldsid.models.model import save_model
     from fieldsid.results.diagnoses import Applied
 

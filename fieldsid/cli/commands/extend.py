@@ -23,7 +23,7 @@ from fieldsid.records.keys import body_of
 from fieldsid.rounding import at_its_bound, number, with_error
 
 if TYPE_CHECKING:
-    from fieldsid.extension import Extension
+    from fieldsid.extension.extend import Extension
     from fieldsid.models.model import Model
     from fieldsid.results.extensions import AddedCoefficient, Extended, LeftOver
 
@@ -70,10 +70,10 @@ def command(
     skips, validate = Skips(), validate or []
     known, names = load_model(path), list(dict.fromkeys(n for given in add or [] for n in names_of(given)))
     targets = step_files(path, names, output, force=force) if names else []
-    check, ready = partial(_check, path, known, names), partial(get_ready, "fieldsid.extension")
+    check, ready = partial(_check, path, known, names), partial(get_ready, "fieldsid.extension.extend")
     training, unseen = read_groups([runs, validate], mapping=mapping, check=check, meanwhile=ready, refused=skips.skip)
-    from fieldsid.extension import extend_in_steps, save_steps, whole_of
-    from fieldsid.extension.lineage import kept_by
+    from fieldsid.extension.extend import extend_in_steps, whole_of
+    from fieldsid.extension.lineage import kept_by, save_steps
     from fieldsid.records.named_inputs import sha256_of
     from fieldsid.results.extensions import Extended, MadeFrom
 
@@ -157,7 +157,7 @@ def _coefficients(found: Extension) -> dict[str, AddedCoefficient]:
 
 def _undone(path: Path, output: Path | None, *, force: bool, as_json: bool) -> Mapping[str, Any]:
     from fieldsid.artifacts import replacing
-    from fieldsid.extension import CHANGED, MISSING, history_of, parent_of
+    from fieldsid.extension.lineage import CHANGED, MISSING, history_of, parent_of
     from fieldsid.models.model import load_model
     from fieldsid.results.extensions import Undone
 

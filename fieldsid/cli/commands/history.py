@@ -19,7 +19,8 @@ from fieldsid.rounding import number
 from fieldsid.views.extension import channels_of
 
 if TYPE_CHECKING:
-    from fieldsid.extension import Gain, Generation, Step
+    from fieldsid.extension.extend import Gain
+    from fieldsid.extension.lineage import Generation, Step
     from fieldsid.results.extensions import History
 
 KEPT = {"unseen": "unseen data are predicted better", "evidence": "the evidence pays for it", "--keep": "kept because of --keep"}
@@ -36,7 +37,7 @@ def command(model: ModelFile, figure: FigureFile = None, force: Force = False, a
 
     refuse_figure(figure, force=force)
     known = read_model(model)
-    from fieldsid.extension import history_of
+    from fieldsid.extension.lineage import history_of
     from fieldsid.results.extensions import History
 
     line = history_of(model)

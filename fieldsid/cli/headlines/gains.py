@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from fieldsid.models.model import Model
     from fieldsid.results.gains import Design, Exported, Patched, Verified
     from fieldsid.results.turning import FittedLaws
-    from fieldsid.turning import TurnPrediction
+    from fieldsid.turning.prediction import TurnPrediction
 
 TARGET = "ros2"
 SLOWER = 60.0
@@ -59,8 +59,7 @@ def caveat(models: Iterable[Model], files: Sequence[Path]) -> str:
 
 def of_turn(found: TurnPrediction, models: Sequence[Path], caveat: str = "") -> Headline:
     """Return the tightest turn of both sides with its band; where the band alone is known, what tells the radius."""
-    from fieldsid.turning.known_radius import turn_words
-    from fieldsid.turning.prediction import found_by
+    from fieldsid.turning.prediction import found_by, turn_words
 
     rows, tightest = found.rows, min(found.rows, key=lambda r: r.radius)
     where = f"to {tightest.side} at {number(tightest.speed, 3)} m/s"

@@ -17,7 +17,7 @@ from fieldsid.rounding import MANY, noise_fall, times_noise
 
 if TYPE_CHECKING:
     from fieldsid.diagnosis import Diagnosis
-    from fieldsid.extension import Gain
+    from fieldsid.extension.extend import Gain
     from fieldsid.models.effect import Effect
     from fieldsid.results.diagnoses import Diagnosed
     from fieldsid.results.effects import NewEffect

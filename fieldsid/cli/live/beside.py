@@ -31,7 +31,8 @@ from fieldsid.online.progress import Progress
 from fieldsid.online.samples import Sample
 from fieldsid.records.keys import body_of
 from fieldsid.runtime.second_process import SecondProcess
-from fieldsid.schedule import FinLimits, load_schedule
+from fieldsid.schedule.linear_plant import FinLimits
+from fieldsid.schedule.record import load_schedule
 from fieldsid.schedule.search.of_one_model import Wanted, gains_of_one, usual, wanted_of
 
 STILL_S = 5.0

@@ -1,4 +1,4 @@
-"""Build one leg: search the best maneuver at a speed, keep it inside the envelope, say what it buys."""
+"""Build one leg: the best maneuver searched at a speed, or a circle for the radius, kept inside the envelope; what it buys."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from fieldsid.maneuvers import Schedule, pick_maneuver
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.belief.prior_model import draws_of, scales_of
-from fieldsid.planning.design.information import information_of
-from fieldsid.planning.design.leg import Expected, Leg, turn_back_s
-from fieldsid.planning.design.objective import Objective, make_objective
+from fieldsid.planning.design.leg import CIRCLE, Expected, Leg, turn_back_s
+from fieldsid.planning.design.objective import Objective, information_of, make_objective
 from fieldsid.planning.design.optimise import SMALLEST, Scored, as_switched, catalogue, largest_paying, switching
-from fieldsid.planning.flight.excitation import Excitation, Window, fits, flown
+from fieldsid.planning.flight.excitation import LONGEST_WINDOW_S, Excitation, Window, fits, flown
 from fieldsid.planning.flight.operating_point import operating_point
 from fieldsid.planning.flight.rule_flight import fly_operating_points
-from fieldsid.planning.safety.envelope import Envelope
+from fieldsid.planning.safety.envelope import MOST_TURNS, Envelope
 from fieldsid.planning.safety.monte_carlo import Ensemble, draw_ensemble, fly_ensemble, fly_list
+from fieldsid.runtime.parallel_map import parallel_map
 
 DESIGN_PROBABILITY_SHARE = 0.7
 """A plan aims at this part of the accepted probability, so that other draws of the prior keep to it as well."""
@@ -55,7 +55,8 @@ def best_leg(setting: Setting, speed: float, known: Sequence[Excitation] = ()) -
     straight = fly_list(crowd.first(COARSE_DRAWS), np.zeros(0), judge.envelope, judge.autopilot, judge.run_up)
     if np.mean(straight.outside(judge.envelope)) > setting.envelope.share:
         raise _nothing_inside(judge)  # as the autopilot steers straight on
-    scored = _known_again(judge, known) if known else catalogue(judge)
+    # what was best elsewhere, each at the angle that pays here
+    scored = [largest_paying(judge, c) for c in known if fits(c, judge.window)] if known else catalogue(judge)
     scored = [s for s in scored if s.candidate.record.rule is None or not setting.open_loop]
     seeds = [s for s in (as_switched(judge, c.candidate) for c in scored) if s is not None]
     scored.append(switching(judge, seeds, setting.seed))
@@ -96,7 +97,8 @@ def ensemble_at(judge: Objective, setting: Setting) -> Ensemble:
 def risk_of(judge: Objective, crowd: Ensemble, candidate: Excitation) -> tuple[float, dict[str, float]]:
     """Return the share of draws that leave the envelope, and each excursion's 95 % quantile."""
     flights = fly_ensemble(crowd, candidate, judge.envelope, judge.autopilot, judge.run_up)
-    return float(np.mean(flights.outside(judge.envelope))), flights.quantiles(0.95)
+    excursions = {name: float(np.quantile(values, 0.95)) for name, values in flights.excursions.items()}
+    return float(np.mean(flights.outside(judge.envelope))), excursions
 
 
 def leg_of(
@@ -150,7 +152,7 @@ def expected_errors(judge: Objective, setting: Setting, candidate: Excitation) -
     base = pulses(judge)
     before = {} if base is None else judge.expected(base).std_errors()
     scales = scales_of(setting.model, judge.scene.base, judge.envelope.fin)
-    values = values_at(judge)
+    values = {**judge.scene.model.values, **judge.scene.model.at_speed(speed)}
     high = {n: _high([e[n] for e in spread]) for n in mean.names}
     errors = mean.std_errors()
     return {n: Expected(values[n], e, high[n], e / scales[n], before.get(n, float("nan"))) for n, e in errors.items()}
@@ -170,16 +172,6 @@ def pulses(judge: Objective) -> Excitation | None:
         return None
     values = {"amplitude": min(0.26, fin), "second": min(0.15, fin), "recovery": min(maneuver.defaults["recovery"], spare)}
     return Excitation(maneuver.name, maneuver.checked(values))
-
-
-def values_at(judge: Objective) -> dict[str, float]:
-    """Return every shared parameter's value at the objective's speed."""
-    return {**judge.scene.model.values, **judge.scene.model.at_speed(judge.scene.speed)}
-
-
-def _known_again(judge: Objective, known: Sequence[Excitation]) -> list[Scored]:
-    """Return maneuvers that were best elsewhere, each at the angle that pays here, best first."""
-    return sorted((largest_paying(judge, c) for c in known if fits(c, judge.window)), key=lambda s: s.cost)
 
 
 def enforce_envelope(judge: Objective, setting: Setting, crowd: Ensemble, candidate: Excitation) -> Excitation | None:
@@ -206,3 +198,56 @@ def lowered(candidate: Excitation, share: float) -> Excitation | None:
     if share < SMALLEST or any(v < bounds[n] for n, v in changes.items()):
         return None
     return candidate.with_(**changes)
+
+
+SETTLED_TURN = 2.5 * np.pi
+"""Heading (rad) to turn through: half a circle to settle, one to be measured on."""
+LARGEST_TURN = MOST_TURNS * 2.0 * np.pi
+"""Heading (rad) at which a circle is ended: one that is flown by the clock turns farther the stronger the fin is."""
+SLACK = 1.6
+
+
+def circle_legs(setting: Setting, speeds: Sequence[float]) -> list[Leg]:
+    """Return a circle at the fin limit to port and one to starboard at every speed.
+
+    A circle turns through more than a whole turn: its heading has a limit of its own. All other limits hold.
+    Raises UsageError when a circle does not fit them.
+    """
+    return parallel_map(lambda turn: _circle(setting, *turn), [(speed, side) for speed in speeds for side in (0.0, 1.0)])
+
+
+def _circle(setting: Setting, speed: float, mirrored: float) -> Leg:
+    free = replace(setting.envelope, heading=LARGEST_TURN)
+    probe = make_objective(setting.model, speed, free, setting.window, {}, setting.run_up_s)
+    rate = abs(probe.scene.base.authority) * free.fin / max(probe.scene.base.damping, 0.02)
+    maneuver = pick_maneuver("turning_circle")
+    pull_out, around = 8.0, setting.window
+    length = float(np.clip(SLACK * SETTLED_TURN / rate + pull_out, 20.0, LONGEST_WINDOW_S - around.lead - around.recover))
+    values = {"amplitude": free.fin, "turn": SETTLED_TURN, "pull_out": pull_out, "mirrored": mirrored, "duration": length}
+    window = replace(around, length=length + around.lead + around.recover)
+    judge = make_objective(setting.model, speed, free, window, {}, setting.run_up_s)
+    leg = leg_of(judge, setting, Excitation(maneuver.name, maneuver.checked(values)), purpose=CIRCLE)
+    leg = replace(leg, heading=LARGEST_TURN)
+    if leg.break_probability > free.share:
+        raise _no_room(leg, setting)
+    return leg
+
+
+def _no_room(leg: Leg, setting: Setting) -> UsageError:
+    """Return the error of a circle that leaves the envelope, with what would hold it."""
+    far, limits = leg.excursions, setting.envelope
+    wanted = []
+    if limits.area_length is not None:
+        wanted.append(f"`--area {max(1.1 * far['along'], limits.area_length):.0f}x{2.2 * far['across']:.0f}`")
+    if limits.area_length is not None and far["behind"] > 0.0:
+        wanted.append(f"`--run-up {setting.run_up_s + 1.1 * far['behind'] / leg.speed:.0f}`")
+    if limits.track is not None:
+        wanted.append(f"`--max-track {1.1 * far['track']:.0f}`")
+    return UsageError(
+        f"a full-fin circle at {leg.speed:g} m/s does not fit the envelope",
+        found=f"{leg.break_probability:.0%} leave it: {far['along']:.0f} m along, {far['across']:.0f} m to a side, "
+        f"{far['behind']:.0f} m behind the start, roll {far['roll']:.2g} rad",
+        hint=f"give {' and '.join(wanted)}, or leave `--radius` out"
+        if wanted
+        else "leave `--radius` out, or give a smaller `--fin-max`",
+    )

@@ -1,21 +1,103 @@
-"""Score a candidate: expected errors over the prior's spread, and how much of the envelope it uses."""
+"""Score a candidate: expected errors over the prior's spread by Fisher's information, and how much of the envelope it uses.
+
+The information of a whitened free run is J^T J with J its sensitivities; whitening is the same Kalman filter the
+prediction-error estimator uses, so coloured sensor noise and a disturbance moment count in full (Ljung 1999, 7.4).
+Initial states and per-run coefficients are estimated too; their share is taken out by the Schur complement.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
+from fieldsid.fitting.optimise.levenberg_marquardt import normal_equations
+from fieldsid.fitting.problem.parameters import ParameterLayout, layout_of
+from fieldsid.fitting.problem.problem import Problem
 from fieldsid.maneuvers import Autopilot
 from fieldsid.models.axis import NAMES
 from fieldsid.models.model import Model
+from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.belief.prior_model import corner, scales_of
-from fieldsid.planning.design.information import Information, information_of
 from fieldsid.planning.flight.excitation import Excitation, Window, flown, flown_all
 from fieldsid.planning.flight.operating_point import OperatingPoint, autopilot_of, operating_point
+from fieldsid.planning.flight.rule_flight import Response
 from fieldsid.planning.safety.envelope import Envelope, excursions_of, used
 from fieldsid.planning.safety.monte_carlo import ROLL_SPREAD
+
+RIDGE = 1e-12
+SMALLEST_PIVOT = 1e-10
+"""Share of its own information below which a parameter is fully correlated with the others."""
+
+
+@dataclass(frozen=True, slots=True)
+class Information:
+    """Information matrix (p, p) on `names` at one speed, nuisances taken out; add the matrices of independent runs."""
+
+    names: tuple[str, ...]
+    matrix: FloatArray
+
+    def std_errors(self) -> dict[str, float]:
+        """Return the standard error of every parameter, infinite where the flight cannot tell it from others."""
+        errors = np.full(len(self.names), np.inf)
+        shown = np.flatnonzero(np.diag(self.matrix) > 0.0)
+        if np.isfinite(self.matrix).all() and shown.size:
+            part = self.matrix[np.ix_(shown, shown)]
+            scale = np.sqrt(np.diag(part))
+            values, vectors = np.linalg.eigh(part / np.outer(scale, scale))
+            lost = values < SMALLEST_PIVOT
+            variance = (vectors[:, ~lost] ** 2 / values[~lost]).sum(axis=1)
+            hidden = (vectors[:, lost] ** 2).sum(axis=1) > 1e-6
+            errors[shown] = np.where(hidden, np.inf, np.sqrt(variance)) / scale
+        return dict(zip(self.names, errors.tolist(), strict=True))
+
+
+def problem_of(scene: OperatingPoint, record: Record) -> tuple[Problem, FloatArray]:
+    """Return the estimation problem of a scene's model on one record, and its vector of true values (N,)."""
+    layout, x = _layout(scene)
+    return Problem((record,), layout), x.copy()
+
+
+@lru_cache(maxsize=32)
+def _layout(scene: OperatingPoint) -> tuple[ParameterLayout, FloatArray]:
+    """Return the slots of a scene's model on one run, referred to the model's own speed, and the true values."""
+    law = scene.model.law
+    reference = law.reference if np.isfinite(law.reference) else scene.speed
+    made = layout_of([scene.record(np.linspace(0.0, 0.2, 3), np.zeros(3))], scene.axis, scene.effects)
+    layout = replace(made, groups=replace(made.groups, speeds=(reference,), reference=0, trim_of_fin=law.trim_of_fin))
+    names, ratio = NAMES[scene.axis], scene.speed / reference
+    at_reference = {names.damping: scene.base.damping / ratio, names.authority: scene.base.authority / ratio**2}
+    at_reference[names.trim] = scene.base.trim / (ratio**2 if law.trim_of_fin else 1.0)
+    known = {**scene.values, "angle0": 0.0, "rate0": 0.0, **at_reference}
+    return layout, np.array([float(known.get(s.name, s.start)) for s in layout.parameters])
+
+
+def information_of(scene: OperatingPoint, response: Response) -> Information:
+    """Return the information of one flight on the shared parameters, in the units they have at the flight's speed."""
+    record = scene.record(response.time, response.command + scene.trim_fin)
+    problem, x = problem_of(scene, record)
+    _, normal, _, _ = normal_equations(problem, x, scene.model.noise, range(len(x)))
+    layout, names = problem.layout, NAMES[scene.axis]
+    shared = layout.shared
+    matrix = _without_nuisances(normal, shared)
+    unit = np.ones(shared)
+    ratio = scene.speed / layout.groups.speeds[0]
+    unit[layout.names.index(names.damping)] = ratio
+    unit[layout.names.index(names.authority)] = ratio**2
+    unit[layout.names.index(names.trim)] = ratio**2 if layout.groups.trim_of_fin else 1.0
+    return Information(layout.names, matrix / np.outer(unit, unit))
+
+
+def _without_nuisances(normal: FloatArray, shared: int) -> FloatArray:
+    own = normal[shared:, shared:]
+    scale = np.sqrt(np.maximum(np.diag(own), 1e-300))
+    cross = normal[:shared, shared:] / scale
+    unit = own / np.outer(scale, scale) + RIDGE * np.eye(scale.size)
+    return np.asarray(normal[:shared, :shared] - cross @ np.linalg.solve(unit, cross.T))
+
 
 CORNER = 1.3
 PENALTY = 30.0

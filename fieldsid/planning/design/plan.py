@@ -15,14 +15,12 @@ from fieldsid.models.allocation import PlaneFins
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
 from fieldsid.planning.belief.prior_model import checked_prior
-from fieldsid.planning.design.abort_conditions import Abort, aborts_of
-from fieldsid.planning.design.best_leg import RUN_UP_S, Setting, best_leg
-from fieldsid.planning.design.circle_legs import circle_legs
-from fieldsid.planning.design.leg import Leg, turn_back_s
+from fieldsid.planning.design.best_leg import RUN_UP_S, Setting, best_leg, circle_legs
+from fieldsid.planning.design.leg import Abort, Leg, aborts_of, turn_back_s
 from fieldsid.planning.flight.excitation import Excitation, Window
 from fieldsid.planning.flight.operating_point import operating_point
 from fieldsid.planning.safety.envelope import Envelope, check_room, check_speeds, limits_said
-from fieldsid.planning.specify.accuracy_goals import accuracy_goals_text
+from fieldsid.planning.specify.quantities import accuracy_goals_text
 from fieldsid.records.keys import INLINE, Key
 from fieldsid.runtime.parallel_map import parallel_map
 
@@ -202,11 +200,7 @@ def _repeated(leg: Leg, want: Mapping[str, float], envelope: Envelope) -> Leg:
             if possible
             else envelope.widening(),
         )
-    return with_passes(leg, max(passes, 1))
-
-
-def with_passes(leg: Leg, passes: int) -> Leg:
-    """Return a leg of one pass flown several times."""
+    passes = max(passes, 1)
     return replace(leg, passes=passes, expected={n: e.over(passes) for n, e in leg.expected.items()})
 
 

@@ -12,11 +12,12 @@ import numpy as np
 from fieldsid.errors import UsageError
 from fieldsid.maneuvers import RATE_HZ, pick_maneuver
 from fieldsid.models.model import Model
+from fieldsid.planning.design.best_leg import FINALISTS
 from fieldsid.planning.design.optimise import moves_of
 from fieldsid.planning.discriminate.t_optimality import MAX_REFIT_ITERATIONS, Rival, log_odds, rival_of
-from fieldsid.planning.flight.closed_loop import Response
-from fieldsid.planning.flight.excitation import Excitation, Window, fits, flown_all
+from fieldsid.planning.flight.excitation import Excitation, Window, fits, flown
 from fieldsid.planning.flight.operating_point import autopilot_of, operating_point
+from fieldsid.planning.flight.rule_flight import Response
 from fieldsid.planning.safety.envelope import Envelope, excursions_of, used
 from fieldsid.records.keys import Key, Number
 
@@ -27,7 +28,6 @@ Map = Callable[[Callable[[Excitation], Pairs], Sequence[Excitation]], list[Pairs
 LONGEST_WINDOW_S = 60.0
 """Length of the window unless another is requested: slow differences discriminate rivals as well."""
 MOST_LOG_ODDS = 300.0
-CANDIDATES_TUNED = 3
 FAST_HZ, FAST_ROUNDS, BEYOND_DOUBT = 10.0, 3, 50.0
 AT_ONCE = 2
 """Candidates that are evaluated at once, before it is asked whether one of them decides."""
@@ -102,9 +102,7 @@ class _RivalFlights:
         """Return every rival's flight, None where one leaves the envelope."""
         limits = self.envelope.limits
         pilot = autopilot_of(self.rivals[0].scene.base, limits)
-        flights: list[Response] = []
-        for rival in self.rivals:
-            flights += flown_all([rival.scene], candidate, self.window, limits, pilot)
+        flights = [flown(rival.scene, candidate, self.window, limits, pilot) for rival in self.rivals]
         for rival, flight in zip(self.rivals, flights, strict=True):
             far = excursions_of(
                 rival.scene.axis, flight.angle[:, None], flight.rate[:, None], speed=self.speed, step=1.0 / self.window.rate_hz,
@@ -129,10 +127,6 @@ class _RivalFlights:
         return found
 
 
-def _in_turn(function: Callable[[Excitation], Pairs], candidates: Sequence[Excitation]) -> list[Pairs]:
-    return [function(c) for c in candidates]
-
-
 def separate(
     models: Sequence[Model],
     envelope: Envelope,
@@ -143,7 +137,7 @@ def separate(
     run_up_s: float = 0.0,
     candidates: Sequence[Excitation] | None = None,
     fast: bool = False,
-    mapped: Map = _in_turn,
+    mapped: Map = lambda function, candidates: list(map(function, candidates)),
 ) -> Separation:
     """Return the maneuver inside the envelope that discriminates rival models best, at the best of the speeds (m/s).
 
@@ -202,7 +196,7 @@ def _at_speed(arena: _RivalFlights, candidates: Sequence[Excitation] | None, map
     if not scored:
         return None
     scored.sort(key=lambda s: -worth(s[1]))
-    tuned = scored if fast else [_tuned(arena, *s) for s in scored[:CANDIDATES_TUNED]]
+    tuned = scored if fast else [_tuned(arena, *s) for s in scored[:FINALISTS]]
     candidate, pairs = max(tuned, key=lambda s: worth(s[1]))
     window = _shortened(arena.window, arena.responses(candidate))
     return Separation(

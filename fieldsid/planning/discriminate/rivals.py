@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from fieldsid.effects import pick_effect, refuse_clash
-from fieldsid.errors import ArtifactError, UsageError
+from fieldsid.errors import UsageError
 from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Coefficient, definitions_of, effect_held
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
+from fieldsid.planning.whole_file import whole_file
 from fieldsid.records.reading import load_record
 
 KIND = "fieldsid/diagnosis"
@@ -49,15 +50,11 @@ def rivals_from(path: Path, names: Sequence[str] = ()) -> tuple[Model, ...]:
     """
     with unless_log(path, "a diagnosis"):
         body = load_record(path, KIND)
-    try:
+    with whole_file(path, "diagnosis", "diagnose again, with `-o`"):
         axis = Axis(body["axis"])
         candidates = sorted(body["candidates"], key=lambda c: -float(c["probability"]))
         wanted = [c for c in candidates if c["effect"] in names] if names else _leading(candidates)
         models = tuple(_of_candidate(axis, c, body) for c in wanted)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ArtifactError(
-            f"`{path}` is not a complete diagnosis", found=f"{type(error).__name__}: {error}", hint="diagnose again, with `-o`"
-        ) from error
     if len(models) < 2:
         known = ", ".join(f"{c['effect']} with probability {float(c['probability']):.2g}" for c in candidates[:MOST_RIVALS])
         hint = "name two of them with `--separate A,B`"

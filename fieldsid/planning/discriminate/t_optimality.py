@@ -16,9 +16,9 @@ from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.planning.design.information import problem_of
-from fieldsid.planning.flight.closed_loop import Response
+from fieldsid.planning.design.objective import problem_of
 from fieldsid.planning.flight.operating_point import OperatingPoint
+from fieldsid.planning.flight.rule_flight import Response
 
 MAX_REFIT_ITERATIONS, CONVERGED_COST_CHANGE = 6, 0.01
 SMALLEST_STEP = 1.0 / 64.0

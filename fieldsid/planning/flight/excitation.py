@@ -11,9 +11,8 @@ import numpy as np
 from fieldsid.errors import UsageError
 from fieldsid.maneuvers import RATE_HZ, Autopilot, Limits, Maneuver, Schedule, pick_maneuver, spec_of
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.planning.flight.closed_loop import Response
 from fieldsid.planning.flight.operating_point import OperatingPoint
-from fieldsid.planning.flight.rule_flight import fly_fins, fly_operating_points, plant_of
+from fieldsid.planning.flight.rule_flight import Response, fly_fins, fly_operating_points, plant_of
 from fieldsid.records.keys import Key
 
 LONGEST_WINDOW_S = 300.0

@@ -2,19 +2,81 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 
+from fieldsid.dynamics.assemble import KernelInputs, assemble, fin_path
+from fieldsid.dynamics.free_run import command_record
 from fieldsid.dynamics.nonlinear_kernel import over_interval
-from fieldsid.maneuvers import Autopilot, Flight, Limits, Maneuver, Parameters, Schedule, fly
-from fieldsid.models.hull import CONSTANTS, DRIVES, MOMENT_END, MOMENT_START, kinds_of, named
+from fieldsid.maneuvers import Autopilot, Flight, Limits, Maneuver, Parameters, Schedule, fly, steer
+from fieldsid.models.hull import CONSTANTS, DRIVES, FIN, MOMENT_END, MOMENT_START, kinds_of, named
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.numerics.jit import jit
-from fieldsid.planning.flight.closed_loop import ACTUATOR_ROUNDS, closed_loop, fin_offset, hold_fin, idle_records, prepared
+from fieldsid.numerics.jit import inner, jit
 from fieldsid.planning.flight.operating_point import OperatingPoint
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """One flight about straight and level: time (n,) s, fin command about trim rad, angle rad, rate rad/s (n,)."""
+
+    time: FloatArray
+    command: FloatArray
+    angle: FloatArray
+    rate: FloatArray
+
+
+@inner
+def hold_fin(drive: FloatArray, i: int, start: float, end: float, push_start: float, push_end: float) -> None:
+    """Add a fin (rad at both ends) to row i of a drive without one, with what a rad of it pushes at both ends."""
+    drive[i, MOMENT_START] += push_start * start
+    drive[i, MOMENT_END] += push_end * end
+    drive[i, FIN] = 0.5 * (start + end)
+
+
+@jit
+def closed_loop(
+    steps: FloatArray, drive: FloatArray, c: FloatArray, pieces: int, asked: FloatArray, off: FloatArray,
+    push: FloatArray, gains: FloatArray, limits: FloatArray, command: FloatArray, out: FloatArray,
+) -> None:  # fmt: skip
+    """Fill command (n,) and out (n, 3): angle, rate, cross state from rest.
+
+    asked (n,): fin about trim, NaN where the autopilot steers. off (n-1, 2): fin angle minus command at both ends of each
+    interval. push (n-1, 2): moment per rad at start and end. gains (3,): angle, rate, fin limit
+    of the autopilot. limits (4,): low, high, rate, trim fin.
+    """
+    n, state, last = asked.shape[0], (0.0, 0.0, 0.0), 0.0
+    k, kinds = named(c), kinds_of(c)
+    for i in range(n):
+        out[i, 0], out[i, 1], out[i, 2] = state
+        fin = steer(asked[i], state[0], state[1], last, gains, limits[2] * steps[min(i, n - 2)], limits[0], limits[1])
+        command[i] = fin
+        last = fin
+        if i == n - 1:
+            break
+        hold_fin(drive, i, limits[3] + fin + off[i, 0], limits[3] + fin + off[i, 1], push[i, 0], push[i, 1])
+        state = over_interval(k, kinds, drive, i, steps[i], pieces, -0.5 * steps[i], state)
+
+
+@lru_cache(maxsize=16)
+def prepared(scene: OperatingPoint, count: int, rate_hz: float) -> tuple[KernelInputs, FloatArray]:
+    """Return the core's arrays of a scene over `count` samples, without fin, and what a rad of fin adds to its drives, (n-1, 2).
+
+    That is the moment at both ends of each interval.
+    """
+    idle = scene.record(np.arange(count) / rate_hz, np.zeros(count))
+    arrays = assemble(idle, scene.effects, replace(scene.base, authority=0.0), scene.values, scene.scale)
+    factor = np.ones(count) if arrays.terms.authority_factor is None else arrays.terms.authority_factor
+    return arrays, scene.base.authority * np.column_stack([factor[:-1], factor[1:]])
+
+
+T = TypeVar("T")
+ACTUATOR_ROUNDS = 4
+"""Times the fin's own path is put back into the loop; each round removes what the one before left of its error."""
 
 
 @jit
@@ -86,8 +148,8 @@ def plant_of(scenes: Sequence[OperatingPoint], n: int, rate_hz: float, moments: 
     constants = np.empty((count, len(CONSTANTS)))
     pieces = 1
     for i, scene in enumerate(scenes):
-        ready = prepared(scene, n, rate_hz)
-        drive[i], constants[i], push[i] = ready.drive, ready.constants, ready.push
+        ready, push[i] = prepared(scene, n, rate_hz)
+        drive[i], constants[i] = ready.drive, ready.constants
         pieces = max(pieces, ready.pieces)
     if moments is not None:
         drive[:, :, MOMENT_START] += moments[:, :-1]
@@ -113,18 +175,18 @@ def fly_fins(
     command, angle, rate = (np.empty((plant.size, time.size)) for _ in range(3))
     low, high = np.minimum(-limits.fin - plant.trim, 0.0), np.maximum(limits.fin - plant.trim, 0.0)
     bounds = np.column_stack([low, high, np.full(plant.size, limits.fin_rate), plant.trim])
-    moving = any(e.fin is not None for s in scenes for e in s.effects)
-    gains, off, steps, out = pilot.gains, plant.off, np.diff(time), np.empty((time.size, 3))
-    idle = idle_records(scenes, time) if moving else {}
-    for left in reversed(range(ACTUATOR_ROUNDS if moving else 1)):
+    gains, steps, out = pilot.gains, np.diff(time), np.empty((time.size, 3))
+
+    def flown(off: FloatArray) -> FloatArray:
         for i in range(plant.size):
             closed_loop(
                 steps, plant.drive[i].copy(), plant.constants[i], plant.pieces, asked, off[i], plant.push[i], gains, bounds[i],
                 command[i], out,
             )  # fmt: skip
             angle[i], rate[i] = out[:, 0], out[:, 1]
-        if left:
-            off = np.stack([fin_offset(s, idle, command[i]) for i, s in enumerate(scenes)])
+        return command.T
+
+    _through_actuators(scenes, time, plant.off, flown, lambda fins: fins)
     return command.T, angle.T, rate.T
 
 
@@ -144,20 +206,41 @@ def fly_operating_points(
     if moments is not None:
         moments = np.pad(moments, ((0, 0), (0, max(0, time.size - moments.shape[1]))), mode="edge")[:, : time.size]
     plant = plant_of(scenes, time.size, schedule.rate_hz, moments)
+
+    def flown(off: FloatArray) -> Flight:
+        return fly(maneuver, parameters, plant.again(off), limits=limits, autopilot=autopilot, schedule=schedule)
+
+    return _through_actuators(scenes, time, plant.off, flown, lambda flight: flight.fin)
+
+
+def _through_actuators(
+    scenes: Sequence[OperatingPoint],
+    time: FloatArray,
+    off: FloatArray,
+    flown: Callable[[FloatArray], T],
+    commands: Callable[[T], FloatArray],
+) -> T:
+    """Return the last of some flights, each with the fins' own paths that the commands (k, m) of the one before make of it.
+
+    off (m, n-1, 2) is each fin's angle less its command about trim at both ends of every interval of `time` (n,), as it is for
+    the first of them; it stays zero after a flight's end.
+    """
     moving = any(e.fin is not None for s in scenes for e in s.effects)
-    off = plant.off
     for left in reversed(range(ACTUATOR_ROUNDS if moving else 1)):
-        flight = fly(maneuver, parameters, plant.again(off), limits=limits, autopilot=autopilot, schedule=schedule)
+        found = flown(off)
         if left:
-            idle = idle_records(scenes, time[: flight.fin.shape[0]])
-            before, off = off, np.stack([_offset(s, idle, flight.fin[:, i], time.size) for i, s in enumerate(scenes)])
+            told, before, off = commands(found), off, np.zeros_like(off)
+            idle = _idle(scenes, time[: told.shape[0]])
+            for i, scene in enumerate(scenes):
+                fin, held = told[:, i] + scene.trim_fin, told[:-1, i] + scene.trim_fin
+                real = fin_path(idle[scene.speed].with_fin(fin), scene.effects, scene.values)
+                off[i, : held.size] = np.column_stack([real.start - held, real.end - held])
             if np.array_equal(off, before):  # the next flight would be the same
                 break
-    return flight
+    return found
 
 
-def _offset(scene: OperatingPoint, idle: Mapping[float, Record], command: FloatArray, count: int) -> FloatArray:
-    """Return the fin's angle less its command over every interval of `count` samples, zero after the flight's end, (n-1, 2)."""
-    off = np.zeros((count - 1, 2))
-    off[: command.size - 1] = fin_offset(scene, idle, command)
-    return off
+def _idle(scenes: Sequence[OperatingPoint], time: FloatArray) -> dict[float, Record]:
+    """Return a record without a command at some times (n,) s for each speed of some scenes."""
+    none = np.zeros(time.size)
+    return {speed: command_record(scenes[0].axis, time, none, speed=speed) for speed in {s.speed for s in scenes}}

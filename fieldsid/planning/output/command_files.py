@@ -11,8 +11,7 @@ from fieldsid.artifacts import plain, write_text
 from fieldsid.errors import UsageError
 from fieldsid.logs.readers.bags.ros2_commands import write_commands
 from fieldsid.models.axis import NAMES
-from fieldsid.planning.design.abort_conditions import aborts_of
-from fieldsid.planning.design.leg import Leg, commands_of
+from fieldsid.planning.design.leg import Leg, aborts_of, commands_of
 from fieldsid.planning.design.plan import Plan
 from fieldsid.planning.output.mission import instead, refuse_blind, render, styles
 from fieldsid.planning.safety.envelope import NOT_LIMITED, limits_said

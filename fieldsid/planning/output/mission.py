@@ -1,4 +1,8 @@
-"""Mission snippets: a leg's commands and abort conditions rendered through the templates of `templates/plan/mission`."""
+"""Mission snippets: a leg's commands and abort conditions rendered through the templates of `templates/plan/mission`.
+
+A MOOS helm compares a variable with a number and knows no deviation from a start: the heading needs the leg's compass course,
+and where that is not known the script waits until somebody says that the heading is watched. Its area is a polygon.
+"""
 
 from __future__ import annotations
 
@@ -14,14 +18,94 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, TemplateError
 from fieldsid._version import __version__
 from fieldsid.errors import ArtifactError, UsageError
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.planning.design.abort_conditions import aborts_of
-from fieldsid.planning.design.leg import CIRCLE, Leg, commands_of
+from fieldsid.planning.design.leg import CIRCLE, Abort, Leg, aborts_of, commands_of
 from fieldsid.planning.design.plan import Plan
-from fieldsid.planning.output import helm
 from fieldsid.planning.safety.envelope import NOT_LIMITED, Envelope, limits_said
 from fieldsid.registry import near
 from fieldsid.templates import template_names, template_path
 from fieldsid.text.one_line import one_line
+
+PUBLISHED = {"surge_m_s": "NAV_SPEED", "depth_m": "NAV_DEPTH", "pitch_rad": "NAV_PITCH", "roll_rad": "NAV_ROLL"}
+ANY = 1e6
+"""Larger than any value: a condition that holds once a variable is published at all."""
+SPARE_M = 50.0
+"""Length before and beyond a leg of a polygon that stands for a limit to the sides alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """When a heading is watched, empty for always, and the condition that it is outside."""
+
+    when: str
+    outside: str
+
+
+@dataclass(frozen=True, slots=True)
+class Polygon:
+    """The corners of the area as a helm takes them, and from where they are."""
+
+    points: str
+    says: str
+
+
+def headings(leg: Leg, aborts: tuple[Abort, ...], course: float | None) -> tuple[Band, ...]:
+    """Return the bands of heading (deg) to be watched, there and back; none without a course, or beyond half a turn."""
+    limit = _limit(aborts, "yaw_rad", "deviation")
+    if limit is None or limit >= math.pi or course is None:
+        return ()
+    there, back = (_outside(course + turn, limit) for turn in (0.0, math.pi))
+    if leg.passes == 1:
+        return (Band("", there),)
+    return (Band("FIELDSID_RETURN = false", there), Band("FIELDSID_RETURN = true", back))
+
+
+def needed(leg: Leg, aborts: tuple[Abort, ...], course: float | None) -> tuple[str, ...]:
+    """Return the conditions without which a script must not start: everything that is watched is there."""
+    found = [f"{PUBLISHED[s]} >= -{ANY:.0f}" for s in dict.fromkeys(a.signal for a in aborts) if s in PUBLISHED]
+    if any(a.signal in ("x_m", "y_m") for a in aborts):
+        found += [f"NAV_X >= -{ANY:.0f}", f"NAV_Y >= -{ANY:.0f}"]
+    if headings(leg, aborts, course):
+        found.append(f"NAV_HEADING >= -{ANY:.0f}")
+        if leg.passes > 1:
+            found.append("(FIELDSID_RETURN = true) or (FIELDSID_RETURN = false)")
+    elif _limit(aborts, "yaw_rad", "deviation") is not None:
+        found.append("FIELDSID_HEADING_WATCHED = true")
+    return tuple(found)
+
+
+def polygon(leg: Leg, aborts: tuple[Abort, ...], course: float | None) -> Polygon | None:
+    """Return the area from the start of the run-up on, turned to the course where that is known; None where there is none."""
+    side = _limit(aborts, "y_m", "deviation")
+    if side is None:
+        return None
+    run_up = leg.run_up_s * leg.speed
+    far, near = _limit(aborts, "x_m", "above"), _limit(aborts, "x_m", "below")
+    end = far + run_up if far is not None else run_up + leg.window.length * leg.speed + SPARE_M
+    start = near + run_up if near is not None else -SPARE_M
+    corners = [(start, -side), (end, -side), (end, side), (start, side)]
+    if course is None:
+        says = "x along the leg from the start of its run-up, y to starboard: turn and shift it to the leg's line"
+    else:
+        corners = [_turned(a, s, course) for a, s in corners]
+        says = "x east and y north of the start of the run-up: shift it there"
+    return Polygon(" : ".join(f"{x:.1f},{y:.1f}" for x, y in corners), says)
+
+
+def _turned(along: float, side: float, course: float) -> tuple[float, float]:
+    """Return east and north of a point along a course (rad) and to starboard of it."""
+    sin, cos = math.sin(course), math.cos(course)
+    return along * sin + side * cos, along * cos - side * sin
+
+
+def _outside(course: float, limit: float) -> str:
+    low, high = (math.degrees(course + by) % 360.0 for by in (-limit, limit))
+    word = "or" if low < high else "and"
+    return f"(NAV_HEADING < {low:.2f}) {word} (NAV_HEADING > {high:.2f})"
+
+
+def _limit(aborts: tuple[Abort, ...], signal: str, kind: str) -> float | None:
+    return next((a.limit for a in aborts if (a.signal, a.kind) == (signal, kind)), None)
+
 
 FOLDER = "plan/mission"
 SUFFIX = ".j2"
@@ -120,9 +204,9 @@ def _context(plan: Plan, leg: Leg) -> dict[str, Any]:
         "unlimited": [n for n, words in limits_said(leg.envelope_in(plan.envelope)).items() if words == NOT_LIMITED],
         "degrees": math.degrees,
         "limit_of": {f"{a.signal}.{a.kind}": a.limit for a in aborts},
-        "headings": helm.headings(leg, aborts, plan.course),
-        "needed": helm.needed(leg, aborts, plan.course),
-        "polygon": helm.polygon(leg, aborts, plan.course),
+        "headings": headings(leg, aborts, plan.course),
+        "needed": needed(leg, aborts, plan.course),
+        "polygon": polygon(leg, aborts, plan.course),
     }
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fieldsid.artifacts import save_record
-from fieldsid.errors import ArtifactError, FieldsidError, shortened
+from fieldsid.errors import ArtifactError
 from fieldsid.maneuvers import Autopilot, pick_maneuver
 from fieldsid.models.allocation import plane_fins_of
 from fieldsid.models.axis import Axis
@@ -18,12 +18,15 @@ from fieldsid.planning.design.leg import Expected, Leg
 from fieldsid.planning.design.plan import MOST_PASSES, Plan
 from fieldsid.planning.flight.excitation import Excitation, Window, fits
 from fieldsid.planning.safety.envelope import LARGEST_SPEED, Envelope
+from fieldsid.planning.specify.quantities import MOST_SPEEDS
+from fieldsid.planning.whole_file import whole_file
+from fieldsid.records.check import finite_number
 from fieldsid.records.keys import body_of
 from fieldsid.records.reading import load_record
 
 KIND = "fieldsid/plan"
-MAX_LEG_S = 3600.0
-MOST_LEGS = 200
+MOST_LEGS = 3 * MOST_SPEEDS
+"""A leg of each speed, and a circle to either side."""
 
 
 def save_plan(plan: Plan, path: Path, *, inputs: Sequence[Path] = (), force: bool = False) -> Path:
@@ -37,18 +40,12 @@ def load_plan(path: Path) -> Plan:
     Raises ArtifactError naming what is missing, wrong or out of bounds.
     """
     body = load_record(path, KIND)
-    try:
+    with whole_file(path, "plan", "plan again, with `--force`"):
         return _plan_of(body)
-    except FieldsidError as error:
-        raise ArtifactError(f"`{path}`: {error.what}", found=error.found, hint=error.hint or "plan again") from error
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ArtifactError(
-            f"`{path}` is not a complete plan", found=f"{type(error).__name__}: {error}", hint="plan again, with `--force`"
-        ) from error
 
 
 def _plan_of(body: Mapping[str, Any]) -> Plan:
-    limits = {k: (None if v is None else _number(v, k)) for k, v in body["envelope"].items()}
+    limits = {k: (None if v is None else finite_number(v, k)) for k, v in body["envelope"].items()}
     limits["fin_rate"] = np.inf if limits.get("fin_rate") is None else limits["fin_rate"]
     envelope = Envelope(**limits)  # type: ignore[arg-type]
     legs = body["legs"]
@@ -60,22 +57,20 @@ def _plan_of(body: Mapping[str, Any]) -> Plan:
         prior=str(body["prior"]),
         envelope=envelope,
         legs=tuple(_leg_of(leg, envelope) for leg in legs),
-        want={str(k): _within(v, f"want {k}", 0.0, 1.0) for k, v in body["want"].items()},
+        want={str(k): finite_number(v, f"want {k}", 0.0, 1.0) for k, v in body["want"].items()},
         seed=int(body["seed"]),
-        course=None if body.get("course_rad") is None else _within(body["course_rad"], "course_rad", 0.0, 2.0 * math.pi),
+        course=None if body.get("course_rad") is None else _number(body, "course_rad", 0.0, 2.0 * math.pi),
         fins=None if body.get("fins") is None else plane_fins_of(body["fins"]),
     )
 
 
 def _leg_of(body: Mapping[str, Any], envelope: Envelope) -> Leg:
     maneuver = pick_maneuver(str(body["maneuver"]))
-    candidate = Excitation(maneuver.name, maneuver.checked({k: _number(v, k) for k, v in body["parameters"].items()}))
+    candidate = Excitation(maneuver.name, maneuver.checked({k: finite_number(v, k) for k, v in body["parameters"].items()}))
     _check_fins(candidate, envelope)
     w = body["window"]
-    lead, recover = (_within(w[k], k, 0.0, MAX_LEG_S) for k in ("lead_s", "recover_s"))
-    window = Window(
-        _within(w["length_s"], "length_s", 1.0, MAX_LEG_S), lead, recover, _within(body["rate_hz"], "rate_hz", 0.1, 1000.0)
-    )
+    length, lead, recover = (_number(w, k, 0.0) for k in ("length_s", "lead_s", "recover_s"))
+    window = Window(length, lead, recover, _number(body, "rate_hz"))
     if not fits(candidate, window):
         raise ArtifactError(
             f"{candidate.duration:.1f} s of `{maneuver.name}` do not fit a window of {window.length:g} s",
@@ -83,22 +78,20 @@ def _leg_of(body: Mapping[str, Any], envelope: Envelope) -> Leg:
         )
     pilot = body["autopilot"]
     return Leg(
-        speed=_within(body["speed_m_s"], "speed_m_s", 1e-3, LARGEST_SPEED),
+        speed=_number(body, "speed_m_s", 1e-3, LARGEST_SPEED),
         candidate=candidate,
         window=window,
-        run_up_s=_within(body["run_up_s"], "run_up_s", 0.0, MAX_LEG_S),
-        turn_s=_within(body["turn_s"], "turn_s", 0.0, MAX_LEG_S),
-        autopilot=Autopilot(_number(pilot["angle_gain"], "angle_gain"), _number(pilot["rate_gain"], "rate_gain"), envelope.fin),
+        run_up_s=_number(body, "run_up_s", 0.0),
+        turn_s=_number(body, "turn_s", 0.0),
+        autopilot=Autopilot(_number(pilot, "angle_gain"), _number(pilot, "rate_gain"), envelope.fin),
         expected={str(n): _expected(e) for n, e in body["expected"].items()},
-        excursions={str(k): _number(v, k) for k, v in body["excursions"].items()},
-        break_probability=_within(body["break_probability"], "break_probability", 0.0, 1.0),
-        passes=round(_within(body["passes"], "passes", 1, MOST_PASSES)),
+        excursions={str(k): finite_number(v, k) for k, v in body["excursions"].items()},
+        break_probability=_number(body, "break_probability", 0.0, 1.0),
+        passes=round(_number(body, "passes", 1, MOST_PASSES)),
         purpose=str(body["purpose"]),
-        heading=None
-        if body["heading_limit_rad"] is None
-        else _within(body["heading_limit_rad"], "heading_limit_rad", 1e-3, 30.0),
-        replay_risk=_risk(body.get("replay_break_probability")),
-        nominal=np.clip([_fin(v) for v in body.get("expected_fin_rad", [])], -envelope.fin, envelope.fin),
+        heading=None if body["heading_limit_rad"] is None else _number(body, "heading_limit_rad", 1e-3, 30.0),
+        replay_risk=_known(body.get("replay_break_probability"), "replay_break_probability", 0.0, 1.0),
+        nominal=np.clip([_known(v, "expected_fin_rad") for v in body.get("expected_fin_rad", [])], -envelope.fin, envelope.fin),
     )
 
 
@@ -117,22 +110,10 @@ def _expected(body: Mapping[str, Any]) -> Expected:
     return Expected(**{f: math.nan if body[f] is None else float(body[f]) for f in Expected.__dataclass_fields__})
 
 
-def _risk(value: Any) -> float:
-    return math.nan if value is None else _within(value, "replay_break_probability", 0.0, 1.0)
+def _number(body: Mapping[str, Any], name: str, *bounds: float) -> float:
+    return finite_number(body[name], name, *bounds)
 
 
-def _fin(value: Any) -> float:
-    return math.nan if value is None else _number(value, "expected_fin_rad")
-
-
-def _number(value: Any, name: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ArtifactError(f"`{name}` must be a finite number", found=shortened(value), hint=f"write a number after `{name}:`")
-    return float(value)
-
-
-def _within(value: Any, name: str, low: float, high: float) -> float:
-    number = _number(value, name)
-    if not low <= number <= high:
-        raise ArtifactError(f"`{name}` must be in {low:g} .. {high:g}", found=f"{number:g}", hint=f"correct `{name}`")
-    return number
+def _known(value: Any, *bounds: Any) -> float:
+    """Return a number that may not be known, NaN then."""
+    return math.nan if value is None else finite_number(value, *bounds)

@@ -27,24 +27,24 @@ ACCEPTED_SHARE = 0.05
 """Share of the draws of the prior that may leave an envelope, unless another is asked for."""
 NOT_LIMITED = "NOT LIMITED"
 _NO_LIMIT = ", or leave it out where there is no limit"
-OPTIONS: Mapping[str, tuple[str, str, str]] = {
-    "fin": ("--fin-max", "rad", "write `--fin-max 15deg`, or leave it out: the vehicle's own limit, else 0.26 rad"),
-    "fin_rate": ("--fin-rate", "rad/s", "write `--fin-rate 60deg`, or leave it out: the vehicle's own, else no limit"),
-    "heading": ("--max-heading", "rad", "write `--max-heading 60deg`, or `--max-heading none` where there is no limit"),
-    "track": ("--max-track", "m", f"write `--max-track 20`{_NO_LIMIT}"),
-    "pitch": ("--max-pitch", "rad", "write `--max-pitch 30deg`, or `--max-pitch none` where there is no limit"),
-    "roll": ("--max-roll", "rad", f"write `--max-roll 20deg`{_NO_LIMIT}"),
-    "area_length": ("--area", "m long", f"write `--area 200x60`{_NO_LIMIT}"),
-    "area_width": ("--area", "m wide", f"write `--area 200x60`{_NO_LIMIT}"),
-    "share": ("--risk", "", f"no maneuver is without risk: write `--risk 0.01`, or leave it out for {ACCEPTED_SHARE:g}"),
-}
-"""Of each limit: the option, its unit, and what to write instead of zero."""
-
-
-SET_BY = {
-    "heading": "--max-heading", "track": "--max-track", "depth": "--depth-band", "pitch": "--max-pitch", "roll": "--max-roll",
-    "along": "--area", "across": "--area",
+OPTIONS: Mapping[str, tuple[str, str, float, str]] = {
+    "fin": ("--fin-max", "rad", LARGEST_FIN, "write `--fin-max 15deg`, or leave it out: the vehicle's own limit, else 0.26 rad"),
+    "fin_rate": ("--fin-rate", "rad/s", np.inf, "write `--fin-rate 60deg`, or leave it out: the vehicle's own, else no limit"),
+    "heading": (
+        "--max-heading", "rad", MOST_TURNS * 2.0 * np.pi,
+        "write `--max-heading 60deg`, or `--max-heading none` where there is no limit",
+    ),
+    "track": ("--max-track", "m", np.inf, f"write `--max-track 20`{_NO_LIMIT}"),
+    "pitch": ("--max-pitch", "rad", np.pi / 2, "write `--max-pitch 30deg`, or `--max-pitch none` where there is no limit"),
+    "roll": ("--max-roll", "rad", np.pi / 2, f"write `--max-roll 20deg`{_NO_LIMIT}"),
+    "area_length": ("--area", "m long", np.inf, f"write `--area 200x60`{_NO_LIMIT}"),
+    "area_width": ("--area", "m wide", np.inf, f"write `--area 200x60`{_NO_LIMIT}"),
+    "share": ("--risk", "", 0.5, f"no maneuver is without risk: write `--risk 0.01`, or leave it out for {ACCEPTED_SHARE:g}"),
 }  # fmt: skip
+"""Of each limit: the option, its unit, the most that can be meant, and what to write instead of zero."""
+SET_BY = {"depth": "--depth-band", "along": "--area", "across": "--area"} | {
+    name: option for name, (option, *_) in OPTIONS.items()
+}
 """The option of `sysid plan` that sets the room for an excursion."""
 
 
@@ -71,14 +71,15 @@ class Envelope:
     share: Annotated[float, Key("Accepted probability of leaving them.")] = ACCEPTED_SHARE
 
     def __post_init__(self) -> None:
-        for name in ("fin", "fin_rate", "heading", "track", "pitch", "roll", "area_length", "area_width", "share"):
-            _positive(name, getattr(self, name))
-        _refuse_idle(self.fin)
-        _at_most("fin", self.fin, LARGEST_FIN, "rad", "fin angle")
-        for name in ("pitch", "roll"):
-            _at_most(name, getattr(self, name), np.pi / 2, "rad", f"{name} limit")
-        _at_most("heading", self.heading, MOST_TURNS * 2 * np.pi, "rad", "heading limit")
-        _at_most("share", self.share, 0.5, "", "accepted probability")
+        for name in OPTIONS:
+            if (value := getattr(self, name)) is not None:
+                _refuse_meaningless(name, value)
+        if self.fin < LEAST_FIN:
+            raise UsageError(
+                f"a fin of {degrees(self.fin):.2g} deg at most turns no vehicle",
+                found=f"--fin-max {self.fin:.3g} rad, least {degrees(LEAST_FIN):.2g} deg",
+                hint=OPTIONS["fin"][-1],
+            )
         low, high = self.depth_low, self.depth_high
         if low is not None and high is not None and not 0 <= low < high:
             raise UsageError(
@@ -203,28 +204,16 @@ def check_room(envelope: Envelope, speeds: tuple[float, ...], run_up_s: float, s
         )
 
 
-def _positive(name: str, value: float | None) -> None:
-    if value is not None and not value > 0:
-        option, unit, hint = OPTIONS[name]
-        raise UsageError(f"`{option}` must be above zero", found=f"{option} {value:.4g} {unit}".rstrip(), hint=hint)
-
-
-def _refuse_idle(fin: float) -> None:
-    if fin < LEAST_FIN:
-        raise UsageError(
-            f"a fin of {degrees(fin):.2g} deg at most turns no vehicle",
-            found=f"--fin-max {fin:.3g} rad, least {degrees(LEAST_FIN):.2g} deg",
-            hint=OPTIONS["fin"][2],
-        )
-
-
-def _at_most(name: str, value: float | None, most: float, unit: str, says: str) -> None:
-    if value is not None and value > most:
+def _refuse_meaningless(name: str, value: float) -> None:
+    """Raise UsageError for a limit of zero, or of more than can be meant."""
+    option, unit, most, hint = OPTIONS[name]
+    given = f"{option} {value:.4g} {unit}".rstrip()
+    if not value > 0.0:
+        raise UsageError(f"`{option}` must be above zero", found=given, hint=hint)
+    if value > most:
         meant = unit == "rad" and value > 2.0 * most and np.radians(value) <= most
-        degrees = f"write `{value:g}deg` if it is in degrees" if meant else f"at most {most:.4g} {unit}".rstrip()
-        raise UsageError(
-            f"the {says} {value:g} {unit}".rstrip() + " cannot be right", found=f"{name} = {value:g}, most {most:g}", hint=degrees
-        )
+        hint = f"write `{value:g}deg` if it is in degrees" if meant else f"at most {most:.4g} {unit}".rstrip()
+        raise UsageError(f"`{given}` cannot be right", found=f"{name} = {value:g}, most {most:g}", hint=hint)
 
 
 def limits_said(envelope: Envelope) -> dict[str, str]:

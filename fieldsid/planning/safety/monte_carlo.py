@@ -40,11 +40,10 @@ class Ensemble:
 
 @dataclass(frozen=True, slots=True)
 class Flights:
-    """The flights of an ensemble: time (n,) s, angle and rate (n, m), and the largest excursions: name -> (m,) rad or m."""
+    """The flights of an ensemble: time (n,) s, angle (n, m), tracks (n, m) m, and largest excursions: name -> (m,) rad or m."""
 
     time: FloatArray
     angle: FloatArray
-    rate: FloatArray
     along: FloatArray
     side: FloatArray
     excursions: dict[str, FloatArray]
@@ -52,10 +51,6 @@ class Flights:
     def outside(self, envelope: Envelope) -> BoolArray:
         """Return which draws left the envelope, (m,)."""
         return np.asarray(used(self.excursions, envelope) > 1.0)
-
-    def quantiles(self, share: float) -> dict[str, float]:
-        """Return a quantile of every excursion."""
-        return {k: float(np.quantile(v, share)) for k, v in self.excursions.items()}
 
 
 def draw_ensemble(model: Model, speed: float, window: Window, count: int, seed: int) -> Ensemble:
@@ -99,4 +94,4 @@ def _measured(crowd: Ensemble, angle: FloatArray, rate: FloatArray, run_up_m: fl
     """Return the flights with their excursions."""
     step, speed = 1.0 / crowd.window.rate_hz, crowd.scenes[0].speed
     far = excursions_of(crowd.axis, angle, rate, speed=speed, step=step, run_up=run_up_m, roll_gain=crowd.roll)
-    return Flights(crowd.window.time[: angle.shape[0]], angle, rate, *track_of(crowd.axis, angle, speed, step), far)
+    return Flights(crowd.window.time[: angle.shape[0]], angle, *track_of(crowd.axis, angle, speed, step), far)

@@ -1,56 +1,105 @@
-"""Numbers as a user types them: an area like `200x60`, a band like `1:5`, lists of speeds; angles are read in `angles.py`."""
+"""What a user types: an area `200x60`, a band `1:5`, speeds, accuracies `a22=5%,b2=3%`; angles are read in `angles.py`."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from math import ceil, floor, log10
 
 import numpy as np
 
 from fieldsid.errors import UsageError
+from fieldsid.registry import near
 
 MOST_SPEEDS = 50
 
 
-def parse_area(text: str | None) -> tuple[float, float] | None:
+def parse_area(text: str | None) -> tuple[float, float] | tuple[None, None]:
     """Read `LxW` in m, length along the leg and width across it; raises UsageError."""
-    if text is None:
-        return None
-    length, cross, width = text.lower().partition("x")
-    if not cross:
-        raise UsageError(f"{text!r} is not an area", found=f"--area {text}", hint="length x width in metres: `--area 200x60`")
-    return _number(length, "--area", text, "200x60"), _number(width, "--area", text, "200x60")
+    return _two(text, "x", "an area", "--area", "length x width in metres: `--area 200x60`")
 
 
-def parse_band(text: str | None) -> tuple[float, float] | None:
+def parse_band(text: str | None) -> tuple[float, float] | tuple[None, None]:
     """Read `shallowest:deepest` in m; raises UsageError."""
+    return _two(text, ":", "a depth band", "--depth-band", "for example `--depth-band 1:5`")
+
+
+def _two(text: str | None, between: str, what: str, option: str, hint: str) -> tuple[float, float] | tuple[None, None]:
+    """Return two numbers as they are typed, None and None where nothing is."""
     if text is None:
-        return None
-    low, colon, high = text.partition(":")
-    if not colon:
-        raise UsageError(f"{text!r} is not a depth band", found=f"--depth-band {text}", hint="for example `--depth-band 1:5`")
-    return _number(low, "--depth-band", text, "1:5"), _number(high, "--depth-band", text, "1:5")
+        return None, None
+    first, mark, second = text.lower().partition(between)
+    if not mark:
+        raise UsageError(f"{text!r} is not {what}", found=f"{option} {text}", hint=hint)
+    return read_number(first, option, text, hint), read_number(second, option, text, hint)
 
 
 def parse_speeds(text: str) -> tuple[float, ...]:
     """Read `1.0,1.4,1.8` or `1.0:1.8:0.4` in m/s, without repeats; raises UsageError."""
     if ":" in text:
-        parts = [_number(p, "--speeds", text, "1.0:1.8:0.4") for p in text.split(":")]
+        hint = "low:high:step, for example `--speeds 1.0:1.8:0.4`"
+        parts = [read_number(p, "--speeds", text, hint) for p in text.split(":")]
         if len(parts) != 3 or parts[2] <= 0 or parts[1] < parts[0]:
-            hint = "low:high:step, for example `--speeds 1.0:1.8:0.4`"
             raise UsageError(f"{text!r} is not a range of speeds", found=f"--speeds {text}", hint=hint)
         count = int(np.floor((parts[1] - parts[0]) / parts[2] + 1e-9)) + 1
         if count > MOST_SPEEDS:
             raise UsageError(f"{count} speeds are too many", found=f"--speeds {text}", hint=f"give at most {MOST_SPEEDS}")
         return tuple(round(parts[0] + i * parts[2], 9) for i in range(count))
-    speeds = [_number(p, "--speeds", text, "1.0,1.4,1.8") for p in text.split(",") if p.strip()]
+    speeds = [read_number(p, "--speeds", text, "for example `--speeds 1.0,1.4,1.8`") for p in text.split(",") if p.strip()]
     return tuple(dict.fromkeys(speeds[:MOST_SPEEDS]))
 
 
-def _number(text: str, option: str, whole: str, example: str) -> float:
+def read_number(text: str, option: str, whole: str, hint: str) -> float:
+    """Return a number as it is typed in the `whole` of an option; raises UsageError."""
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise UsageError(f"{text.strip()!r} is not a number", found=f"{option} {whole}", hint=f"for example `{option} {example}`")
+        raise UsageError(f"{text.strip()!r} is not a number", found=f"{option} {whole}", hint=hint)
     return value
+
+
+MIN_RELATIVE_ERROR, MAX_RELATIVE_ERROR = 1e-4, 1.0
+"""Relative errors that can be asked for."""
+
+
+def parse_accuracy_goals(text: str, known: Sequence[str]) -> dict[str, float]:
+    """Read `name=5%` or `name=0.05`, separated by commas, as relative standard errors.
+
+    Raises UsageError for an unknown parameter (with near matches), a value that is not a number or cannot be meant.
+    """
+    out: dict[str, float] = {}
+    for item in filter(None, (part.strip() for part in text.split(","))):
+        name, equals, value = (part.strip() for part in item.partition("="))
+        if not equals:
+            raise UsageError(f"{item!r} is not a wish", found=f"--want {text}", hint=f"write it like `--want {known[0]}=5%`")
+        if name not in known:
+            raise UsageError(
+                f"there is no parameter named {name!r} in the prior", found=", ".join(known), hint=near(name, list(known))
+            )
+        out[name] = _share(value, name, text)
+    return out
+
+
+def _share(value: str, name: str, text: str) -> float:
+    number = read_number(value.removesuffix("%"), "--want", text, f"write it like `--want {name}=5%`")
+    share = number * (0.01 if value.endswith("%") else 1.0)
+    if not MIN_RELATIVE_ERROR <= share <= MAX_RELATIVE_ERROR:
+        raise UsageError(
+            f"a standard error of {100 * share:g}% of {name} cannot be meant",
+            found=f"--want {text}",
+            hint=f"give {100 * MIN_RELATIVE_ERROR:g}% .. {100 * MAX_RELATIVE_ERROR:g}%, for example `--want {name}=5%`",
+        )
+    return share
+
+
+def accuracy_goals_text(wish: Mapping[str, float]) -> str:
+    """Return accuracy goals as the user would type them, each share rounded up to two digits."""
+    return ",".join(f"{n}={_up(100 * s):g}%" for n, s in wish.items())
+
+
+def _up(value: float) -> float:
+    """Round up to two significant digits, so that what is offered can be kept."""
+    step = 10.0 ** (floor(log10(value)) - 1)
+    return round(ceil(value / step - 1e-9) * step, 10)

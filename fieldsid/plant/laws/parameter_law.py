@@ -27,7 +27,6 @@ MIN_DEGREES_OF_FREEDOM = 2
 (rounded digits make such) put a third any number of its standard errors off."""
 AUTHORITY = (("affine", (0.0, 2.0)), ("through_zero", (2.0,)))
 OTHERS = (("constant", (0.0,)), ("linear", (0.0, 1.0)), ("affine", (0.0, 2.0)))
-EXPONENT_OF_LIFT = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,7 +206,7 @@ def _exponent(power: Regression) -> Exponent:
     half = t_factor(power.dof) * error
     p = float("nan")
     if power.dof > 0 and error > 0:
-        p = 2.0 * student_tail(abs(value - EXPONENT_OF_LIFT) / error, power.dof)
+        p = 2.0 * student_tail(abs(value - 2.0) / error, power.dof)
     return Exponent(value, error, (value - half, value + half), p)
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from fieldsid.display import Brief
 from fieldsid.errors import DataError
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.arrays import FloatArray, known
 from fieldsid.numerics.tail_probabilities import student_quantile
 from fieldsid.records.check import ShapeError, finite_number
 from fieldsid.records.keys import Key, Number
@@ -82,8 +82,8 @@ def regression_of(record: Mapping[str, Any]) -> Regression:
         coefficients=np.array(coefficients, dtype=np.float64),
         covariance=np.array(covariance, dtype=np.float64).reshape(count, count),
         dof=record["dof"],
-        r2=_number(record["r2"]),
-        rms=_number(record["rms"]),
+        r2=known(record["r2"]),
+        rms=known(record["rms"]),
     )
 
 
@@ -147,7 +147,3 @@ def _r2(value: FloatArray, error: FloatArray) -> float:
 
 def _rms(error: FloatArray) -> float:
     return float(np.sqrt(np.mean(error**2)))
-
-
-def _number(value: Any) -> float:
-    return float("nan") if value is None else float(value)

@@ -15,11 +15,9 @@ from fieldsid.models.hull import Core, Kinds, core_at, kinds_of, named, power, s
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import inner, jit
 
-SPEED, KP, KI, KD, BIAS, REFERENCE_GAIN, FIN_LIMIT, DEPTH_GAIN = range(8)
-GAIN_COLUMNS = 8
+GAINS = SPEED, KP, KI, KD, BIAS, REFERENCE_GAIN, FIN_LIMIT, DEPTH_GAIN = tuple(range(8))
 """Columns of the gains' rows."""
-ANGLE, FIN, DEPTH, SURGE = range(4)
-OUT_COLUMNS = 4
+MOTION = ANGLE, FIN, DEPTH, SURGE = tuple(range(4))
 """Columns of the motion."""
 DIVERGED_RATE_RAD_S = 20.0
 SLOWEST_SHARE = 0.05

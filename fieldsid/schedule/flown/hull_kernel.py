@@ -9,11 +9,8 @@ import numpy as np
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 from fieldsid.schedule.flown.closed_loop_kernel import DIVERGED_RATE_RAD_S, at_rest, commanded, gains_at
-from fieldsid.turning.maneuvering.equations import LEAST_SURGE_M_S, OFFSET, rudder_lift, slope
-
-SETTINGS = 5
-"""Columns of a vehicle's row: which way the fin turns (1 to port as the equations' rudder, else -1), its offset (rad), lag (s),
-largest rate (rad/s), delay (s)."""
+from fieldsid.turning.maneuvering.equations import OFFSET, rudder_lift, slope
+from fieldsid.turning.steady.transient import LEAST_SURGE_M_S
 
 
 @jit
@@ -29,8 +26,9 @@ def close_hull_loop(
 ) -> None:
     """Fill out (n, t, 4) with heading, fin command, depth (nil) and surge of n vehicles (n, 22) under the gains of table (k, 8).
 
-    settings (n, 5); push (t,) is a disturbance moment in rad/s^2; a loop starts from where it rests on a straight run at `speed`
-    m/s. What diverges is inf from there on.
+    settings (n, 5): which way the fin turns (1 to port as the equations' rudder, else -1), its offset (rad), lag (s), largest
+    rate (rad/s), delay (s). push (t,) is a disturbance moment in rad/s^2; a loop starts from where it rests on a
+    straight run at `speed` m/s. What diverges is inf from there on.
     """
     now = np.empty(table.shape[1])
     for case in range(hulls.shape[0]):

@@ -6,16 +6,16 @@ import numpy as np
 
 from fieldsid.dynamics.steady_kernel import settled_rates, straight_slopes
 from fieldsid.models.hull import CONSTANTS
-from fieldsid.schedule.flown.closed_loop_kernel import GAIN_COLUMNS, OUT_COLUMNS, Plants, close_loop
-from fieldsid.schedule.flown.hull_kernel import SETTINGS, close_hull_loop
-from fieldsid.schedule.flown.pace import STEP_S
+from fieldsid.schedule.flown.closed_loop_kernel import GAINS, MOTION, Plants, close_loop
+from fieldsid.schedule.flown.hull_kernel import close_hull_loop
+from fieldsid.schedule.flown.response import STEP_S
 from fieldsid.turning.maneuvering.equations import NAMES, about_straight, settle, simulate
 from fieldsid.turning.steady.speed_loss import simulated
 
 
 def compile_loops() -> None:
     """Call once, on vehicles of which every coefficient is one, what a turn, the gains and their check call."""
-    none, push, out = np.zeros((1, GAIN_COLUMNS)), np.zeros(2), np.zeros((1, 2, OUT_COLUMNS))
+    none, push, out = np.zeros((1, len(GAINS))), np.zeros(2), np.zeros((1, 2, len(MOTION)))
     p, time = np.ones(len(NAMES)), np.array([0.0, STEP_S])
     time.setflags(write=False)  # as that of a run is
     simulate(p, 1.0, np.ones((1, 3)), np.zeros(1, dtype=np.int64), time, np.zeros((1, 2)), np.ones(2), STEP_S)
@@ -27,4 +27,4 @@ def compile_loops() -> None:
     straight_slopes(rows)
     settled_rates(rows, row, row, row, 1.0, np.zeros(0), np.zeros(0), np.zeros(1))
     close_loop(plants, none, 0.0, 0.0, 0.0, 1.0, STEP_S, push, out)
-    close_hull_loop(p[None], np.ones((1, SETTINGS)), none, 0.0, 1.0, STEP_S, push, out)
+    close_hull_loop(p[None], np.ones((1, 5)), none, 0.0, 1.0, STEP_S, push, out)

@@ -1,21 +1,85 @@
-"""Closed loops in time of every draw of a plant: steps, dives, a straight leg; and what is read off them."""
+"""Closed loops in time of every draw of a plant: steps, dives, a straight leg; and what is read off them.
+
+How finely and how long one is flown goes by the time constants of its plant, not by a clock of its own. With the whole fin at
+the largest error a plant answers within 1/w, w^2 = k + |b| delta/e. Loops between the two bandwidths below are flown at one pace,
+for 60 s in steps of 0.02 s; slower and quicker ones for as many steps that are as much longer or shorter.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 import numpy.typing as npt
 
 from fieldsid.display import Brief
+from fieldsid.models.model import Noise
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.schedule.flown.closed_loop_kernel import OUT_COLUMNS, Plants, close_loop
+from fieldsid.schedule.flown.closed_loop_kernel import MOTION, Plants, close_loop
 from fieldsid.schedule.flown.hull_kernel import close_hull_loop
-from fieldsid.schedule.flown.pace import STEP_S
 from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.record import Row
 from fieldsid.turning.steady.transient import LEAST_SURGE_M_S
+
+STEP_S, FLIGHT_S = 0.02, 60.0
+SLOWEST_RAD_S, QUICKEST_RAD_S = 25.0 / FLIGHT_S, 2.0
+"""Bandwidths of the full fin: below the first 60 s are fewer than 25 times 1/w, above the second 0.02 s are coarse."""
+LEAST_RAD_S = 1e-4
+"""No fin is so weak."""
+LARGEST_TURN = 0.2
+"""Of the hull's fastest own motion in one step, rad: the midpoint rule is off by less than a hundredth of it."""
+LONGER = (1.0, 2.0, 4.0)
+"""What has not come to rest is flown twice as long, and twice as long again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """Time step and length of a flight, s."""
+
+    step: float = STEP_S
+    flight: float = FLIGHT_S
+
+    @property
+    def longest(self) -> float:
+        """How long a step is flown that does not come to rest, s."""
+        return LONGER[-1] * self.flight
+
+    @property
+    def leg(self) -> float:
+        """How long a straight leg and a step of depth are flown, s."""
+        return 2.0 * self.flight
+
+
+def full_bandwidth(plant: LinearPlant, fin_limit: float, error: float) -> float:
+    """Return the bandwidth (rad/s) of the estimate that uses the full fin at an error (rad): faster would only saturate."""
+    return float(np.sqrt(max(plant.stiffness[0], 0.0) + abs(plant.slow_authority[0]) * fin_limit / error))
+
+
+def pace_of(plant: LinearPlant, fin_limit: float, error: float) -> Pace:
+    """Return the pace of a plant whose fin is limited to +/-fin_limit rad, for steps about `error` rad."""
+    bandwidth = max(full_bandwidth(plant, fin_limit, error), LEAST_RAD_S)
+    times = SLOWEST_RAD_S / min(bandwidth, SLOWEST_RAD_S) * QUICKEST_RAD_S / max(bandwidth, QUICKEST_RAD_S)
+    damping, stiffness, crossed, of_rate, of_fin = plant.straight
+    own = (damping, np.sqrt(np.abs(stiffness)), np.where((of_rate != 0.0) | (of_fin != 0.0), crossed, 0.0))
+    fastest = max(float(np.max(np.abs(part))) for part in own)
+    most = max(LARGEST_TURN / max(fastest, LEAST_RAD_S), STEP_S)
+    return Pace(STEP_S * times if times <= 1.0 else min(STEP_S * times, most), FLIGHT_S * times)
+
+
+LEG_SEED = 5
+
+
+def disturbance_moment(noise: Noise | None, pace: Pace) -> FloatArray:
+    """Return a moment (t,) in rad/s^2, one value for each time step of a pace: zero where no model has measured any."""
+    count = round(pace.leg / pace.step) + 1
+    if noise is None or not noise.disturbance > 0.0:
+        return np.zeros(count)
+    keep = float(np.exp(-pace.step / max(noise.disturbance_time, pace.step)))
+    white = np.random.default_rng(LEG_SEED).standard_normal(count) * np.sqrt(1.0 - keep**2)
+    return noise.disturbance * np.array(list(accumulate(white.tolist(), lambda moment, now: keep * moment + now)))
+
 
 HULL_STEPS = 2.0
 """Steps of a plant in one of a flight in surge, sway and yaw: half of it moves the settling by less than a hundredth."""
@@ -88,50 +152,21 @@ def steady_error(values: FloatArray, wanted: float) -> FloatArray:
     return np.asarray(wanted - values[-tail:].mean(axis=0))
 
 
-def step_response(
-    plant: LinearPlant,
-    rows: Sequence[Row] | Row,
-    *,
-    reference: float,
-    seconds: float,
-    offset: float = 0.0,
-    step_s: float = STEP_S,
-) -> Steps:
-    """Return the response of every draw of a plant to a step of the reference (rad) at time 0, under a row's gains or rows'.
-
-    `offset` (rad) is added to the fin: a bent fin, on top of the plant's own trim. `step_s` (s) is the plant's time step.
-    """
-    return _run(plant, rows, _Flight(seconds, step_s, reference=reference, offset=offset))
-
-
-def depth_response(
-    plant: LinearPlant,
-    rows: Sequence[Row] | Row,
-    *,
-    step: float,
-    seconds: float,
-    pitch_limit: float,
-    step_s: float = STEP_S,
-) -> Steps:
-    """Return the response to a step of the wanted depth (m) through pitch, z' = -u theta, pitch asked within pitch_limit."""
-    return _run(plant, rows, _Flight(seconds, step_s, depth=step, pitch_limit=pitch_limit))
-
-
-def leg_response(plant: LinearPlant, rows: Sequence[Row] | Row, *, push: FloatArray, step_s: float = STEP_S) -> Steps:
-    """Return a straight leg under a disturbance moment push (t,) rad/s^2, a value for each time step of `step_s` s."""
-    return _run(plant, rows, _Flight(step_s * (push.size - 1), step_s), push)
-
-
 @dataclass(frozen=True, slots=True)
-class _Flight:
-    """What is flown for `seconds` in steps of `step` s: reference (rad), depth (m) within a pitch (rad), fin offset (rad)."""
+class Flight:
+    """What is flown for `seconds` in steps of `step` s: a step of the reference (rad) at time 0, or of the depth that is wanted.
+
+    The depth (m) goes through pitch, z' = -u theta, which is asked within `pitch_limit` rad. `offset` (rad) is added to the fin:
+    a bent fin, on top of the plant's own trim. `push` (t,) is a disturbance moment in rad/s^2, a value for each step.
+    """
 
     seconds: float
-    step: float
+    step: float = STEP_S
     reference: float = 0.0
     depth: float = 0.0
     pitch_limit: float = 0.0
     offset: float = 0.0
+    push: FloatArray | None = None
 
     def times(self, steps: float = 1.0) -> FloatArray:
         """Return the times (t,) s of a flight in steps of so many of its own."""
@@ -139,46 +174,30 @@ class _Flight:
         return whole * np.arange(round(self.seconds / whole) + 1, dtype=np.float64)
 
 
-def _run(plant: LinearPlant, rows: Sequence[Row] | Row, flight: _Flight, push: FloatArray | None = None) -> Steps:
-    if plant.hull is not None:
-        return _run_hulls(plant, plant.hull, rows, flight, push)
-    of_damping, of_authority, of_core, drag, fin_loss, turn_loss = (
-        np.ascontiguousarray(part) for part in (*plant.powers[:, :2].T, plant.powers[:, 2:], *plant.speed_loss.T)
-    )
-    plants = Plants(
-        plant.damping, plant.stiffness, plant.authority, plant.offset + flight.offset, np.ascontiguousarray(plant.core),
-        of_damping, of_authority, of_core, np.exp(-flight.step / np.maximum(plant.lag, FASTEST_LAG_S)),
-        np.round(plant.delay / flight.step), np.minimum(plant.fin_rate, 1e6) * flight.step, drag, fin_loss, turn_loss,
-    )  # fmt: skip
-    time = flight.times()
-    out = np.zeros((plant.count, time.size, OUT_COLUMNS))
-    pushed = np.zeros(time.size) if push is None else push
-    asked = (flight.reference, flight.depth, flight.pitch_limit)
-    close_loop(plants, _table(rows), *asked, plant.speed, flight.step, pushed, out)
-    return _steps(time, out)
-
-
-def _run_hulls(
-    plant: LinearPlant, hull: FloatArray, rows: Sequence[Row] | Row, flight: _Flight, push: FloatArray | None
-) -> Steps:
-    """Return the flights of a plant's vehicles in surge, sway and yaw."""
-    way = np.where(plant.authority < 0.0, 1.0, -1.0)
-    limited = np.minimum(plant.fin_rate, 1e6)
-    settings = np.column_stack([way, plant.offset + flight.offset, np.maximum(plant.lag, FASTEST_LAG_S), limited, plant.delay])
-    time, step = flight.times(HULL_STEPS), HULL_STEPS * flight.step
-    pushed = np.zeros(time.size) if push is None else np.interp(time, flight.times(), push)
-    out = np.zeros((plant.count, time.size, OUT_COLUMNS))
-    close_hull_loop(np.ascontiguousarray(hull), settings, _table(rows), flight.reference, plant.speed, step, pushed, out)
-    return _steps(time, out)
-
-
-def _steps(time: FloatArray, out: FloatArray) -> Steps:
-    angle, fin, deep, speed = (np.ascontiguousarray(out[:, :, j].T) for j in range(OUT_COLUMNS))
-    return Steps(time, angle, fin, deep, speed)
-
-
-def _table(rows: Sequence[Row] | Row) -> FloatArray:
-    return np.array([_gains(r) for r in ([rows] if isinstance(rows, Row) else rows)])
+def fly(plant: LinearPlant, rows: Sequence[Row], flight: Flight) -> Steps:
+    """Return a flight of every draw of a plant under the gains of rows; where the draws are of hulls, of these."""
+    coarser = 1.0 if plant.hull is None else HULL_STEPS
+    time, step, own = flight.times(coarser), coarser * flight.step, flight.times()
+    pushed = np.interp(time, own, np.zeros(own.size) if flight.push is None else flight.push)
+    out = np.zeros((plant.count, time.size, len(MOTION)))
+    table = np.array([_gains(row) for row in rows])
+    lag, fin_rate = np.maximum(plant.lag, FASTEST_LAG_S), np.minimum(plant.fin_rate, 1e6)
+    offset = plant.offset + flight.offset
+    if plant.hull is None:
+        of_damping, of_authority, of_core, drag, fin_loss, turn_loss = (
+            np.ascontiguousarray(part) for part in (*plant.powers[:, :2].T, plant.powers[:, 2:], *plant.speed_loss.T)
+        )
+        plants = Plants(
+            plant.damping, plant.stiffness, plant.authority, offset, np.ascontiguousarray(plant.core), of_damping, of_authority,
+            of_core, np.exp(-step / lag), np.round(plant.delay / step), fin_rate * step, drag, fin_loss, turn_loss,
+        )  # fmt: skip
+        asked = (flight.reference, flight.depth, flight.pitch_limit)
+        close_loop(plants, table, *asked, plant.speed, step, pushed, out)
+    else:
+        way = np.where(plant.authority < 0.0, 1.0, -1.0)
+        settings = np.column_stack([way, offset, lag, fin_rate, plant.delay])
+        close_hull_loop(np.ascontiguousarray(plant.hull), settings, table, flight.reference, plant.speed, step, pushed, out)
+    return Steps(time, *(np.ascontiguousarray(out[:, :, j].T) for j in MOTION))
 
 
 def _gains(row: Row) -> tuple[float, ...]:

@@ -2,23 +2,24 @@
 
 The estimate has the damping and phase margin asked; 95 % of the draws of its errors leave half of the margin and fly the step,
 with the fin's limits, the speed lost in the turn and the drag of the turning hull. P and PI have the largest gain that lets them,
-unless a time to settle or a bandwidth is asked. Feed-forward is -delta_r0 (-delta_s0 in pitch, plus c23/d2 of the reference).
+unless a time to settle or a bandwidth is asked. What binds them is the fin, the answer asked, or the requirement that a little
+more bandwidth would not keep. Feed-forward is -delta_r0 (-delta_s0 in pitch, plus c23/d2 of the reference).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import degrees
 
 import numpy as np
 
 from fieldsid.errors import ModelError
-from fieldsid.schedule.controller import Gains
+from fieldsid.rounding import number
+from fieldsid.schedule.controller import FREQUENCY_GRID_RAD_S, HELD_SHARE, Gains, margins, worst_of
 from fieldsid.schedule.linear_plant import LinearPlant
-from fieldsid.schedule.margins import FREQUENCY_GRID_RAD_S, HELD_SHARE, margins, worst_of
 from fieldsid.schedule.record import Row
-from fieldsid.schedule.search.binding import bound_by
 from fieldsid.schedule.search.formulas import bandwidth_of
-from fieldsid.schedule.search.objective import BETTER_SHARE, LACK_ROUNDING, Place, demand_of
+from fieldsid.schedule.search.objective import BETTER_SHARE, DRAWS_MARGIN_SHARE, ROUNDING, Demand, Place, demand_of
 from fieldsid.schedule.search.optimum import Found, Search
 from fieldsid.schedule.wish import PROPORTIONAL, QUICKEST, Wish
 
@@ -141,7 +142,7 @@ def _found(family: LinearPlant, wish: Wish, fin_limit: float) -> Found | None:
     """Return the quickest gains; None where they do not serve the estimate, or with P and PI not half of the draws."""
     search = _search(family, wish, fin_limit)
     found = search.quickest()
-    if sum(found.outcome.own) > LACK_ROUNDING:
+    if sum(found.outcome.own) > ROUNDING:
         return None
     return None if wish.kind in PROPORTIONAL and search.place.held(found.gains)[0] < LEAST_HELD else found
 
@@ -195,3 +196,41 @@ def _remedy(family: LinearPlant, wish: Wish, fin_limit: float) -> str:
             changed = (option.format(getattr(other, n)) for n, option in OPTIONS.items() if getattr(other, n) != getattr(wish, n))
             return f"at this speed there is one with `{' '.join(changed)}`"
     return ""
+
+
+A_LITTLE_MORE = 1.03
+
+
+def bound_by(search: Search, found: Found) -> str:
+    """Return what keeps gains that were sought as quick as may be from more bandwidth."""
+    demand, wish = search.place.demand, search.wish
+    if found.share >= 1.0 - 2.0 * ROUNDING:
+        return (
+            f"damping {number(wish.damped, 3)}" if demand.fin_use > demand.fin_of(found.gains) * A_LITTLE_MORE else _fin(demand)
+        )
+    share = A_LITTLE_MORE * found.share
+    outcome = search.at(share, max(found.more, search.needed(share))).outcome
+    lacks = dict(zip(_words(demand, wish), (*outcome.own, *outcome.drawn), strict=True))
+    most = max(lacks, key=lambda name: lacks[name])
+    return most if lacks[most] > 0.0 else "the step itself: more gain settles no sooner"
+
+
+def _fin(demand: Demand) -> str:
+    share = "" if demand.fin_use == 1.0 else f"{number(100.0 * demand.fin_use, 3)} % of the "
+    return f"{share}fin at {number(degrees(demand.step), 3)} deg"
+
+
+def _words(demand: Demand, wish: Wish) -> list[str]:
+    """Return what can be lacked, in the order of an outcome."""
+    margin = demand.phase_margin_deg
+    own = (f"damping {number(wish.damped, 3)}", f"phase margin {number(margin, 3)} deg", _fin(demand))
+    over = (f"overshoot {number(100.0 * o, 3)} %" for o in (demand.own_overshoot, demand.draws_overshoot))
+    (ours, theirs), half = over, number(DRAWS_MARGIN_SHARE * margin, 3)
+    return [
+        *own,
+        "bandwidth",
+        ours,
+        f"phase margin {half} deg by the draws",
+        f"{theirs} by the draws",
+        "swing after the step by the draws",
+    ]

@@ -13,9 +13,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from fieldsid.schedule.controller import Gains
+from fieldsid.schedule.controller import Gains, margins
 from fieldsid.schedule.linear_plant import LinearPlant
-from fieldsid.schedule.margins import margins
 from fieldsid.schedule.wish import Wish
 
 INTEGRAL_SHARE = 0.1

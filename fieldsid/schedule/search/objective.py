@@ -20,20 +20,22 @@ import numpy as np
 
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.records.keys import Key, Number
-from fieldsid.schedule.controller import Gains
-from fieldsid.schedule.flown.pace import Pace, full_bandwidth, pace_of
+from fieldsid.schedule.controller import HELD_SHARE, Gains, PlantResponse, margins, margins_of, plant_response, worst_of
 from fieldsid.schedule.flown.response import (
     FLIGHT_ERROR_SHARE,
     LIMIT_CYCLE_SHARE,
     SETTLING_BAND,
+    Flight,
+    Pace,
     about_rest,
+    fly,
+    full_bandwidth,
     overshoot,
+    pace_of,
     settling,
-    step_response,
     swing,
 )
 from fieldsid.schedule.linear_plant import LinearPlant
-from fieldsid.schedule.margins import HELD_SHARE, PlantResponse, margins, margins_of, plant_response, worst_of
 from fieldsid.schedule.record import Row
 from fieldsid.schedule.search.formulas import bandwidth_of
 from fieldsid.schedule.wish import QUICKEST, Wish, overshoot_of
@@ -42,8 +44,8 @@ DRAWS_MARGIN_SHARE = 0.5
 """Share of the wished phase margin that a draw of the errors has to leave: the estimate has all of it."""
 SEARCHED_RAD_S = np.geomspace(5e-3, 100.0, 240)
 """Coarser than the margins' own grid: it is interpolated between, and the row found is checked on the fine one."""
-LACK_ROUNDING = 1e-3
-"""What is lacked of a requirement that counts as met."""
+ROUNDING = 1e-3
+"""What is lacked of a requirement that counts as met, and to how much of an e-fold the least is found: gains to a thousandth."""
 BETTER_SHARE = 0.01
 """Gains are better than others where they settle sooner, or ask for less fin, by more than this."""
 FLOWN_TIMES, LEAST_SHARE = 25.0, 1.0 / 3.0
@@ -99,13 +101,13 @@ class Outcome:
     @property
     def serves(self) -> bool:
         """Whether nothing is lacked."""
-        return sum(self.own) <= LACK_ROUNDING and sum(self.drawn) <= LACK_ROUNDING
+        return sum(self.own) <= ROUNDING and sum(self.drawn) <= ROUNDING
 
     def cost(self, demand: Demand) -> float:
         """Return what of two gains at one speed is smaller for the better, as long as it is not the fin that tells them apart."""
-        if sum(self.own) > LACK_ROUNDING:
+        if sum(self.own) > ROUNDING:
             return 2.0 * FORBIDDEN + sum(self.own)
-        if sum(self.drawn) > LACK_ROUNDING:
+        if sum(self.drawn) > ROUNDING:
             return FORBIDDEN + sum(self.drawn)
         return self._late(demand)
 
@@ -198,7 +200,7 @@ class Place:
     def _outcome(self, gains: Gains) -> Outcome:
         demand, (own, drawn) = self.demand, self.linear_lacks(gains)
         fin, kp = demand.fin_of(gains), abs(gains.kp)
-        if sum(own) > LACK_ROUNDING:
+        if sum(own) > ROUNDING:
             return Outcome(tuple(own), tuple(drawn), inf, fin, kp)
         time, angle = self.step(gains)
         moved = about_rest(angle, demand.step)
@@ -213,17 +215,17 @@ class Place:
         """Return time (t,) and angle (t, d) of the step flown with gains, the trim of the estimate counted out."""
         plant, demand = self.plant, self.demand
         row = Row(plant.speed, gains, -float(plant.offset[0]), plant.reference_gain, demand.fin_limit)
-        steps = step_response(plant, row, reference=demand.step, seconds=demand.pace.flight, step_s=demand.pace.step)
+        steps = fly(plant, (row,), Flight(demand.pace.flight, demand.pace.step, reference=demand.step))
         return steps.time, steps.angle
 
     def held(self, gains: Gains) -> tuple[float, float]:
         """Return the share of the draws that come to rest with the margin asked of draws, and the settling (s) of 95 %."""
         time, angle = self.step(gains)
         demand, moved = self.demand, about_rest(angle, self.demand.step)
-        rests = (overshoot(moved, demand.step) <= demand.draws_overshoot + LACK_ROUNDING) & (
-            swing(angle, demand.step) <= LIMIT_CYCLE_SHARE + LACK_ROUNDING
+        rests = (overshoot(moved, demand.step) <= demand.draws_overshoot + ROUNDING) & (
+            swing(angle, demand.step) <= LIMIT_CYCLE_SHARE + ROUNDING
         )
-        asked = (DRAWS_MARGIN_SHARE - 2.0 * LACK_ROUNDING) * demand.phase_margin_deg
+        asked = (DRAWS_MARGIN_SHARE - 2.0 * ROUNDING) * demand.phase_margin_deg
         damped = margins(self.plant, gains).phase_deg >= asked
         return float(np.mean(rests & damped)), worst_of(settling(time, moved, demand.step), most=True)
 

@@ -18,9 +18,8 @@ from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.parameter_source import source_of_models
 from fieldsid.rounding import TWO_SIDED_95, number, with_error
-from fieldsid.schedule.controller import Gains
+from fieldsid.schedule.controller import Gains, margins
 from fieldsid.schedule.linear_plant import FinLimits
-from fieldsid.schedule.margins import margins
 from fieldsid.schedule.plants import Plants, models_plants
 from fieldsid.schedule.record import Row, Schedule
 from fieldsid.schedule.rows import DESIGN_DRAWS, SEED, place_of

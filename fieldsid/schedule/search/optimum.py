@@ -1,26 +1,26 @@
 """The best gains of a formula at one speed, by its two free numbers: the quickest, and those of least fin that are quick enough.
 
+And the best one gain for all speeds: what a schedule has to beat, by the objective that its rows were designed for.
+
 Every part of the objective is continuous in the gains and in the plant: rows next to each other differ by what the plant differs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import exp, log
+from math import exp, inf, log
 
 import numpy as np
 
 from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.search.formulas import Formula, formula_of
-from fieldsid.schedule.search.objective import LACK_ROUNDING, Outcome, Place
+from fieldsid.schedule.search.objective import ROUNDING, Outcome, Place
 from fieldsid.schedule.wish import DAMPING, MOST_DAMPING, RATE_FED, Wish
 
 SLOWEST_SHARE = 0.03
 SCANNED = 7
-PLACE_ROUNDING = 1e-3
-"""To how much of an e-fold the least is found: gains to a thousandth."""
 NEARLY = 0.95
 """The whole fin is taken where a little less settles no sooner."""
 MOST_TRIES, MOST_TURNS = 12, 4
@@ -88,7 +88,7 @@ class Search:
             more = least(self._of_damping(found.share), max(near - NEAR_DAMPING, 0.0), near + NEAR_DAMPING)
             better = self._better(found, self._slowed(self.at(found.share, min(exp(more), self.most_damping))))
             gained, found = found.share / better.share - 1.0, better
-            if gained < PLACE_ROUNDING:
+            if gained < ROUNDING:
                 break
         return found
 
@@ -110,7 +110,7 @@ class Search:
 
         def lacking(log_more: float) -> float:
             lacks = sum(map(sum, self.place.linear_lacks(self.formula(share, exp(log_more)))))
-            return lacks if lacks > LACK_ROUNDING else log_more - log(self.most_damping)
+            return lacks if lacks > ROUNDING else log_more - log(self.most_damping)
 
         return exp(minimum(lacking, 0.0, log(self.most_damping))) if self.most_damping > 1.0 and lacking(0.0) > 0.0 else 1.0
 
@@ -128,7 +128,7 @@ class Search:
         low, low_late = SLOWEST_SHARE, 1.0
         share = high.share * exp(high_late)  # settling goes with 1/share where the fin is not at its limit
         for _ in range(MOST_TRIES):
-            if high_late > -PLACE_ROUNDING or high.share / low < 1.0 + PLACE_ROUNDING:
+            if high_late > -ROUNDING or high.share / low < 1.0 + ROUNDING:
                 break
             found = at(min(max(share, low), high.share))
             if late(found) > 0.0:
@@ -153,4 +153,42 @@ def least(cost: Callable[[float], float], low: float, high: float) -> float:
     """Return where a cost with one valley between two places is least, by Brent's method."""
     from scipy.optimize import minimize_scalar
 
-    return float(minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": PLACE_ROUNDING}).x)
+    return float(minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": ROUNDING}).x)
+
+
+MULTIPLES = (1.0, 0.7, 1.4, 0.5, 2.0)
+FARTHEST = log(1.5)
+
+
+def best_constant(candidates: Sequence[Gains], places: Sequence[Place]) -> Gains:
+    """Return the gains of least cost at the speed where they cost most; of those that cost alike, the ones of less fin."""
+    best, least = candidates[0], (inf, inf)
+    for gains in candidates:
+        worst, fin = -inf, 0.0
+        for place in places:
+            found = place.outcome(gains)
+            worst, fin = max(worst, found.cost(place.demand)), max(fin, found.fin)
+            if (worst, fin) >= least:  # neither falls at another speed
+                break
+        else:
+            best, least = gains, (worst, fin)
+    return best
+
+
+def multiples_of(rows: Sequence[Gains]) -> list[Gains]:
+    """Return the gains of rows and multiples of them."""
+    return [gains.times(f) for f in MULTIPLES for gains in rows]
+
+
+def improved(place: Place, start: Gains) -> Gains:
+    """Return the best gains near some, sought along all of them and along the rate's alone."""
+
+    def times(own: float, rate: float) -> Gains:
+        return Gains(start.kp * exp(own), start.ki * exp(own), start.kd * exp(own + rate))
+
+    def cost(own: float, rate: float) -> float:
+        return place.outcome(times(own, rate)).cost(place.demand)
+
+    rate = minimum(lambda x: cost(0.0, x), -FARTHEST, FARTHEST) if start.kd != 0.0 else 0.0
+    own = minimum(lambda x: cost(x, rate), -FARTHEST, FARTHEST)
+    return times(own, rate)

@@ -76,8 +76,8 @@ class Belief:
     def turn(self, entry: float, rudder: float, side: float) -> BelievedTurn:
         """Return the turn to starboard (side +1) or port (-1) from a straight run at `entry` m/s at `rudder` rad."""
         fin = _fin(self.models, entry, rudder, side)
-        turns = settled_turns(self.posterior, np.array([entry]), fin)
-        radius, rate = turns.radius[:, 0], turns.rate[:, 0]
+        path, rate = settled_turns(self.posterior, entry, fin)
+        radius = path / np.abs(rate)
         ok = np.isfinite(radius) & (side * rate > 0.0)
         log_radius = np.log(np.where(ok, radius, np.nan))
         middle = float(np.exp(_median(log_radius)))
@@ -87,7 +87,7 @@ class Belief:
         form = FORM_LOG_SD + UNSEEN_LOG_SD * (1.0 - covered) + STALL_LOG_SD * (1.0 - fin_covered)
         drawn = float(np.std(log_radius[ok])) / np.sqrt(max(effective, 1.0)) if ok.any() else 0.0
         low, high = _band(log_radius[ok], float(np.hypot(form, drawn)))
-        states = _median(np.abs(rate[ok])), _median(turns.path_speed[ok, 0])
+        states = _median(np.abs(rate[ok])), _median(path[ok])
         way = self._transient(entry, fin, side)
         return BelievedTurn(middle, (low, high), *states, covered, fin_covered, float(1.0 - ok.mean()), effective, way)
 

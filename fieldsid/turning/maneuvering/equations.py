@@ -19,6 +19,8 @@ import numpy.typing as npt
 
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import inner, jit
+from fieldsid.records.check import LARGEST_SPEED_M_S
+from fieldsid.turning.steady.transient import LEAST_SURGE_M_S
 
 NAMES = (
     "length", "drag", "sway_surge", "thrust_slope", "rudder", "rudder_arm", "gyration", "sway_lift", "sway_rate",
@@ -44,8 +46,6 @@ FIRST_STATION, STATION_STEP = float(STATIONS[0]), float(STATIONS[1] - STATIONS[0
 OFFSET = NAMES.index("rudder_offset")
 DIFFERENCE = 1e-5
 """Width of a difference, of speed, of speed over length, in rad: its third order is below 1e-10 of what it is of."""
-LEAST_SURGE_M_S = 0.02
-MOST_M_S = 50.0
 
 
 @inner
@@ -142,9 +142,9 @@ def simulate(
             mu, mv, mr = u + 0.5 * h * du, v + 0.5 * h * dv, r + 0.5 * h * dr
             du, dv, dr = slope(mu, mv, mr, between, push, straight, lift, p)
             heading += h * mr
-            u = min(max(u + h * du, LEAST_SURGE_M_S), MOST_M_S)
-            v = min(max(v + h * dv, -MOST_M_S), MOST_M_S)
-            r = min(max(r + h * dr, -MOST_M_S), MOST_M_S)
+            u = min(max(u + h * du, LEAST_SURGE_M_S), LARGEST_SPEED_M_S)
+            v = min(max(v + h * dv, -LARGEST_SPEED_M_S), LARGEST_SPEED_M_S)
+            r = min(max(r + h * dr, -LARGEST_SPEED_M_S), LARGEST_SPEED_M_S)
             angle += min(max((asked - angle) * (1.0 - keep), -h * p[16]), h * p[16])
     return out
 
@@ -165,7 +165,7 @@ def settle(p: FloatArray, straight: float, fin: float) -> FloatArray:
         mu, mv, mr = u + 0.5 * h * du, v + 0.5 * h * dv, r + 0.5 * h * dr
         du, dv, dr = slope(mu, mv, mr, fin, 1.0, straight, lift, p)
         u, v, r = max(u + h * du, LEAST_SURGE_M_S), v + h * dv, r + h * dr
-        if not (abs(v) < MOST_M_S and abs(r) < MOST_M_S):
+        if not (abs(v) < LARGEST_SPEED_M_S and abs(r) < LARGEST_SPEED_M_S):
             break
         low, high = min(low, r), max(high, r)
         if i % block == 0:

@@ -1,22 +1,105 @@
 """The maneuvering model fitted to all runs at once: maximum a posteriori by Gauss-Newton, nuisances of the runs profiled out.
 
-Runs are cut into short segments first and longer ones then (`cut_run`), so that the start is not led to a wrong minimum. The
-noise of each channel is that of its residuals, taken larger by (1 + rho)/(1 - rho) where these are correlated.
+Runs are cut into segments (multiple shooting, Bock 1983), short ones first and longer ones then, so that the start is not led
+to a wrong minimum. Every run has its straight speed and the biases of its rate and sway, every segment the state that it begins
+with, so that a hull without stability of course is fitted as well. The noise of each channel is that of its residuals, taken
+larger by (1 + rho)/(1 - rho) where these are correlated.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.turning.correlated import inflation
-from fieldsid.turning.maneuvering.cut_run import OWN, CutRun, cut_run
-from fieldsid.turning.maneuvering.equations import NAMES, coefficients, growth_rate
-from fieldsid.turning.maneuvering.flown import FlownRun
+from fieldsid.numerics.jit import jit
+from fieldsid.numerics.ljung_box import inflation
+from fieldsid.turning.maneuvering.equations import NAMES, coefficients, growth_rate, longest_step, simulate
+from fieldsid.turning.maneuvering.flown import HEADING, RATE, STATE_SD, SURGE, SWAY, FlownRun
 from fieldsid.turning.maneuvering.prior import FARTHEST_COST, Prior, prior
+from fieldsid.turning.steady.transient import LEAST_SURGE_M_S
+
+OWN = 3
+"""Nuisances of a run before its segments': straight speed, bias of the rate, bias of the sway."""
+SWAY_BIAS_SD = 0.02
+"""m/s: what a Doppler log may be off by across the hull."""
+LARGEST_RESIDUAL = 1e6
+"""Weighted residuals are clipped here where a simulation has left the water."""
+
+
+@dataclass(frozen=True, slots=True)
+class CutRun:
+    """A run whose segments begin at samples `begins` (m,), the nuisances (3 + 3 m,) measured there, one over their spread.
+
+    `longest` is the longest time step, s.
+    """
+
+    run: FlownRun
+    begins: npt.NDArray[np.int64]
+    first: FloatArray
+    weight: FloatArray
+    longest: float
+
+    def misfit(self, p: FloatArray, local: FloatArray) -> FloatArray:
+        """Return measured less simulated (4, n) with coefficients p and nuisances `local`, NaN where nothing was measured."""
+        run, states = self.run, local[OWN:].reshape(-1, 3)
+        straight = max(float(local[0]), LEAST_SURGE_M_S)
+        out = simulate(p, straight, states, self.begins, run.time, run.fin, run.thrust, self.longest)
+        out[RATE] += local[1]
+        out[HEADING] += local[1]
+        out[SWAY] += local[2]
+        return np.asarray(run.measured - out)
+
+    def residual(self, p: FloatArray, local: FloatArray, noise: FloatArray) -> FloatArray:
+        """Return the weighted residuals (4, n), zero where nothing was measured; `noise` (4,)."""
+        spread = np.hypot(noise, self.run.discrepancy)
+        weighted = np.nan_to_num(self.misfit(p, local) / spread[:, None], nan=LARGEST_RESIDUAL)
+        return np.where(np.isfinite(self.run.measured), np.clip(weighted, -LARGEST_RESIDUAL, LARGEST_RESIDUAL), 0.0)
+
+    def away(self, local: FloatArray) -> FloatArray:
+        """Return the weighted distances of the nuisances from what was measured of them, (3 + 3 m,)."""
+        return np.asarray((local - self.first) * self.weight)
+
+    def cost(self, p: FloatArray, local: FloatArray, noise: FloatArray) -> float:
+        """Return the sum of the squares of both."""
+        away = self.away(local)
+        spread = np.hypot(noise, self.run.discrepancy)
+        return float(away @ away) + float(_square_sum(self.misfit(p, local), self.run.measured, spread))
+
+
+@jit
+def _square_sum(misfit: FloatArray, measured: FloatArray, spread: FloatArray) -> float:
+    """Return the sum of the residuals' squares; a simulation that ends in a NaN is as bad as any can be."""
+    total = 0.0
+    for i in range(misfit.shape[0]):
+        for j in range(misfit.shape[1]):
+            if math.isfinite(measured[i, j]):
+                size = abs(misfit[i, j]) / spread[i]
+                total += min(size, LARGEST_RESIDUAL) ** 2 if math.isfinite(size) else LARGEST_RESIDUAL**2
+    return total
+
+
+def cut_run(run: FlownRun, segment_s: float, length: float) -> CutRun:
+    """Return a run cut into segments of about `segment_s`, of a vehicle about `length` m long."""
+    begins = run.begins(segment_s)
+    states = np.zeros((begins.size, 3))
+    for i, begin in enumerate(begins):
+        near = slice(max(begin - 2, 0), begin + 3)
+        for j, channel in enumerate((SURGE, SWAY, RATE)):
+            values = run.measured[channel, near]
+            if np.isfinite(values).any():
+                states[i, j] = np.mean(values[np.isfinite(values)])
+            elif channel == SURGE:
+                states[i, j] = run.speed
+    spread = np.concatenate([[run.speed_sd, run.rate_bias_sd, SWAY_BIAS_SD], np.full(states.size, STATE_SD)])
+    return CutRun(
+        run, begins, np.concatenate([[run.speed, 0.0, 0.0], states.ravel()]), 1.0 / spread, longest_step(length, run.speed)
+    )
+
 
 SHARED = len(NAMES)
 FIRST_NOISE = np.array([0.05, 0.05, 0.02, 0.02])
@@ -44,7 +127,6 @@ class Fitted:
     vector: FloatArray
     covariance: FloatArray
     cuts: tuple[CutRun, ...]
-    segment_s: float
     noise: FloatArray
     local: tuple[FloatArray, ...]
     response: tuple[FloatArray, ...]
@@ -119,7 +201,6 @@ def _inverse(matrix: FloatArray) -> FloatArray:
 @dataclass(frozen=True, slots=True)
 class _Problem:
     cuts: tuple[CutRun, ...]
-    segment_s: float
     prior: Prior
 
     def solved(
@@ -154,7 +235,7 @@ class _Problem:
         parts = [_normal(cut, vector, own, noise) for cut, own in zip(self.cuts, local, strict=True)]
         information = self.prior.precision(vector) + sum(p.profiled for p in parts)
         return Fitted(
-            vector, _inverse(information), self.cuts, self.segment_s, noise, tuple(local),
+            vector, _inverse(information), self.cuts, noise, tuple(local),
             tuple(p.response for p in parts), self.prior, cost,
         )  # fmt: skip
 
@@ -178,7 +259,7 @@ class _Problem:
 
 def _problem(runs: Sequence[FlownRun], segment_s: float, believed: Prior) -> _Problem:
     length = float(np.exp(believed.mean[0]))
-    return _Problem(tuple(cut_run(r, segment_s, length) for r in runs), segment_s, believed)
+    return _Problem(tuple(cut_run(r, segment_s, length) for r in runs), believed)
 
 
 def _normal(cut: CutRun, vector: FloatArray, local: FloatArray, noise: FloatArray) -> _Normal:

@@ -17,21 +17,20 @@ from fieldsid.models.model import Model
 from fieldsid.models.record import Record, knows_speed, record_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.block_means import block_means
-from fieldsid.turning.correlated import inflation
-from fieldsid.turning.steady.speed_loss import LEAST_SAMPLES
-from fieldsid.turning.thrust import RPM, at_start, thrust_ratio
+from fieldsid.numerics.ljung_box import inflation
+from fieldsid.turning.measured.measured_turn import LEAST_TURN_RAD_S
+from fieldsid.turning.steady.speed_loss import LEAST_SAMPLES, RPM, at_start, thrust_ratio
 
 OWN_EFFECTS = frozenset({"servo_lag", "rate_limit"})
 """Effects of the actuator that the maneuvering model has itself."""
-LEAST_TURN_RAD_S = 0.005
 UNKNOWN_BIAS_RAD_S = 0.002
 """What a gyro may be off by, where no heading shows it."""
 LEAST_BIAS_SD_RAD_S = 1e-5
 DISCREPANCY = 0.03
 """Share of the motion that the equations themselves are off by."""
 DISCREPANCY_LENGTH_M = 2.0
-START_SD = 0.3
-"""Of a straight speed about that measured, m/s."""
+STATE_SD = 0.3
+"""Of a straight speed, and of a segment's first state, about that measured: m/s, and rad/s."""
 SPEED_OF_RPM_SHARE = 0.03
 """A propeller's slip on a straight course is alike at every speed to within a few hundredths (Fossen 2011, section 9.4)."""
 SURGE, SWAY, RATE, HEADING = range(4)
@@ -83,7 +82,7 @@ def flown_run(run: Run, model: Model | None, speed_per_rpm: float | None = None)
     if not steered or not (run.has("yaw_rate_rad_s") or run.has("yaw_rad")):
         return None
     surge = run["surge_m_s"] if knows_speed(run) else np.full(len(run), np.nan)
-    speed, speed_sd = float(np.nanpercentile(surge, 90)) if knows_speed(run) else float("nan"), START_SD
+    speed, speed_sd = float(np.nanpercentile(surge, 90)) if knows_speed(run) else float("nan"), STATE_SD
     if not np.isfinite(speed) and speed_per_rpm is not None and run.has(RPM):
         speed = speed_per_rpm * _turns_at_start(run)
         speed_sd = SPEED_OF_RPM_SHARE * speed

@@ -128,22 +128,13 @@ def effective_draws(values: FloatArray) -> float:
     return float(chains * steps / (1.0 + 2.0 * total))
 
 
-@dataclass(frozen=True, slots=True)
-class SettledTurns:
-    """Turns of all draws at entry speeds: radius m, rate rad/s, surge m/s, path speed m/s, (n, s); NaN where none settles."""
+def settled_turns(posterior: Posterior, entry: float, fin: float) -> tuple[FloatArray, FloatArray]:
+    """Return path speed m/s and rate rad/s (n,) of the circles that a straight run at `entry` m/s settles to, NaN where none.
 
-    radius: FloatArray
-    rate: FloatArray
-    surge: FloatArray
-    path_speed: FloatArray
-
-
-def settled_turns(posterior: Posterior, entry: FloatArray, fin: float) -> SettledTurns:
-    """Return the circles that straight runs at entry speeds (s,) m/s settle to with the rudder at `fin` rad."""
-    states = np.array([[settle(p, float(u), fin) for u in entry] for p in map(coefficients, posterior.vectors)])
-    surge, sway, rate = states[..., 0], states[..., 1], states[..., 2]
-    path = np.hypot(surge, sway)
-    return SettledTurns(path / np.abs(rate), rate, surge, path)
+    The rudder is at `fin` rad.
+    """
+    surge, sway, rate = np.array([settle(coefficients(vector), entry, fin) for vector in posterior.vectors]).T
+    return np.hypot(surge, sway), rate
 
 
 def weighted_quantile(values: FloatArray, weights: FloatArray, share: float) -> float:

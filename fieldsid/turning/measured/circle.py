@@ -90,7 +90,9 @@ def _refined(
     points, share = (track - middle) / scale, t / span
 
     def off(p: FloatArray) -> FloatArray:
-        return _distance(points, share, np.concatenate([p, np.zeros(5 - p.size)]))
+        full = np.concatenate([p, np.zeros(5 - p.size)])  # cx, cy, R, wx, wy
+        away = points - full[:2] - share[:, None] * full[3:]
+        return np.asarray(np.hypot(away[:, 0], away[:, 1]) - full[2])
 
     best = start[:free]
     for _ in range(4):
@@ -112,12 +114,6 @@ def _refined(
         turned=turned,
         effective_samples=size,
     )
-
-
-def _distance(points: FloatArray, share: FloatArray, p: FloatArray) -> FloatArray:
-    """Return the signed distance (n,) of each point to the circle (cx, cy, R, wx, wy)."""
-    away = points - p[:2] - share[:, None] * p[3:5]
-    return np.asarray(np.hypot(away[:, 0], away[:, 1]) - p[2])
 
 
 def _by_heading(points: FloatArray, share: FloatArray, heading: FloatArray) -> FloatArray:

@@ -16,13 +16,30 @@ import numpy as np
 from fieldsid.display import Brief
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
-from fieldsid.models.record import knows_speed, record_of
+from fieldsid.models.record import Record, knows_speed, record_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.block_means import block_means, block_width
 from fieldsid.numerics.jit import jit
+from fieldsid.numerics.ljung_box import inflation
 from fieldsid.records.keys import Key, Number
-from fieldsid.turning.correlated import inflation
-from fieldsid.turning.thrust import thrust_ratio
+
+RPM = "propeller_rpm"
+
+
+def at_start(values: FloatArray) -> float:
+    """Return the median of a signal (n,) over its first twentieth, of ten samples at least; NaN where it has none."""
+    return float(np.median(values[: max(10, values.size // 20)])) if values.size else float("nan")
+
+
+def thrust_ratio(record: Record) -> FloatArray:
+    """Return the thrust (n,) over that at the run's start, one where it is not logged; it goes with the rpm squared."""
+    thrust = record.signals.get("thrust")
+    start = float("nan") if thrust is None else at_start(thrust)
+    if thrust is None or not start > 0.0:
+        return np.ones(len(record))
+    ratio = np.maximum(thrust / start, 0.0)
+    return np.asarray(ratio**2 if record.thrust_column == RPM else ratio)
+
 
 BLOCK_S, BLOCK_SHARE = 0.2, 0.2
 """Block means are of 0.2 s, or of a fifth of the time in which a slow vehicle takes up its largest rate: its speed is slower."""

@@ -1,18 +1,27 @@
-"""The steady circle of a plant: yaw rate, speed kept and radius, with speed lost and drift, for all draws and speeds at once."""
+"""The steady circle of a plant, with speed lost and drift, for all draws and speeds at once; and of a source of models.
+
+Each model is scaled by its own law, neighbours in speed are blended.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
+import numpy.typing as npt
 
 from fieldsid.dynamics.free_run import command_record
 from fieldsid.dynamics.steady_kernel import settled_rates
 from fieldsid.models.axis import Axis
 from fieldsid.models.hull import CROSS_SHARE
+from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.plant.yaw_plant import YawPlant, own_moment
-from fieldsid.turning.steady.speed_loss import SpeedLoss
+from fieldsid.plant.parameter_source import ParameterSource, draw_values
+from fieldsid.plant.yaw_plant import YawPlant, own_moment, yaw_plant
+from fieldsid.runtime.parallel_map import parallel_map
+from fieldsid.turning.prediction import SIDES
+from fieldsid.turning.steady.speed_loss import SpeedLoss, SurgeModel, draw_speed_loss, no_speed_loss
+from fieldsid.turning.steady.transient import Transient, turn_transient
 
 MAX_TURN_ITERATIONS = 60
 TOLERANCE = 1e-10
@@ -73,3 +82,102 @@ def _moment_table(plant: YawPlant) -> tuple[FloatArray, FloatArray]:
     record = command_record(Axis.YAW, np.arange(40) * 0.1, np.zeros(40), speed=reference if np.isfinite(reference) else 1.0)
     values = {c.name: c.start for e in plant.effects for c in e.nuisance} | dict(plant.model.values)
     return rate, own_moment(plant.effects, values, rate, record)
+
+
+FALLBACK_CURVATURE = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class BlendedTurns:
+    """Turns to one side from entry speeds (s,): radius (d, s) over draws; magnitudes (s,) of rate and path speed; transient."""
+
+    entry: FloatArray
+    radius: FloatArray
+    rate: FloatArray
+    path_speed: FloatArray
+    transient: Transient
+    effects: tuple[str, ...]
+
+
+def blended_turns(
+    source: ParameterSource, entry: FloatArray, rudder: float, surge: SurgeModel | None, draws: int, rng: np.random.Generator
+) -> dict[str, BlendedTurns]:
+    """Return the settled turns of a source's models with the rudder held at `rudder` rad, to either side by name."""
+    asked = _asked(source, entry, rudder, surge, draws, rng)
+
+    def turned(of: _Asked) -> tuple[SteadyTurn, Transient]:
+        turn = steady_turn(of.plant, of.speed_loss, entry[of.used], SIDES[of.side])
+        return turn, turn_transient(of.plant, of.speed_loss, entry[of.used], SIDES[of.side], rudder)
+
+    sums = {side: _Sums(draws, entry.size) for side in SIDES}
+    for of, (turn, after) in zip(asked, parallel_map(turned, asked), strict=True):
+        sums[of.side].add(of.used, of.share, turn, after)
+    effects = tuple(sorted({e for m in source.models for e in m.effects}))
+    return {side: total.turns(entry, effects) for side, total in sums.items()}
+
+
+def blended_radius(source: ParameterSource, entry: FloatArray, rudder: float, surge: SurgeModel | None) -> dict[str, FloatArray]:
+    """Return the estimate's settled radius (s,) m to either side by name: no draws, and not the way into the turn."""
+    log_radius = {side: np.zeros(entry.size) for side in SIDES}
+    for of in _asked(source, entry, rudder, surge, 1, np.random.default_rng(0)):
+        turn = steady_turn(of.plant, of.speed_loss, entry[of.used], SIDES[of.side])
+        log_radius[of.side][of.used] += of.share * np.log(turn.radius[0])
+    return {side: np.exp(total) for side, total in log_radius.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """Turns of one model to one side: the entry speeds used (k,), the model's share at each, its plant and loss of speed."""
+
+    side: str
+    used: npt.NDArray[np.int_]
+    share: FloatArray
+    plant: YawPlant
+    speed_loss: SpeedLoss
+
+
+def _asked(
+    source: ParameterSource, entry: FloatArray, rudder: float, surge: SurgeModel | None, draws: int, rng: np.random.Generator
+) -> list[_Asked]:
+    weight = np.zeros((len(source.models), entry.size))
+    for i, speed in enumerate(entry):
+        for index, share in source.near(float(speed)):
+            weight[index, i] = share
+    asked = []
+    for index, model in enumerate(source.models):
+        used = np.flatnonzero(weight[index])
+        if used.size:
+            plant, speed_loss = _plant_and_speed_loss(model, rudder, surge, draws, rng, entry[used])
+            asked += [_Asked(side, used, weight[index, used], plant, speed_loss) for side in SIDES]
+    return asked
+
+
+class _Sums:
+    """Weighted sums over neighbouring models: logarithms of what is positive and multiplies, the rest as it is."""
+
+    def __init__(self, draws: int, speeds: int) -> None:
+        self.log_radius = np.zeros((draws, speeds))
+        self.log_rate, self.log_speed = np.zeros(speeds), np.zeros(speeds)
+        self.after = {f.name: np.zeros(speeds) for f in fields(Transient)}
+
+    def add(self, used: npt.NDArray[np.int_], share: FloatArray, turn: SteadyTurn, after: Transient) -> None:
+        self.log_radius[:, used] += share * np.log(turn.radius)
+        self.log_rate[used] += share * np.log(np.abs(turn.rate[0]))
+        self.log_speed[used] += share * np.log(turn.speed[0])
+        for name, total in self.after.items():
+            total[used] += share * getattr(after, name)
+
+    def turns(self, entry: FloatArray, effects: tuple[str, ...]) -> BlendedTurns:
+        rate, speed = np.exp(self.log_rate), np.exp(self.log_speed)
+        return BlendedTurns(entry, np.exp(self.log_radius), rate, speed, Transient(**self.after), effects)
+
+
+def _plant_and_speed_loss(
+    model: Model, rudder: float, surge: SurgeModel | None, draws: int, rng: np.random.Generator, entry: FloatArray
+) -> tuple[YawPlant, SpeedLoss]:
+    values, exponents = draw_values(model, draws, rng)
+    plant = yaw_plant(model, values, rudder, exponents, entry)
+    kept = steady_turn(plant.one(), no_speed_loss(1), entry, 1.0)
+    middle = int(np.argsort(entry)[entry.size // 2])
+    curvature = float(np.abs(kept.rate[0, middle]) / kept.surge[0, middle])
+    return plant, draw_speed_loss(surge, curvature if np.isfinite(curvature) else FALLBACK_CURVATURE, draws, rng)

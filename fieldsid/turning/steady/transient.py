@@ -7,7 +7,7 @@ tactical diameter across the approach track at 180 degrees.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from fieldsid.turning.steady.speed_loss import SpeedLoss
 
 STEP_S = 0.04
 MAX_TRANSIENT_S = 240.0
-LEAST_SURGE_M_S = 0.05
+LEAST_SURGE_M_S = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +36,11 @@ class Transient:
     advance: FloatArray
     transfer: FloatArray
     tactical_diameter: FloatArray
+
+    def of(self, index: int) -> dict[str, Any]:
+        """Return the lengths (m) of one of the turns by their names in a row of a prediction; that of the path is over pi."""
+        lengths = {name: getattr(self, name)[index] for name in ("advance", "transfer", "tactical_diameter")}
+        return {name: float(value) for name, value in {**lengths, "u_turn_radius": self.path_180[index] / np.pi}.items()}
 
 
 class _Vehicle(NamedTuple):

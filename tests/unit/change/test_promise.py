@@ -13,7 +13,7 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import save_model
 from fieldsid.plant.parameter_source import source_of_models
-from fieldsid.schedule.flown.response import step_response
+from fieldsid.schedule.flown.response import Flight, fly
 from fieldsid.schedule.linear_plant import FinLimits
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.plants import models_plants
@@ -33,7 +33,7 @@ def schedule():
 def flown(schedule, model, *, limits=FinLimits(), size=STEP):  # noqa: B008 - a frozen record
     """Fly one step of the heading with a schedule and another vehicle, as its sensors see it."""
     plant = models_plants(source_of(model), limits, ()).family_at(SPEED, LIMIT, 1, 0)
-    answer = step_response(plant, schedule.rows, reference=abs(size), seconds=30.0)
+    answer = fly(plant, schedule.rows, Flight(30.0, reference=abs(size)))
     time = np.arange(0.0, LEAD + 30.0, 1.0 / RATE)
     noise = np.random.default_rng(4).normal(0.0, 0.005, time.size)
     moved = np.interp(time - LEAD, answer.time, answer.angle[:, 0], left=0.0)

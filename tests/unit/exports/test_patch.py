@@ -88,6 +88,22 @@ def test_a_ragged_file_keeps_every_other_line(tmp_path):
     assert "      # about the next one\n" in patch.after
 
 
+@pytest.mark.parametrize(
+    "old", ["", " 3  # so", " *b", " [1, 2]", "\n  - 1\n  # of a list\n", "\n    kp: 1 # it\n    ki: {x: 1}\n"]
+)
+@pytest.mark.parametrize("after", ["", "\n", "\n# the next\nother: *b\n"])
+def test_whatever_stands_at_a_key_is_replaced(tmp_path, old, after):
+    text = f"base: &b {{x: 1}}\ngains:{old}{after}"
+    patch = patch_yaml(written(tmp_path, text), "gains", COLUMNS)
+    assert YAML(typ="safe").load(patch.after) == {**YAML(typ="safe").load(text), "gains": COLUMNS}
+    assert all(comment in patch.after for comment in ("# so", "# it", "# of a list", "# the next") if comment in text)
+
+
+def test_a_key_inside_braces_is_replaced_there(tmp_path):
+    patch = patch_yaml(written(tmp_path, FILE), "control.depth.kp", COLUMNS)
+    assert "depth: {kp: {speed_m_s: [1.0, 1.5], kp: [" in patch.after
+
+
 def test_a_key_that_is_not_there_names_the_near_one(tmp_path):
     with pytest.raises(UsageError, match="gians") as caught:
         patch_yaml(written(tmp_path, FILE), "control.heading.gians", COLUMNS)

@@ -11,7 +11,7 @@ import pytest
 from cli.trial import vehicle
 
 from fieldsid.errors import DataError, UsageError
-from fieldsid.extension import extend_in_steps, whole_of
+from fieldsid.extension.extend import extend_in_steps, whole_of
 from fieldsid.fitting.predict.predict import predict
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis

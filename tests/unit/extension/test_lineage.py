@@ -10,7 +10,8 @@ from cli.trial import vehicle
 
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.errors import ArtifactError
-from fieldsid.extension import CHANGED, INTACT, MISSING, Extension, Gain, history_of, parent_of, save_extension
+from fieldsid.extension.extend import Extension, Gain
+from fieldsid.extension.lineage import CHANGED, INTACT, MISSING, history_of, parent_of, save_extension
 from fieldsid.logs import load_run, save_run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise, load_model, save_model

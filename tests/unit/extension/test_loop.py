@@ -9,7 +9,8 @@ from cli import trial
 
 from fieldsid.comparison.compare import compare_one
 from fieldsid.diagnosis.records import Errors, Pair
-from fieldsid.extension import INTACT, Gain, Generation, Step, loop_of
+from fieldsid.extension.extend import Gain
+from fieldsid.extension.lineage import INTACT, Generation, Step, loop_of
 from fieldsid.figures.loop import figure
 from fieldsid.logs import load_run
 from fieldsid.models.axis import Axis

@@ -13,7 +13,7 @@ from fieldsid.change.compare import compare_models
 from fieldsid.comparison.compare import compare
 from fieldsid.diagnosis import Candidate, Diagnosis, Errors, Pair
 from fieldsid.diagnosis.records import NextManeuver
-from fieldsid.extension import Extension, Gain
+from fieldsid.extension.extend import Extension, Gain
 from fieldsid.fitting.fit import Fit
 from fieldsid.fitting.predict.predict import Prediction
 from fieldsid.fitting.problem.estimator import History
@@ -23,8 +23,10 @@ from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import record_of
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.plant.parameter_source import source_of_models
-from fieldsid.schedule import design_schedule, verify_schedule
-from fieldsid.turning import measure_turn, turn_radius
+from fieldsid.schedule.make import design_schedule
+from fieldsid.schedule.verify import verify_schedule
+from fieldsid.turning.measured.measured_turn import measure_turn
+from fieldsid.turning.radius import turn_radius
 
 UNITS = {"a22": "1/s", "b2": "1/s^2", "C0": "rad/s^2", "lag": "s"}
 NOISE = Noise(0.005, 0.004)

@@ -126,8 +126,8 @@ def test_schedules_are_designed_and_verified_as_by_the_commands(run_cli, inside,
 def test_diagnose_and_extend_are_asked_what_the_commands_ask(inside, monkeypatch):
     asked = []
     monkeypatch.setattr("fieldsid.diagnosis.diagnose", lambda *a, **k: asked.append((a, k)))
-    monkeypatch.setattr("fieldsid.extension.extend_in_steps", lambda *a, **k: asked.append((a, k)))
-    monkeypatch.setattr("fieldsid.extension.whole_of", lambda steps: steps)
+    monkeypatch.setattr("fieldsid.extension.extend.extend_in_steps", lambda *a, **k: asked.append((a, k)))
+    monkeypatch.setattr("fieldsid.extension.extend.whole_of", lambda steps: steps)
     model = fs.load_model("pulses_1.4.yaml")
     fs.diagnose("pulses_*.parquet", "yaw", validate="zigzag.parquet", model=model, thorough=True)
     fs.extend(model, "pulses_*.parquet", "servo_lag+delay", validate="zigzag.parquet")

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from fieldsid.diagnosis.records import Errors, Pair
-from fieldsid.extension import INTACT, Gain, Generation, Step
+from fieldsid.extension.extend import Gain
+from fieldsid.extension.lineage import INTACT, Generation, Step
 from fieldsid.figures.history import falls_of, figure, summary
 from fieldsid.models.model import Noise
 

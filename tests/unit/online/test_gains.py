@@ -15,8 +15,10 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.online import OnlineIdentifier
 from fieldsid.online.progress import Watch, default_goals
 from fieldsid.plant.parameter_source import source_of_models
-from fieldsid.schedule import FinLimits, Wish, design_schedule
+from fieldsid.schedule.linear_plant import FinLimits
+from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.search.of_one_model import GAINS, Wanted, gains_of_one, wanted_of
+from fieldsid.schedule.wish import Wish
 
 FIN, SPEED = 0.35, 1.4
 QUICK = Wanted(Wish("pd"), FIN, FinLimits())

@@ -7,7 +7,7 @@ import sys
 
 AGAIN = """
 from fieldsid.planning import jit_warmup
-from fieldsid.planning.flight.closed_loop import closed_loop
+from fieldsid.planning.flight.rule_flight import closed_loop
 from fieldsid.planning.flight.rule_flight import advance_all
 doors = closed_loop, advance_all
 jit_warmup.compile_planning()

@@ -14,14 +14,12 @@ from fieldsid.angles import parse_angle
 from fieldsid.errors import ArtifactError, FieldsidError, ModelError, UsageError
 from fieldsid.maneuvers import all_maneuvers
 from fieldsid.models.axis import Axis
-from fieldsid.planning.belief.prior_file import load_believed
-from fieldsid.planning.belief.prior_model import checked_prior, corner, draws_of, named_prior
+from fieldsid.planning.belief.prior_model import checked_prior, corner, draws_of, load_believed, named_prior
 from fieldsid.planning.design.objective import make_objective
 from fieldsid.planning.design.optimise import LEFT_OUT, SHORTEST_HOLD_S, _started, merge_short_holds
 from fieldsid.planning.flight.excitation import Window, fits
 from fieldsid.planning.safety.envelope import Envelope, check_room, check_speeds
-from fieldsid.planning.specify.accuracy_goals import accuracy_goals_text, parse_accuracy_goals
-from fieldsid.planning.specify.quantities import parse_area, parse_band, parse_speeds
+from fieldsid.planning.specify.quantities import accuracy_goals_text, parse_accuracy_goals, parse_area, parse_band, parse_speeds
 from fieldsid.templates import template_path
 
 KNOWN = ("a22", "b2", "C0")

@@ -15,7 +15,7 @@ from fieldsid.logs import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import save_model
 from fieldsid.plant.parameter_source import load_parameter_source
-from fieldsid.plant.remedies import damping_that_holds, in_radians, wider_fin
+from fieldsid.plant.remedies import damping_that_holds, refuse_no_fin, wider_fin
 from fieldsid.schedule.make import design_schedule
 from fieldsid.turning.radius import turn_radius
 
@@ -58,7 +58,9 @@ def test_where_the_runs_do_not_tell_a_limit_the_least_is_said(tmp_path, fin_max)
     ("given", "said"), [(15.0, "15 rad is 859.4 deg"), (-0.2, "-0.2 rad is -11.46 deg"), (1.745, "1.745 rad is 99.98 deg")]
 )
 def test_an_angle_that_no_fin_has_is_said_in_both_units(given, said):
-    assert in_radians("--x", given) == f"{said}; write it like `--x 15deg`"
+    with pytest.raises(UsageError, match="at most at 90 deg") as caught:
+        refuse_no_fin("a fin's limit", given)
+    assert caught.value.hint == f"{said}; write it like `--fin-max 15deg`"
 
 
 def test_an_offset_that_no_fin_has_is_not_to_be_trimmed_but_looked_into(tmp_path):

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from fieldsid.turning.known_radius import is_band_only, radius_cell, turn_words
+from fieldsid.turning.prediction import is_band_only, radius_cell, turn_words
 
 
 @pytest.mark.parametrize(("band", "alone"), [((4.4, 5.5), False), ((4.13, 5.86), False), ((4.1, 5.9), True), ((4.0, 11.0), True)])

@@ -8,7 +8,7 @@ import pytest
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
-from fieldsid.turning.thrust import thrust_ratio
+from fieldsid.turning.steady.speed_loss import thrust_ratio
 
 
 @pytest.mark.parametrize(("column", "wanted"), [("thrust", 2.0), ("thrust_ratio", 2.0), ("propeller_rpm", 4.0)])

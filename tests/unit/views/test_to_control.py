@@ -11,10 +11,9 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.plant.parameter_source import source_of_models
-from fieldsid.schedule.controller import Gains, closed_poles
-from fieldsid.schedule.flown.response import step_response
+from fieldsid.schedule.controller import Gains, closed_poles, margins
+from fieldsid.schedule.flown.response import Flight, fly
 from fieldsid.schedule.linear_plant import FinLimits, plants_at
-from fieldsid.schedule.margins import margins
 from fieldsid.schedule.record import Row, Schedule
 
 PATHS = {
@@ -82,7 +81,7 @@ def test_margins_by_python_control_of_the_opened_loop_are_those_of_the_design():
 
 def test_a_step_by_python_control_is_the_one_that_is_flown():
     model, gains = model_of(PATHS["lag"]), Gains(-0.6, 0.0, -0.3)
-    flown = step_response(plant_at(model, 1.5), row_at(1.5, gains), reference=0.3, seconds=12.0)
+    flown = fly(plant_at(model, 1.5), [row_at(1.5, gains)], Flight(12.0, reference=0.3))
     theirs = control.step_response(closed(model, schedule_of(row_at(1.5, gains)), 1.5), flown.time)
     assert np.max(np.abs(flown.angle[:, 0] - 0.3 * theirs.outputs)) < 1e-3
 

@@ -12,7 +12,7 @@ from fieldsid.maneuvers import Limits, parse_spec
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.planning.belief.prior_model import named_prior
-from fieldsid.planning.design.information import Information, information_of
+from fieldsid.planning.design.objective import Information, information_of
 from fieldsid.planning.flight.excitation import Excitation, Window, flown
 from fieldsid.planning.flight.operating_point import autopilot_of, operating_point
 
@@ -62,15 +62,6 @@ def test_a_disturbance_makes_every_parameter_worse():
         errors.append(information_of(scene, flight(scene)).std_errors())
     for name in errors[0]:
         assert errors[0][name] < errors[1][name] < errors[2][name]
-
-
-def test_four_passes_halve_the_error():
-    scene = operating_point(named_prior("torpedo", Axis.YAW), 1.4)
-    once = information_of(scene, flight(scene))
-    for name, error in once.times(4).std_errors().items():
-        assert error == pytest.approx(0.5 * once.std_errors()[name], rel=1e-9)
-    for name, error in once.plus(once).std_errors().items():
-        assert error == pytest.approx(once.std_errors()[name] / np.sqrt(2), rel=1e-9)
 
 
 def test_what_a_flight_cannot_tell_apart_has_no_finite_error():

@@ -15,8 +15,7 @@ from ruamel.yaml import YAML
 from fieldsid.artifacts import plain, to_yaml
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.run import Run
-from fieldsid.planning.design.abort_conditions import aborts_of
-from fieldsid.planning.design.leg import commands_of
+from fieldsid.planning.design.leg import aborts_of, commands_of
 from fieldsid.planning.output.command_files import formats, table_text, write_all
 from fieldsid.planning.output.mission import render, steps_of, styles
 from fieldsid.planning.output.plan_file import load_plan, save_plan

@@ -9,7 +9,7 @@ import pytest
 from plan_legs import leg
 
 from fieldsid.models.axis import Axis
-from fieldsid.planning.design.abort_conditions import aborts_of
+from fieldsid.planning.design.leg import aborts_of
 from fieldsid.planning.safety.envelope import NOT_LIMITED, Envelope, excursions_of, limits_said, used
 
 TIME = 0.05 * np.arange(801)
