@@ -135,9 +135,9 @@ def _taken(place: int, step: Step, known: Mapping[str, str], session: Session, *
     with nullcontext() if told == VERBOSE else _silence():
         result = run([*expanded(words), *(["--force"] if force else [])], session)
     sys.stderr.flush()
-    meaning = step.means(result)
+    brief, meaning = step.tells(result)
     if told == BRIEF:
-        said = f"{place:2d}. {step.title}{'' if step.title.endswith('?') else ':'} {step.brief(result)}"
+        said = f"{place:2d}. {step.title}{'' if step.title.endswith('?') else ':'} {brief}"
         sys.stdout.write(f"{folded(said, WIDTH, rest='    ')}\n")
         sys.stdout.flush()
     if told == VERBOSE:
