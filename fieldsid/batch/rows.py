@@ -89,14 +89,9 @@ def _bug(task: Task, error: Exception) -> Row:
 def _read(task: Task) -> tuple[list[Run], str]:
     settings, path = task.settings, Path(task.log)
     vehicle = _vehicle(settings.vehicle)
-    limits = {} if vehicle is None else _limits(vehicle)
+    limits = {} if vehicle is None else vehicle.signal_limits
     runs = Importer(_mapping(settings.mapping), whole=settings.whole, recognise=True).read(path, limits)
     return runs, sha256_of(path)
-
-
-def _limits(vehicle: Vehicle) -> dict[str, float]:
-    pairs = (("rudder_rad", vehicle.rudder_max_rad), ("elevator_rad", vehicle.elevator_max_rad))
-    return {name: limit for name, limit in pairs if limit is not None}
 
 
 @lru_cache(maxsize=4)

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from fieldsid.change.consequences import Fin, answers, fin_of, gain_changes, radius_changes
+from fieldsid.change.consequences import answers, fin_of, gain_changes, radius_changes
 from fieldsid.change.estimates import common_speeds
 from fieldsid.change.parameters import MATTERS, parameter_changes
 from fieldsid.change.record import (
@@ -24,7 +24,6 @@ from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.schedule.linear_plant import FinLimits
-from fieldsid.schedule.record import Schedule
 
 T = TypeVar("T")
 FIN_IF_NOT_KNOWN = 0.26
@@ -37,14 +36,12 @@ def compare_models(
     *,
     fin_limit: float | None = None,
     stated: FinLimits | None = None,
-    gains: Schedule | None = None,
 ) -> Change:
     """Return what has changed between the models of one axis before and after.
 
     Tested are the parameters at the speeds that both sides were flown at, and the effects' coefficients that both have. fin_limit
     (rad): of the turn and the gains, the largest in the old models' runs if not given. stated: the fin's lag, delay and rate.
-    gains: the schedule the vehicle has; without it P gains of the old models. Raises UsageError for models of two axes, without a
-    speed in common, or without runs at a known speed.
+    The gains are P gains. Raises UsageError for models of two axes, without a speed in common, or without runs at a known speed.
     """
     _refuse(old, new)
     speeds = common_speeds(old, new)
@@ -58,7 +55,7 @@ def compare_models(
     added, removed = _effects(new, old), _effects(old, new)
     parameters = parameter_changes(old, new, speeds)
     notes: list[Note] = []
-    found_gains = _tried(lambda: gain_changes(old, new, speeds, Fin(limit, stated or FinLimits()), gains), "gains", notes)
+    found_gains = _tried(lambda: gain_changes(old, new, speeds, limit, stated or FinLimits()), "gains", notes)
     turns = _tried(lambda: radius_changes(old, new, speeds, limit), "radius", notes) if old.axis is Axis.YAW else ()
     notes += _remarks(parameters, (*added, *removed))
     return Change(

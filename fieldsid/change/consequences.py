@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.schedule.controller import least_damping, margins
 from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, family_at
 from fieldsid.schedule.make import design_schedule
-from fieldsid.schedule.record import Row, Schedule
+from fieldsid.schedule.record import Row
 from fieldsid.schedule.wish import Wish
 from fieldsid.turning.radius import turn_radius
 
@@ -27,31 +26,21 @@ DRAWS, SEED = 400, 20
 PULSES = "square_pulses"
 
 
-@dataclass(frozen=True, slots=True)
-class Fin:
-    """What the fin can do: largest angle (rad), and lag, delay and rate where they are stated."""
-
-    limit: float
-    stated: FinLimits
-
-
 def gain_changes(
-    old: ParameterSource, new: ParameterSource, speeds: Sequence[float], fin: Fin, before: Schedule | None
+    old: ParameterSource, new: ParameterSource, speeds: Sequence[float], fin_limit: float, stated: FinLimits
 ) -> tuple[GainChange, ...]:
-    """Return the gains at each speed; `before` are those the vehicle has, designed as asked then, else P gains of the old models.
+    """Return the P gains at each speed, of a fin with a largest angle (rad), and with lag, delay and rate where they are stated.
 
     Raises ModelError where no gain holds one of the two loops.
     """
-    wish = Wish() if before is None else before.wish
-    was = before or design_schedule(old, fin.limit, speeds=speeds, wish=wish, limits=fin.stated)
-    now = design_schedule(new, fin.limit, speeds=speeds, wish=wish, limits=fin.stated)
+    was, now = (design_schedule(s, fin_limit, speeds=speeds, wish=Wish(), limits=stated) for s in (old, new))
     level = LEVEL / len(speeds)  # the speeds are asked together
-    return tuple(_gain(old, new, was.at(s), now.at(s), fin, level) for s in speeds)
+    return tuple(_gain(old, new, was.at(s), now.at(s), stated, level) for s in speeds)
 
 
-def _gain(old: ParameterSource, new: ParameterSource, was: Row, now: Row, fin: Fin, level: float) -> GainChange:
+def _gain(old: ParameterSource, new: ParameterSource, was: Row, now: Row, stated: FinLimits, level: float) -> GainChange:
     speed = now.speed
-    families = [family_at(source, speed, fin.stated, DRAWS, SEED + 1000 * i) for i, source in enumerate((old, new))]
+    families = [family_at(source, speed, stated, DRAWS, SEED + 1000 * i) for i, source in enumerate((old, new))]
     ratio = _formula(families[1]) / _formula(families[0])
     change = now.gains.kp / was.gains.kp - 1.0
     # the draws say how far the ratio may be off; what lag and delay take of the gain is in its middle

@@ -18,6 +18,7 @@ from fieldsid.display import Brief
 from fieldsid.models.axis import NAMES
 from fieldsid.models.model import Model
 from fieldsid.models.speed_law import GROUP_WIDTH
+from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.plant.points import points_of
 
@@ -85,13 +86,18 @@ def _pooled(each: Mapping[int, tuple[float, float]]) -> tuple[float, float, dict
     places = list(each)
     values = np.array([each[p][0] for p in places])
     errors = np.array([each[p][1] for p in places])
-    weights = 1.0 / errors**2 if np.all(errors > 0) else np.ones(values.size)
-    weights = weights / weights.sum()
+    weights = weights_of(errors)
     mean = float(weights @ values)
     error = float(np.sqrt(weights**2 @ errors**2))
     if values.size > 1 and np.all(errors > 0):
         error *= max(1.0, float(np.sqrt(np.sum(((values - mean) / errors) ** 2) / (values.size - 1))))
     return mean, error, dict(zip(places, weights.tolist(), strict=True))
+
+
+def weights_of(errors: FloatArray) -> FloatArray:
+    """Return the weights (n,) of values with some standard errors (n,), equal where one of them has none."""
+    weights = 1.0 / errors**2 if np.all(errors > 0) else np.ones(errors.size)
+    return np.asarray(weights / weights.sum())
 
 
 def shared_values(source: ParameterSource) -> Iterator[tuple[str, float, float]]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from fieldsid.change.estimates import Known, known_at, shared_values
+from fieldsid.change.estimates import Known, known_at, shared_values, weights_of
 from fieldsid.change.holm import adjusted
 from fieldsid.change.record import (
     CHANGED,
@@ -100,8 +100,7 @@ def _tested(found: Sequence[_Quantity]) -> tuple[ParameterChange, ...]:
 def _mean(quantity: _Quantity) -> tuple[float, float]:
     """Return the change over the speeds, weighted by its errors, and its standard error with what the speeds share."""
     changes, errors = (np.array([getattr(r, n) for r in quantity.rows]) for n in ("change", "std_error"))
-    weights = 1.0 / errors**2 if np.all(errors > 0) else np.ones(changes.size)
-    weights = weights / weights.sum()
+    weights = weights_of(errors)
     spread = weights * errors
     return float(weights @ changes), float(np.sqrt(max(float(spread @ quantity.correlation @ spread), 0.0)))
 

@@ -27,7 +27,7 @@ from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.voice import voice
 from fieldsid.logs.run import Note
 from fieldsid.page import Block, Page, Whole, dense, folded, told
-from fieldsid.records.keys import body_of
+from fieldsid.records.keys import Result, body_of
 from fieldsid.text.one_line import one_line
 
 T = TypeVar("T")
@@ -68,15 +68,14 @@ def messages() -> Console:
 
 
 def emit(
-    body: Mapping[str, Any],
+    told: Result | Mapping[str, Any],
     *,
-    as_json: bool,
     render: Page | Callable[[Console], None],
     headline: Headline | None = None,
     notes: Iterable[Note] = (),
     is_file: bool = False,
 ) -> Mapping[str, Any]:
-    """Print a result and return its body: as one JSON object, or for a reader.
+    """Print a result, or its body, and return that: as one JSON object, or for a reader.
 
     A reader gets the headline, then the notes as warnings, then the page that `render` is, or what it prints; where it is to be
     quiet, the headline alone. Only what is no result, as a page of the guide, has no headline. Where what `render` prints
@@ -84,8 +83,9 @@ def emit(
     """
     if headline is not None:
         _SAID.set(headline.says)
+    body = body_of(told) if isinstance(told, Result) else told
     whole = body if headline is None else {**body, "headline": body_of(headline)}
-    if as_json:
+    if voice().is_json:
         sys.stdout.write(json.dumps(plain(whole), allow_nan=False) + "\n")
         return whole
     to = out()

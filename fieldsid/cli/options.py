@@ -60,5 +60,4 @@ FigurePlace = Annotated[
 ]
 OutputFile = Annotated[Path | None, option("-o --output", "FILE", "File to write.", WRITTEN)]
 Force = Annotated[bool, flag("--force", "Replace files that exist.", WRITTEN)]
-JsonFlag = Annotated[bool, flag("--json", "Print one JSON object instead of text.", ANSWER)]
 Figures = Annotated[bool, flag("--figures/--no-figures", "Draw figures next to the files that are written.", WRITTEN)]

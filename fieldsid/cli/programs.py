@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from fieldsid.cli.voice import JSON
+
 if TYPE_CHECKING:
     import typer
 
@@ -18,8 +20,8 @@ def program_of(arguments: Sequence[str]) -> tuple[typer.Typer, list[str], str]:
     """Return the program of a command, the words it takes, and the name it goes by; raises UsageError for an unknown command."""
     from fieldsid.cli.help.catalogue import entries
 
-    known, arguments = entries(), [_as_named_now(word) for word in arguments]
-    name = arguments[0]
+    known, name = entries(), arguments[0]
+    arguments = [name, *(_as_named_now(word) for word in arguments[1:] if word != JSON)]
     if name not in known:
         raise _unknown(name, tuple(known))
     import typer

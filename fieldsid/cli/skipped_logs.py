@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -40,9 +40,9 @@ class Skips:
         """Return those of the runs read that were not skipped afterwards."""
         return [run for run in runs if run.name not in self._runs]
 
-    def end(self, used: int) -> None:
-        """End the command with exit code 1 where logs were skipped, and say how many."""
+    def end(self, result: Mapping[str, Any], used: int) -> Mapping[str, Any]:
+        """Return a command's result; where logs were skipped end it with exit code 1, and say how many."""
         if not self.records:
-            return
+            return result
         complain(f"{len(self.records)} of {len(self.records) + used} logs skipped, for the reasons above")
         raise typer.Exit(1)

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from fieldsid.models.model import Model
+    from fieldsid.plant.parameter_source import ParameterSource
 
 OWN_EFFECTS = "effects"
 
@@ -43,6 +44,15 @@ def read_model(path: Path) -> Model:
     model = load_model(path)
     check_effects([(path, model)])
     return model
+
+
+def read_source(paths: Sequence[Path], laws: Sequence[str] = ()) -> ParameterSource:
+    """Return the source of parameters that files give, the effects of its models all known; raises as `read_model` does."""
+    from fieldsid.plant.parameter_source import load_parameter_source
+
+    source = load_parameter_source(paths, laws=laws)
+    check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
+    return source
 
 
 def check_effects(models: Iterable[tuple[Path, Model]]) -> None:

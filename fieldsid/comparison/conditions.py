@@ -41,8 +41,8 @@ def conditions(record: Record, rate: FloatArray, trim: float) -> tuple[Condition
     """Return every condition of a record; rate (n,) rad/s is the simulated one, free of noise, trim the fin at rest in rad."""
     return (
         *_phases(record, trim),
-        *_fin(record, trim),
-        *_rate(rate),
+        *_thirds("fin", np.abs(record.fin - trim), "rad off trim"),
+        *_thirds("rate", np.abs(rate), "rad/s"),
         *_side(record, rate),
         *_helpers(record),
         *_heading(record),
@@ -63,15 +63,6 @@ def _phases(record: Record, trim: float) -> Iterator[Condition]:
     yield Condition("phase: onset", begun & onset)
     yield Condition("phase: hold", begun & ~onset & away)
     yield Condition("phase: recovery", begun & ~onset & ~away)
-
-
-def _fin(record: Record, trim: float) -> Iterator[Condition]:
-    size = np.abs(record.fin - trim)
-    yield from _thirds("fin", size, "rad off trim")
-
-
-def _rate(rate: FloatArray) -> Iterator[Condition]:
-    yield from _thirds("rate", np.abs(rate), "rad/s")
 
 
 def _thirds(what: str, size: FloatArray, unit: str) -> Iterator[Condition]:
@@ -97,10 +88,10 @@ def _helpers(record: Record) -> Iterator[Condition]:
         if role not in record.signals:
             continue
         values = record.signals[role]
-        spread = float(np.ptp(np.quantile(values, (0.02, 0.98))))
-        if spread < LEAST_SPREAD[role] * (abs(float(np.median(values))) if role == "surge" else 1.0):
+        ends = np.quantile(values, (0.02, 0.98))
+        if float(np.ptp(ends)) < LEAST_SPREAD[role] * (abs(float(np.median(values))) if role == "surge" else 1.0):
             continue
-        middle = 0.5 * float(np.sum(np.quantile(values, (0.02, 0.98))))
+        middle = 0.5 * float(np.sum(ends))
         yield Condition(f"{word}: below {middle:.2f} {unit}", values < middle)
         yield Condition(f"{word}: above {middle:.2f} {unit}", values >= middle)
 

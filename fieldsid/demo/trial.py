@@ -22,7 +22,6 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.design.leg import Leg
 
 TRAIN_SPEEDS = (1.0, 1.4, 1.8)
-PLANNED_SPEED = 1.4
 CHECK_SPEEDS = (1.2, 1.6)
 SEED = 1848
 

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 File: TypeAlias = "str | PathLike[str]"
 OWN_EFFECTS = Path("effects")
+UNKNOWN = Vehicle("")
+"""A vehicle that nothing is stated of."""
 
 
 def own_effects() -> None:
@@ -55,39 +57,27 @@ def names_of(names: str | Iterable[str] | None) -> tuple[str, ...]:
     return tuple(n.strip() for n in parts if n.strip())
 
 
-def vehicle_of(vehicle: Vehicle | File | None) -> Vehicle | None:
-    """Return a vehicle, that of a file, or without one that of the working folder where it has one; raises VehicleError."""
+def vehicle_of(vehicle: Vehicle | File | None) -> Vehicle:
+    """Return a vehicle, that of a file, or without one that of the working folder, else one that states nothing.
+
+    Raises VehicleError.
+    """
     if isinstance(vehicle, Vehicle):
         return vehicle
-    return find_vehicle(Path()) if vehicle is None else load_vehicle(Path(vehicle))
+    return (find_vehicle(Path()) or UNKNOWN) if vehicle is None else load_vehicle(Path(vehicle))
 
 
-def length_of(vehicle: Vehicle | None) -> float | None:
-    """Return the length of a vehicle in m, None where it is not stated."""
-    return None if vehicle is None else vehicle.length_m
-
-
-def fin_rate_of(vehicle: Vehicle | None) -> float | None:
-    """Return the fastest that the fins of a vehicle turn in rad/s, None where it is not stated."""
-    return None if vehicle is None else vehicle.fin_rate_rad_s
-
-
-def fins_of(vehicle: Vehicle | None, axis: Axis) -> PlaneFins | None:
+def fins_of(vehicle: Vehicle, axis: Axis) -> PlaneFins | None:
     """Return the fins that an axis' command is made of; None where it is one."""
-    return None if vehicle is None or vehicle.fins is None else vehicle.fins.of(axis.value)
+    return None if vehicle.fins is None else vehicle.fins.of(axis.value)
 
 
-def signal_limits(vehicle: Vehicle | None) -> dict[str, float]:
-    """Return the fin limits of a vehicle in rad by signal, without those it does not state."""
-    return {} if vehicle is None else vehicle.signal_limits
-
-
-def fin_limit_of(vehicle: Vehicle | None, source: ParameterSource, say: Callable[[str], None], fin: str = "fin limit") -> float:
+def fin_limit_of(vehicle: Vehicle, source: ParameterSource, say: Callable[[str], None], fin: str = "fin limit") -> float:
     """Return the largest angle of the fin in rad where none is given: the vehicle's limit, or that of the models' runs.
 
     say is called with the last, and what the `fin` is called. Raises UsageError where there is none.
     """
-    if vehicle is not None and (limit := vehicle.fin_max_rad(source.axis.value)) is not None:
+    if (limit := vehicle.fin_max_rad(source.axis.value)) is not None:
         return limit
     fins: Sequence[float] = [m.trained["fin_max"] for m in source.models if m.trained.get("fin_max", 0.0) > 0]
     if not fins:

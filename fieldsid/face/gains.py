@@ -11,9 +11,7 @@ from fieldsid.face.arguments import (
     File,
     designed_from,
     fin_limit_of,
-    fin_rate_of,
     fins_of,
-    length_of,
     own_effects,
     run_files,
     runs_behind,
@@ -79,7 +77,7 @@ def turn_radius(
         measured=runs_mapped(measured, mapping),
         method=method,
         fin_zero=fin_zero,
-        length=length_of(known),
+        length=known.length_m,
     )
 
 
@@ -132,10 +130,10 @@ def design_schedule(
         fin_limit_of(known, source, _say) if fin_limit is None else fin_limit,
         speeds=speeds_of(speeds),
         wish=Wish(controller or usual_controller(source), damping, phase_margin, step, bandwidth, settling, overshoot, fin_use),
-        limits=FinLimits(fin_lag, delay, fin_rate_of(known) if fin_rate is None else fin_rate, latency),
+        limits=FinLimits(fin_lag, delay, known.fin_rate_rad_s if fin_rate is None else fin_rate, latency),
         depth=depth,
         runs=runs_behind(source, _say),
-        length=length_of(known),
+        length=known.length_m,
         fins=fins_of(known, source.axis),
     )
 

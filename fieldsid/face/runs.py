@@ -12,12 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeGuard, cast
 
 from fieldsid.errors import LogError, UsageError
-from fieldsid.face.arguments import File, signal_limits, vehicle_of
+from fieldsid.face.arguments import File, vehicle_of
 from fieldsid.face.several import Several
-from fieldsid.logs import ChannelMap, Run, Source, load_run
-from fieldsid.logs.convert.assemble import WHOLE
+from fieldsid.logs import ChannelMap, Run
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
-from fieldsid.logs.importing import runs_under_way
+from fieldsid.logs.importing import Importer
 from fieldsid.logs.reader import neighbours
 
 if TYPE_CHECKING:
@@ -31,43 +30,25 @@ Logs: TypeAlias = "Log | Iterable[Log] | Mapping[str, DataFrame]"
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """How logs are read: mapping, single channels, message definitions, what is allowed, and the part that is taken in s.
+    """How logs are read, the fin limits (rad) they are judged by, and the part of each run that is taken in s."""
 
-    `joined` are the other tables of a run of which the one file that is read is one. `recognise`: a log without a mapping is read
-    by what `inspect` proposes, where that is in no doubt.
-    """
-
-    mapping: ChannelMap | Path | None = None
-    channels: Mapping[str, Source] = field(default_factory=dict)
-    msg_path: Path | None = None
-    salvage: bool = False
-    max_gap_s: float = MAX_GAP_S
+    importer: Importer = field(default_factory=lambda: Importer(whole=True))
     fin_max_rad: Mapping[str, float] = field(default_factory=dict)
     start: float | None = None
     end: float | None = None
-    whole: bool = True
-    joined: tuple[Path, ...] = ()
-    recognise: bool = False
 
     def of_file(self, path: Path) -> list[Run]:
         """Return the run of a file, or where not all of it is wanted its stretches under way."""
-
-        def load_part(part: tuple[float, float], max_gap_s: float) -> Run:
-            return load_run(
-                path, self.mapping, channels=self.channels, msg_path=self.msg_path, joined=self.joined, salvage=self.salvage,
-                max_gap_s=max_gap_s, part=part, fin_max_rad=self.fin_max_rad, recognise=self.recognise,
-            )  # fmt: skip
-
-        if self.whole or not (self.start is None and self.end is None):
-            return [self.part(load_part(WHOLE, self.max_gap_s))]
-        return runs_under_way(load_part, self.max_gap_s)
+        return [self.part(run) for run in self.importer.read(path, self.fin_max_rad)]
 
     def of_table(self, table: DataFrame, name: str) -> Run:
         """Return the run of a pandas table."""
+        from fieldsid.logs.mapping.mapping_file import channel_of
         from fieldsid.logs.pandas_table import run_of_frame
 
+        how = self.importer
         run = run_of_frame(
-            table, name, self.mapping, channels=self.channels, salvage=self.salvage, max_gap_s=self.max_gap_s,
+            table, name, how.mapping, channels=dict(map(channel_of, how.channels)), salvage=how.salvage, max_gap_s=how.max_gap_s,
             fin_max_rad=self.fin_max_rad,
         )  # fmt: skip
         return self.part(run)
@@ -102,22 +83,17 @@ def load(
     is missing or cannot be read and for a pattern without a file, MappingError where no column is known, DataError where the
     part is empty, UsageError for what is no log.
     """
-    from fieldsid.logs.mapping.mapping_file import channel_of
-
     files = _tables_of_one_run(logs) if join else []
-    reading = Reading(
-        mapping=_mapping(mapping),
-        channels=dict(channel_of(text) for text in channel),
-        msg_path=None if msg_path is None else Path(msg_path),
-        salvage=salvage,
+    importer = Importer(
+        _mapping(mapping),
+        tuple(channel),
+        None if msg_path is None else Path(msg_path),
         max_gap_s=max_gap,
-        fin_max_rad=signal_limits(vehicle_of(vehicle)),
-        start=start,
-        end=end,
-        whole=whole,
+        salvage=salvage,
+        whole=whole or start is not None or end is not None,
         joined=tuple(files[1:]),
     )
-    return runs_of(files[0] if files else logs, reading)
+    return runs_of(files[0] if files else logs, Reading(importer, vehicle_of(vehicle).signal_limits, start, end))
 
 
 def _tables_of_one_run(logs: Logs) -> list[Path]:
@@ -141,7 +117,7 @@ def runs_mapped(
     logs: Logs, mapping: ChannelMap | File | None, start: float | None = None, end: float | None = None
 ) -> Several[Run]:
     """Return the runs of logs as every command but `import` reads them, cut to start .. end s; raises as `load` does."""
-    return runs_of(logs, Reading(mapping=_mapping(mapping), start=start, end=end, recognise=True))
+    return runs_of(logs, Reading(Importer(_mapping(mapping), whole=True, recognise=True), start=start, end=end))
 
 
 def files_of(name: File, what: str = "log") -> list[Path]:
@@ -189,8 +165,10 @@ def _no_log(item: Any) -> UsageError:
     )
 
 
-def _mapping(mapping: ChannelMap | File | None) -> ChannelMap | Path | None:
-    return mapping if mapping is None or isinstance(mapping, ChannelMap) else Path(mapping)
+def _mapping(mapping: ChannelMap | File | None) -> ChannelMap | None:
+    from fieldsid.logs.mapping.mapping_file import load_mapping
+
+    return mapping if mapping is None or isinstance(mapping, ChannelMap) else load_mapping(Path(mapping))
 
 
 def _plain(pattern: Path) -> Path:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fieldsid.face.arguments import File, fin_rate_of, own_effects, vehicle_of
+from fieldsid.face.arguments import File, own_effects, vehicle_of
 from fieldsid.face.models import Models, source_of
 
 if TYPE_CHECKING:
@@ -25,8 +25,7 @@ def compare_models(old: Models, new: Models, *, vehicle: Vehicle | File | None =
 
     own_effects()
     before, known = source_of(old), vehicle_of(vehicle)
-    limit = None if known is None else known.fin_max_rad(before.axis.value)
-    stated = FinLimits(rate=fin_rate_of(known))
+    limit, stated = known.fin_max_rad(before.axis.value), FinLimits(rate=known.fin_rate_rad_s)
     return compare_sources(before, source_of(new), fin_limit=limit, stated=stated)
 
 

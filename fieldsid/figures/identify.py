@@ -30,8 +30,7 @@ def residual_figure(fit: Fit, index: int = 0) -> Figure:
 
 def history_figure(fit: Fit, history: History) -> Figure:
     """Return the recursive estimates over time."""
-    view = rls.TrackView(history.time, history.names, fit.model.units, history.values, history.std_errors, history.settled_s)
-    return rls.panels(view, f"{', '.join(fit.model.runs)}, {fit.model.axis.value}: {fit.model.method}")
+    return rls.panels(history, fit.model.units, f"{', '.join(fit.model.runs)}, {fit.model.axis.value}: {fit.model.method}")
 
 
 def view_of(shown: Prediction, fit: Fit) -> motion.MotionView:

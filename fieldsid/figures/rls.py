@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fieldsid.figures import canvas
+from fieldsid.fitting.problem.estimator import History
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.rounding import TWO_SIDED_95
 
@@ -17,31 +17,15 @@ START_UP = 0.15
 """Share of the record whose wild first estimates do not set the scale of a panel."""
 
 
-@dataclass(frozen=True, slots=True)
-class TrackView:
-    """Estimates over time: time (n,) s; names; units; values and std_errors (n, p).
-
-    `settled` is the settle time by name, in s after the first sample, NaN if never.
-    """
-
-    time: FloatArray
-    names: Sequence[str]
-    units: Mapping[str, str]
-    values: FloatArray
-    std_errors: FloatArray
-    settled: Mapping[str, float]
-
-
-def draw(view: TrackView, ax: Axes, index: int) -> None:
+def draw(view: History, ax: Axes, index: int, unit: str) -> None:
     """Draw one parameter (by its place in `names`) over time."""
     name = view.names[index]
     value, band = view.values[:, index], TWO_SIDED_95 * view.std_errors[:, index]
-    unit = view.units.get(name, "")
     canvas.dress(ax, y=f"{name}, {unit}" if unit else name)
     ax.fill_between(view.time, value - band, value + band, color=canvas.SECOND, alpha=0.2, linewidth=0, label="95 % band")
     ax.plot(view.time, value, color=canvas.SECOND, linewidth=1.3, label="estimate")
     ax.axhline(float(value[-1]), color="0.3", linewidth=0.8, linestyle=":", label="last value")
-    at = view.settled.get(name, float("nan"))
+    at = view.settled_s.get(name, float("nan"))
     if np.isfinite(at):
         when = float(view.time[0]) + at
         ax.axvline(when, color=canvas.SIMULATED, linewidth=1.1, linestyle="--", label="settled")
@@ -49,28 +33,28 @@ def draw(view: TrackView, ax: Axes, index: int) -> None:
             f"after {at:.1f} s", (when, 1.0), xycoords=("data", "axes fraction"), xytext=(4, -11),
             textcoords="offset points", color=canvas.SIMULATED, fontsize=9,
         )  # fmt: skip
-    elif view.settled:
+    elif view.settled_s:
         ax.annotate("not settled", (0.99, 0.04), xycoords="axes fraction", ha="right", color=canvas.SIMULATED, fontsize=9)
     ax.set_xlim(view.time[0], view.time[-1])
     ax.set_ylim(*_scale(value, band))
 
 
-def panels(view: TrackView, of: str) -> Figure:
+def panels(view: History, units: Mapping[str, str], of: str) -> Figure:
     """Return a sheet with one panel per parameter; its title says when each settled, and what the estimates are of."""
     count = len(view.names)
     figure = canvas.sheet(9.0, 1.2 + 1.9 * count, f"{of}: {settling(view)}")
     axes = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
     for i, ax in enumerate(axes):
-        draw(view, ax, i)
+        draw(view, ax, i, units.get(view.names[i], ""))
     canvas.legend_above(axes[0])
     axes[-1].set_xlabel("time, s")
     figure.align_ylabels(list(axes))
     return figure
 
 
-def settling(view: TrackView) -> str:
+def settling(view: History) -> str:
     """Return in words when each parameter settled."""
-    ends = {name: view.settled.get(name, float("nan")) for name in view.names}
+    ends = {name: view.settled_s.get(name, float("nan")) for name in view.names}
     settled = [f"{name} settled after {at:.1f} s" for name, at in ends.items() if np.isfinite(at)]
     return ", ".join([*settled, *(f"{name} did not" for name, at in ends.items() if not np.isfinite(at))])
 

@@ -44,18 +44,15 @@ def free_run(found: Comparison, title: str) -> tuple[str, str]:
     return chart(panels, "time, s", title), legend(named)
 
 
-def loop_before(loop: Loop) -> tuple[str, str]:
-    """Return the chart of the first model's free run over its measurement, the worst stretches shaded, and its legend."""
-    return _loop_motion(loop, [(loop.start, loop.before, "second")], f"the {loop.start} and the measurement")
+def loop_motion(loop: Loop, *, has_last: bool) -> tuple[str, str]:
+    """Return the chart of the first model's free run over its measurement, that of the last beside it if asked, and its legend.
 
-
-def loop_after(loop: Loop) -> tuple[str, str]:
-    """Return the chart of the first and the last model's free runs over the measurement, and its legend."""
-    models = [(loop.start, loop.before, "second"), (f"with {', '.join(loop.added)}", loop.after, "simulated")]
-    return _loop_motion(loop, models, "the model with what was added, and the measurement")
-
-
-def _loop_motion(loop: Loop, models: Sequence[tuple[str, Comparison, str]], title: str) -> tuple[str, str]:
+    The worst stretches of the first are shaded.
+    """
+    models, title = [(loop.start, loop.before, "second")], f"the {loop.start} and the measurement"
+    if has_last:
+        models.append((f"with {', '.join(loop.added)}", loop.after, "simulated"))
+        title = "the model with what was added, and the measurement"
     record, is_rate = loop.before.shown.record, loop.before.leading.name == "rate"
     values, ok = (record.rate, record.rate_ok) if is_rate else (record.angle, record.angle_ok)
     seen, there = thinned(record.time, np.where(ok, DEG * values, np.nan))

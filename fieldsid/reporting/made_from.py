@@ -7,10 +7,9 @@ from pathlib import PurePosixPath
 
 from fieldsid.page import Block
 from fieldsid.trial_folder.journal import Hashes, made_by, relative_to
+from fieldsid.trial_folder.patterns import FEW
 from fieldsid.trial_folder.state import LOG, RUN, FolderState, Item, Source
 
-FEW = 3
-"""Files of one folder up to which each is named with its folder."""
 NOT_HASHED = "too large"
 HASH = 8
 """Characters of a SHA-256 that are shown."""
@@ -36,7 +35,7 @@ def _row(item: Item, state: FolderState, now: Mapping[str, str]) -> tuple[str, .
         now[item.path][:HASH],
         item.kind,
         "; ".join([*_together(plain, now), *told]),
-        "" if maker is None else " ".join(maker.command[1 : 3 if maker.command[1] == "schedule" else 2]),
+        "" if maker is None else maker.name,
         item.standing,
     )
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from fieldsid.comparison.compare import Comparison, compare_one
 from fieldsid.display import Brief
@@ -114,7 +114,7 @@ def _tried(read: Callable[[], T], what: str, skipped: list[str]) -> T | None:
 def _fitted_to(state: FolderState) -> set[str]:
     """Return the names of the runs that the best models were fitted to."""
     best = {path for axis in ("yaw", "pitch") for path in chosen_models(state, axis)}
-    return {str(r) for i in state.of_kind(MODEL) if i.path in best for r in (i.body or {}).get("runs", ())}
+    return {r for i in state.of_kind(MODEL) if i.path in best for r in i.runs}
 
 
 def _chosen(places: Sequence[Path], fitted: set[str]) -> list[Path]:
@@ -174,8 +174,7 @@ def _shown(state: FolderState, path: Path, runs: Sequence[Run], skipped: list[st
 
 def _last(state: FolderState, kind: str, axis: str, skipped: list[str]) -> Item | None:
     """Return the newest file of a kind for an axis that says enough to be drawn; a turning radius is that of the yaw."""
-    items = [i for i in state.of_kind(kind) if _axis_of(i) == axis and _is_complete(i, skipped)]
-    return max(items, key=lambda i: state.place(i).stat().st_mtime_ns, default=None)
+    return state.newest(i for i in state.of_kind(kind) if (i.axis or "yaw") == axis and _is_complete(i, skipped))
 
 
 def _is_complete(item: Item, skipped: list[str]) -> bool:
@@ -185,7 +184,3 @@ def _is_complete(item: Item, skipped: list[str]) -> bool:
         skipped.append(f"{item.path}: {error}")
         return False
     return True
-
-
-def _axis_of(item: Item) -> Any:
-    return (item.body or {}).get("axis", "yaw")

@@ -13,8 +13,6 @@ from fieldsid.page import dense
 from fieldsid.templates import template_path
 
 PAGE, STYLE, SCRIPT = "report.html", "report.css", "report.js"
-LARGEST = 3_000_000
-"""Bytes that a page stays below, so that it can be sent from a boat."""
 
 
 def html_of(context: Mapping[str, Any]) -> str:

@@ -22,14 +22,12 @@ from fieldsid.schedule.record import Schedule
 from fieldsid.trial_folder.journal import Entry
 from fieldsid.trial_folder.next_step import REPORT, verification_of
 from fieldsid.trial_folder.patterns import shortened
-from fieldsid.trial_folder.state import FolderState, Item
+from fieldsid.trial_folder.state import DONE, FolderState, Item
 from fieldsid.turning.prediction import turn_words
 from fieldsid.views._candidates import candidates
 from fieldsid.views._words import merit_blocks, parameter_block
 from fieldsid.views.schedule import blocks_of
 from fieldsid.views.turn_prediction import turns_of
-
-DONE = (0, 1)
 
 
 def context_of(material: Material) -> dict[str, Any]:
@@ -58,8 +56,8 @@ def _verdicts(axis: AxisMaterial, state: FolderState) -> list[dict[str, str]]:
     best = axis.shown[0]
     out = []
     if best.found:
-        seen, unseen = _split(best)
-        judged = unseen or seen
+        unseen = [c for c in best.found if not best.was_fitted_to(c.run)]
+        judged = unseen or best.found
         over = pooled(c.over_noise for c in judged)
         on = f"{counted(len(judged), 'run')} {'it was not fitted to' if unseen else 'it was fitted to'}"
         worst = max(judged, key=lambda c: c.badness)
@@ -69,20 +67,15 @@ def _verdicts(axis: AxisMaterial, state: FolderState) -> list[dict[str, str]]:
         says = f"error {over:.2f} x the noise on {on}{most}{tail}" if over < MANY else _without_noise(judged, on)
         effects = f" with {', '.join(best.model.effects)}" if best.model.effects else ""
         out.append({"what": f"{axis.axis} model{effects}", "says": says, "state": "good" if good else "warn"})
-    if axis.diagnosis is not None and axis.diagnosis.body is not None:
+    if axis.diagnosis is not None:
         body = axis.diagnosis.body
         says = str(body.get("short") or body.get("says", ""))
         out.append({"what": f"{axis.axis} diagnosis: {body['verdict']}", "says": says, "state": "plain"})
-    if axis.turning is not None and axis.turning.body is not None:
+    if axis.turning is not None:
         out.append(_turn_verdict(axis.turning.body))
     if axis.schedule is not None and axis.gains is not None:
         out.append(_gain_verdict(axis.gains, verification_of(state, axis.schedule)))
     return out
-
-
-def _split(shown: Shown) -> tuple[list[Any], list[Any]]:
-    seen = [c for c in shown.found if shown.was_fitted_to(c.run)]
-    return seen, [c for c in shown.found if not shown.was_fitted_to(c.run)]
 
 
 def _turn_verdict(body: Mapping[str, Any]) -> dict[str, str]:
@@ -143,7 +136,7 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
 
 def _loop(loop: Loop) -> dict[str, Any]:
     """Return the loop in four charts: the first model fails, where; with what was added, and the error after each step."""
-    (before, before_key), (after, after_key) = figures.loop_before(loop), figures.loop_after(loop)
+    (before, before_key), (after, after_key) = (figures.loop_motion(loop, has_last=last) for last in (False, True))
     return {
         "run": loop.run, "start": loop.start, "added": ", ".join(loop.added),
         "before": before, "before_key": before_key, "before_left": loop.left_by(loop.before),
@@ -186,7 +179,7 @@ def _errors(shown: Shown) -> Block:
 
 
 def _candidates(item: Item | None) -> tuple[Block, str] | None:
-    return None if item is None or item.body is None else candidates(item.body, DEGREES)
+    return None if item is None else candidates(item.body, DEGREES)
 
 
 def _parameters(told: Sequence[Shown]) -> Block:
@@ -212,9 +205,8 @@ def _laws(axis: AxisMaterial) -> list[dict[str, str]]:
 
 
 def _radius(item: Item) -> dict[str, Any]:
-    body: Mapping[str, Any] = item.body or {}
-    drawn, key = figures.radius(body)
-    return {"chart": drawn, "legend": key, "blocks": turns_of(body, DEGREES), "path": item.path}
+    drawn, key = figures.radius(item.body)
+    return {"chart": drawn, "legend": key, "blocks": turns_of(item.body, DEGREES), "path": item.path}
 
 
 def _gains(gains: Schedule, path: str) -> dict[str, Any]:
@@ -236,13 +228,5 @@ def _vehicle(material: Material) -> list[tuple[str, str]]:
 
 def _commands(state: FolderState) -> list[dict[str, str]]:
     """Return the commands that made what is there: those of the journal that ended well and wrote something or gave a result."""
-    told = [e for e in _told(state.entries) if e.exit in DONE]
-    return [{"line": shortened(e.command, state.folder), "verdict": e.verdict, "time": _when(e)} for e in told]
-
-
-def _told(entries: Sequence[Entry]) -> list[Entry]:
-    return [e for e in entries if e.command[1:2] not in (("report",), ("status",))]
-
-
-def _when(entry: Entry) -> str:
-    return datetime.fromisoformat(entry.time).astimezone().strftime("%Y-%m-%d %H:%M")
+    told = [e for e in state.entries if e.exit in DONE and e.name not in ("report", "status")]
+    return [{"line": shortened(e.command, state.folder), "verdict": e.verdict, "time": e.when} for e in told]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.run import Note
+from fieldsid.page import counted
 from fieldsid.trial_folder.state import RUN, FolderState
 from fieldsid.vehicle import find_vehicle
 
@@ -18,13 +19,12 @@ def contradicted_limits(state: FolderState) -> list[Note]:
         return []
     found = []
     for fin, limit in (("rudder", vehicle.rudder_max_rad), ("elevator", vehicle.elevator_max_rad)):
-        reach = [r for i in state.of_kind(RUN) for name, r in (i.fins or {}).items() if name.startswith(fin)]
+        reach = [r for i in state.of_kind(RUN) for name, r in i.fins.items() if name.startswith(fin)]
         beyond = [r for r in reach if limit is not None and r > limit]
         if beyond:
-            runs = "1 run" if len(beyond) == 1 else f"{len(beyond)} runs"
             message = (
                 f"vehicle.yaml: `{fin}_max_rad: {limit:.4g}` is less than the {max(beyond):.4g} rad that the {fin} went to in "
-                f"{runs}: correct it, or log the measured fin where it stopped"
+                f"{counted(len(beyond), 'run')}: correct it, or log the measured fin where it stopped"
             )
             found.append(Note("fin_limit", message, {"signal": f"{fin}_rad", "value": max(beyond), "limit": limit}))
     return found

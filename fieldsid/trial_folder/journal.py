@@ -78,15 +78,15 @@ class Entry(Brief):
         """The command without what it was given: `schedule verify`, `report`."""
         return " ".join(self.command[1 : 3 if self.command[1:2] in GROUPS else 2])
 
+    @property
+    def when(self) -> str:
+        """When it was run, by the clock of this machine."""
+        return datetime.fromisoformat(self.time).astimezone().strftime("%Y-%m-%d %H:%M")
+
 
 def is_trial(folder: Path) -> bool:
     """Whether a folder is that of a trial: it holds a journal, which is a file of its own and no link to another."""
-    return (folder / JOURNAL).is_file() and not is_linked(folder)
-
-
-def is_linked(folder: Path) -> bool:
-    """Whether what would be the journal of a folder is a symbolic link: it is neither read nor written, wherever it leads."""
-    return (folder / JOURNAL).is_symlink()
+    return (folder / JOURNAL).is_file() and not (folder / JOURNAL).is_symlink()
 
 
 def append(folder: Path, entry: Entry) -> None:

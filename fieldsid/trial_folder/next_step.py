@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import chdir
+from itertools import takewhile
 from pathlib import Path
 
 from fieldsid.comparison.left_by import left_by_addition
@@ -22,9 +23,6 @@ from fieldsid.trial_folder.make import LOGS, MAPPING, RUNS
 from fieldsid.trial_folder.patterns import shortened
 from fieldsid.trial_folder.state import LOG, MODEL, RUN, FolderState, Item, state_of
 from fieldsid.vehicle import find_vehicle
-
-DONE = (0, 1)
-"""Exit codes of a command that gave a result."""
 
 DONE_ALL = ("everything rests on what is there", "")
 REPORT = "sysid report"
@@ -47,7 +45,7 @@ def step_before(command: str, state: FolderState) -> tuple[str, str]:
         runs = [i for i in state.of_kind(RUN) if any(may_show(run, Axis.YAW) for run in _loaded(state, i))]
         if not runs:
             return "there is no model of the yaw, and no run with a rudder", ""
-        return "there is no model of the yaw yet", shlex.join(["sysid", "identify", "--axis", "yaw", *_joint(runs)])
+        return "there is no model of the yaw yet", _line("identify", "--axis", "yaw", *_joint(runs))
     return next_step(state)
 
 
@@ -59,11 +57,16 @@ def _again(state: FolderState) -> tuple[str, str] | None:
     order = (RUN, MODEL)  # what the rest is made from
     first = min(stale, key=lambda i: (i.stale.endswith(" is stale"), order.index(i.kind) if i.kind in order else len(order)))
     maker = made_by(state.entries, first.path)
-    return f"{first.path}: {first.stale}", _made_again(state, maker) if maker is not None else _remake(state, first)
+    return f"{first.path}: {first.stale}", _remake(state, first) if maker is None else _forced(_words(state, maker))
 
 
-def _made_again(state: FolderState, entry: Entry) -> str:
-    words = _words(state, entry)
+def _line(*words: str) -> str:
+    """Return the line of a command, ready to paste."""
+    return shlex.join(["sysid", *words])
+
+
+def _forced(words: Sequence[str]) -> str:
+    """Return the line of a command that was run before, which replaces what it wrote then."""
     return shlex.join([*words, *([] if "--force" in words else ["--force"])])
 
 
@@ -77,25 +80,24 @@ def _words(state: FolderState, entry: Entry) -> list[str]:
 
 def _remake(state: FolderState, item: Item) -> str:
     """Return how to make a file again that the journal does not know, as far as the file says how."""
-    axis = str((item.body or {}).get("axis", "yaw"))
+    axis, folder = item.axis or "yaw", str(Path(item.path).parent)
     named = [s.named for s in item.sources]
     mappings = [name for name in named if name.endswith((".yaml", ".yml"))]
     logs = [name for name in named if name not in mappings]
     if item.kind == RUN and logs:  # of one that was piped in nothing says where it came from
-        read = [*logs, *(word for name in mappings for word in ("--mapping", name))]
-        return shlex.join(["sysid", "import", *read, "-o", str(Path(item.path).parent), "--force"])
+        return _line("import", *logs, *_repeated("--mapping", mappings), "-o", folder, "--force")
     if item.kind == MODEL:
-        read = [*run_words(state), *_mapped(item)]
-        return shlex.join(["sysid", "identify", *read, "--axis", axis, "-o", str(Path(item.path).parent), "--force"])
+        mapping = item.body.get("mapping")
+        read = [*run_words(state), *([] if mapping is None else ["--mapping", str(mapping["path"])])]
+        return _line("identify", *read, "--axis", axis, "-o", folder, "--force")
     if item.kind == "diagnosis":
-        return shlex.join(["sysid", "diagnose", *run_words(state), "--axis", axis, "-o", item.path, "--force"])
-    return shlex.join(["sysid", "history", item.path])
+        return _line("diagnose", *run_words(state), "--axis", axis, "-o", item.path, "--force")
+    return _line("history", item.path)
 
 
-def _mapped(item: Item) -> list[str]:
-    """Return the option by which a model's logs are read, where a mapping was named for them."""
-    named = (item.body or {}).get("mapping")
-    return [] if named is None else ["--mapping", str(named["path"])]
+def _repeated(option: str, values: Iterable[str]) -> list[str]:
+    """Return an option that takes one value, once for each of them."""
+    return [word for value in values for word in (option, value)]
 
 
 def _sides(state: FolderState) -> tuple[str, str] | None:
@@ -108,7 +110,7 @@ def _sides(state: FolderState) -> tuple[str, str] | None:
         if not inner.models and line:
             return f"{side}: {why}", f"cd {shlex.quote(side)} && {line}"
     if len(state.sides) == 2 and not any(e.name == "compare" and set(state.sides) <= set(e.command) for e in state.entries):
-        return f"{' and '.join(state.sides)} have models", shlex.join(["sysid", "compare", *state.sides])
+        return f"{' and '.join(state.sides)} have models", _line("compare", *state.sides)
     return _use(state) or DONE_ALL
 
 
@@ -127,9 +129,9 @@ def _data(state: FolderState) -> tuple[str, str] | None:
         words = ["sysid", "import", *_left_out(state, *new, "-o", RUNS), *reading]
         return "there is no run of the logs yet", shortened(words, state.folder)
     if plans := state.of_kind("plan"):
-        axis = str((plans[-1].body or {}).get("axis", Axis.YAW.value))
-        live = ["sysid", "live", "--axis", axis, "--udp", str(PORT), *_left_out(state, "--plan", plans[-1].path)]
-        return f"there is no log yet: fly {plans[-1].path} and put the logs in {LOGS}/", shlex.join(live)
+        axis, path = plans[-1].axis or Axis.YAW.value, plans[-1].path
+        live = _line("live", "--axis", axis, "--udp", str(PORT), *_left_out(state, "--plan", path))
+        return f"there is no log yet: fly {path} and put the logs in {LOGS}/", live
     return "there is no log yet", f"sysid plan --axis yaw --speeds {_speeds(state.folder)}"
 
 
@@ -144,47 +146,41 @@ def _speeds(folder: Path) -> str:
 def _model(state: FolderState) -> tuple[str, str] | None:
     axis = _axis(state)
     if not state.of_kind(MODEL):
-        runs = state.of_kind(RUN)
-        return "there is no model of the runs yet", shlex.join(
-            ["sysid", "identify", *_left_out(state, *run_words(state)), "--axis", axis, *_joint(runs)]
-        )
-    diagnosis = next((e for e in reversed(state.entries) if e.command[1:2] == ("diagnose",) and e.exit in DONE), None)
-    kept = state.of_kind("diagnosis")
-    if diagnosis is None and not kept:
+        runs = _left_out(state, *run_words(state))
+        return "there is no model of the runs yet", _line("identify", *runs, "--axis", axis, *_joint(state.of_kind(RUN)))
+    diagnosis = next(reversed(state.done("diagnose")), None)
+    kept = state.newest(state.of_kind("diagnosis"))
+    if diagnosis is None and kept is None:
         if not (words := run_words(state)):
             return None
-        return "no diagnosis yet", shlex.join(["sysid", "diagnose", *_left_out(state, *words), "--axis", axis])
+        return "no diagnosis yet", _line("diagnose", *_left_out(state, *words), "--axis", axis)
     if (unsettled := _unsettled(state, diagnosis)) is not None:
         return unsettled
     best = state.models[0]
-    have = set((best.body or {}).get("effects", ()))
-    named = diagnosis.named if diagnosis is not None else _named(max(kept, key=lambda i: state.place(i).stat().st_mtime_ns))
-    lacking = [e for e in named if e not in have]
+    named = diagnosis.named if diagnosis is not None else kept.effects if kept is not None else ()
+    lacking = [e for e in named if e not in best.effects]
     since = "" if diagnosis is None else diagnosis.time
-    tried = any(e.command[1:2] == ("extend",) and e.time >= since and e.exit in DONE for e in state.entries)
-    if lacking and not tried:
-        add = [w for e in lacking for w in ("--add", e)]
-        return f"the diagnosis names {', '.join(lacking)}", shlex.join(
-            ["sysid", "extend", *_left_out(state, best.path, *_typed_runs(state, best)), *add]
-        )
+    if lacking and not any(e.time >= since for e in state.done("extend")):
+        fitted, judged = diagnosed_runs(state, best)
+        typed = _left_out(state, best.path, *fitted, *_repeated("--validate", judged))
+        return f"the diagnosis names {', '.join(lacking)}", _line("extend", *typed, *_repeated("--add", lacking))
     return _searched_on(state, best)
 
 
 def _searched_on(state: FolderState, best: Item) -> tuple[str, str] | None:
     """Return how to ask what an extended model still lacks, by its own record, where no diagnosis asked since it was made."""
-    left = left_by_addition((best.body or {}).get("info") or {})
+    left = left_by_addition(best.body.get("info") or {})
     if is_noise(left):
         return None
     place = state.place(best)
     now = sha256_of(place)
-    asked = (e.command[1:2] == ("diagnose",) and e.exit in DONE and any(s.sha256 == now for s in e.inputs) for e in state.entries)
-    asking = (any(s.path == place.resolve() for s in i.sources) for i in state.of_kind("diagnosis"))
+    asked = (s.sha256 == now for e in state.done("diagnose") for s in e.inputs)
+    asking = (s.path == place.resolve() for i in state.of_kind("diagnosis") for s in i.sources)
     if any(asked) or any(asking):
         return None
-    words = ["sysid", "diagnose", *_left_out(state, *run_words(state)), "--axis", _axis(state), "--model", best.path]
-    return f"{best.path} leaves {left:.2f} x the noise" if left < MANY else f"{best.path} leaves more than the noise", shlex.join(
-        words
-    )
+    says = f"{left:.2f} x the noise" if left < MANY else "more than the noise"
+    line = _line("diagnose", *_left_out(state, *run_words(state)), "--axis", _axis(state), "--model", best.path)
+    return f"{best.path} leaves {says}", line
 
 
 def _unsettled(state: FolderState, diagnosis: Entry | None) -> tuple[str, str] | None:
@@ -199,29 +195,22 @@ def _unsettled(state: FolderState, diagnosis: Entry | None) -> tuple[str, str] |
     if verdict == "unexplained" and "--thorough" not in words:
         longer = shlex.join([*words, "--thorough", *(["--force"] if written and "--force" not in words else [])])
         return "the diagnosis explains not all, and a longer search may", longer
-    planned = any(e.command[1:2] == ("plan",) and e.time >= diagnosis.time and e.exit in DONE for e in state.entries)
+    planned = any(e.time >= diagnosis.time for e in state.done("plan"))
     kept = [s.path for s in diagnosis.outputs if s.path.endswith((".yaml", ".yml"))]
     if verdict == "undecided" and kept and not planned:
-        return "the diagnosis is undecided, and a maneuver would tell", shlex.join(
-            ["sysid", "plan", "--from", kept[0], "-o", "plan"]
-        )
+        return "the diagnosis is undecided, and a maneuver would tell", _line("plan", "--from", kept[0], "-o", "plan")
     return None
-
-
-def _named(diagnosis: Item) -> list[str]:
-    """Return the effects that a diagnosis file names."""
-    return [str(e) for e in (diagnosis.body or {}).get("effects", ())]
 
 
 def _use(state: FolderState) -> tuple[str, str] | None:
     schedules = state.of_kind("schedule")
     models = chosen_models(state)
-    design = ["sysid", "schedule", "design", *_left_out(state, *models), "-o"]
+    design = ["schedule", "design", *_left_out(state, *models), "-o"]
     if not schedules:
-        return ("no gains yet", shlex.join([*design, "gains.yaml"])) if models else None
+        return ("no gains yet", _line(*design, "gains.yaml")) if models else None
     gains = schedules[-1]
     if models and (old := _extended_since(state, gains)):
-        return f"{gains.path} rests on {old}, which was extended since", shlex.join([*design, gains.path, "--force"])
+        return f"{gains.path} rests on {old}, which was extended since", _line(*design, gains.path, "--force")
     if not is_trial(state.folder):
         return f"{gains.path} is there; no journal says whether it is verified", ""
     if verification_of(state, gains) is None:
@@ -238,25 +227,21 @@ def _extended_since(state: FolderState, gains: Item) -> str:
 
 def verification_of(state: FolderState, gains: Item) -> Entry | None:
     """Return the journal's last entry of a command that verified gains as they are now."""
-    done = [e for e in state.entries if e.name == "schedule verify" and e.exit in DONE]
+    done = state.done("schedule verify")
     now = sha256_of(state.place(gains)) if done else ""
     return next((e for e in reversed(done) if not e.inputs or now in {s.sha256 for s in e.inputs}), None)
 
 
 def _reported(state: FolderState) -> tuple[str, str] | None:
     """Return how the report is written, or written again where a command made something after it."""
-    reports = [i for i, e in enumerate(state.entries) if e.command[1:2] == ("report",) and e.exit in DONE]
+    reports = state.done("report")
     if not reports:
         return "there is no report yet", REPORT
-    since = [
-        e for e in state.entries[reports[-1] + 1 :] if any(s.path.endswith((".yaml", ".yml", ".parquet")) for s in e.outputs)
-    ]
-    if not since:
+    after = takewhile(lambda e: e is not reports[-1], reversed(state.entries))
+    made = [e for e in after if any(s.path.endswith((".yaml", ".yml", ".parquet")) for s in e.outputs)]
+    if not made:
         return None
-    entry = state.entries[reports[-1]]
-    words = [w for w in entry.command if w != "--json"]
-    again = shlex.join([*words, *([] if "--force" in words else ["--force"])])
-    return f"the report is older than what `sysid {since[-1].name}` made", again
+    return f"the report is older than what `sysid {made[0].name}` made", _forced(_words(state, reports[-1]))
 
 
 def chosen_models(state: FolderState, axis: str = "") -> list[str]:
@@ -264,20 +249,20 @@ def chosen_models(state: FolderState, axis: str = "") -> list[str]:
 
     Nothing where both planes have models and none is asked for.
     """
-    models = [i for i in state.models if not axis or (i.body or {}).get("axis") == axis]
-    if len({(i.body or {}).get("axis") for i in models}) > 1:
+    models = [i for i in state.models if not axis or i.axis == axis]
+    if len({i.axis for i in models}) > 1:
         return []
-    joint = [i for i in models if len((i.body or {}).get("runs", ())) > 1]
+    joint = [i for i in models if len(i.runs) > 1]
     if joint:
-        return [max(joint, key=lambda i: (len((i.body or {}).get("effects", ())), state.place(i).stat().st_mtime_ns)).path]
+        return [max(joint, key=lambda i: (len(i.effects), state.place(i).stat().st_mtime_ns)).path]
     return [i.path for i in models]
 
 
 def single_models(state: FolderState, axis: str) -> list[str]:
     """Return the models of one run each, with the most effects of any of them: points of the laws over speed."""
-    models = [i for i in state.models if (i.body or {}).get("axis") == axis and len((i.body or {}).get("runs", ())) == 1]
-    most = max((len((i.body or {}).get("effects", ())) for i in models), default=0)
-    return [i.path for i in models if len((i.body or {}).get("effects", ())) == most]
+    models = [i for i in state.models if i.axis == axis and len(i.runs) == 1]
+    most = max((len(i.effects) for i in models), default=0)
+    return [i.path for i in models if len(i.effects) == most]
 
 
 def root_of(state: FolderState, model: str) -> str:
@@ -299,9 +284,8 @@ def unseen_runs(state: FolderState, model: Item) -> list[str]:
 
 def trained_runs(state: FolderState, model: Item) -> list[str]:
     """Return the runs of a folder that a model was fitted to."""
-    fitted = {str(r) for r in (model.body or {}).get("runs", ())}
     named = {s.path for s in model.sources if s.path is not None}
-    return [i.path for i in state.of_kind(RUN) if state.place(i).resolve() in named and Path(i.path).stem in fitted]
+    return [i.path for i in state.of_kind(RUN) if state.place(i).resolve() in named and Path(i.path).stem in model.runs]
 
 
 def diagnosed_runs(state: FolderState, model: Item) -> tuple[list[str], list[str]]:
@@ -310,20 +294,13 @@ def diagnosed_runs(state: FolderState, model: Item) -> tuple[list[str], list[str
     Without a diagnosis of the model's plane, or where a run of it is no longer there, the runs that the model was fitted to: a
     run that an earlier addition held back would be lost to the next one otherwise.
     """
-    axis = (model.body or {}).get("axis")
-    made = [i for i in state.of_kind("diagnosis") if (i.body or {}).get("axis") == axis]
-    if made:
-        body = max(made, key=lambda i: state.place(i).stat().st_mtime_ns).body or {}
+    made = state.newest(i for i in state.of_kind("diagnosis") if i.axis == model.axis)
+    if made is not None:
         named = {stem_of(Path(r)): r for r in run_words(state)}
-        fitted, judged = ([str(r) for r in body.get(key) or ()] for key in ("runs", "validation_runs"))
+        fitted, judged = ([str(r) for r in made.body.get(key) or ()] for key in ("runs", "validation_runs"))
         if fitted and all(r in named for r in (*fitted, *judged)):
             return [named[r] for r in fitted], [named[r] for r in judged]
     return trained_runs(state, model), []
-
-
-def _typed_runs(state: FolderState, model: Item) -> list[str]:
-    fitted, judged = diagnosed_runs(state, model)
-    return [*fitted, *(w for r in judged for w in ("--validate", r))]
 
 
 def logs_to_import(state: FolderState, *, again: bool = False) -> list[str]:
@@ -354,7 +331,7 @@ def _joint(runs: Sequence[Item]) -> list[str]:
 def _axis(state: FolderState) -> str:
     """Return the plane of the models, else the one that most runs excite."""
     if state.models:
-        return str((state.models[0].body or {}).get("axis", "yaw"))
+        return state.models[0].axis or "yaw"
     return plane_of([run for i in state.of_kind(RUN) for run in _loaded(state, i)])
 
 

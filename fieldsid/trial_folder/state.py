@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from itertools import takewhile
 from pathlib import Path
@@ -23,6 +23,8 @@ from fieldsid.trial_folder.make import LOGS, MODELS, RUNS
 
 METADATA_KEY = b"fieldsid"
 LOG, RUN, MODEL, PLANNED = "log", "run", "model", "planned"
+DONE = (0, 1)
+"""Exit codes of a command that gave a result."""
 SETTINGS = ("vehicle", "mapping", "user-effect", "effect")
 """Kinds of files that a user writes: they are read, and made of nothing."""
 
@@ -49,8 +51,23 @@ class Item(Brief):
     sources: Annotated[tuple[Source, ...], Key("What it was made from, as it says itself.", "made_from")] = ()
     stale: Annotated[Words, Key("Why it does not hold any more; null where it does.")] = ""
     missing: Annotated[tuple[str, ...], Key("What it was made from and is not there any more.")] = ()
-    body: Mapping[str, Any] | None = None
-    fins: Mapping[str, float] | None = None
+    body: Mapping[str, Any] = field(default_factory=dict)
+    fins: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def axis(self) -> str | None:
+        """The plane that a record says it is of."""
+        return self.body.get("axis")
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects that a record names."""
+        return tuple(map(str, self.body.get("effects", ())))
+
+    @property
+    def runs(self) -> tuple[str, ...]:
+        """The names of the runs that a record says it was fitted to."""
+        return tuple(map(str, self.body.get("runs", ())))
 
     @property
     def standing(self) -> str:
@@ -77,18 +94,26 @@ class FolderState(Brief):
         """Return the files of one kind."""
         return tuple(i for i in self.items if i.kind == kind)
 
+    def newest(self, items: Iterable[Item]) -> Item | None:
+        """Return the file of some that was written last, None where there are none."""
+        return max(items, key=lambda i: (self.place(i).stat().st_mtime_ns, i.path), default=None)
+
+    def done(self, name: str) -> tuple[Entry, ...]:
+        """Return the journal's entries of a command that gave a result, the oldest first."""
+        return tuple(e for e in self.entries if e.name == name and e.exit in DONE)
+
     def place(self, item: Item) -> Path:
         """Return where a file is."""
         return self.folder / item.path
 
     def parents(self, item: Item) -> tuple[Source, ...]:
         """Return the file that a model was extended from, none for others."""
-        return _parents(item, self.folder)
+        return _sources(_named(item.body, "parent"), self.folder)
 
     def mapping_of(self, log: Path) -> Path | None:
         """Return the mapping that a model of a log was made with, None where none was named: the log is read without one."""
         for item in self.of_kind(MODEL):
-            sources = _sources(_named(_body(item), "mapping"), self.folder)
+            sources = _sources(_named(item.body, "mapping"), self.folder)
             if sources and any(s.path == log.resolve() for s in item.sources):
                 return sources[0].path
         return None
@@ -98,7 +123,7 @@ class FolderState(Brief):
         """The models that nothing was extended from, joint ones before those of one run."""
         parents = {str(s.path) for i in self.of_kind(MODEL) for s in self.parents(i)}
         leaves = [i for i in self.of_kind(MODEL) if str(self.place(i).resolve()) not in parents]
-        return tuple(sorted(leaves, key=lambda i: (len(_body(i).get("runs", ())) < 2, i.path)))
+        return tuple(sorted(leaves, key=lambda i: (len(i.runs) < 2, i.path)))
 
 
 def state_of(folder: Path, files: Sequence[Path] | None = None) -> FolderState:
@@ -218,14 +243,6 @@ def _found(named: str, folder: Path) -> Path | None:
 def _unknown(source: Source) -> str:
     """Return how an input is told of which nothing is known."""
     return source.named if source.path is None else f"{source.named} (too large to be hashed)"
-
-
-def _parents(item: Item, folder: Path) -> tuple[Source, ...]:
-    return _sources(_named(_body(item), "parent"), folder)
-
-
-def _body(item: Item) -> Mapping[str, Any]:
-    return item.body or {}
 
 
 def _judge(path: str, items: Mapping[str, Item], done: dict[str, Item], hashes: Hashes, folder: Path) -> Item:

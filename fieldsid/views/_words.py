@@ -7,13 +7,11 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.page import Block, counted, cut, facts
-from fieldsid.records.keys import body_of
-from fieldsid.rounding import MANY, RADIANS, Angles, in_unit, interval, number, with_error
+from fieldsid.rounding import MANY, Angles, in_unit, interval, number, with_error
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from fieldsid.fitting.estimates import Estimate
     from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit
     from fieldsid.logs import Note
     from fieldsid.models.model import Model, Noise
@@ -41,18 +39,14 @@ def speed_words(speed: float) -> str:
     return f"{speed:.2f} m/s" if isfinite(speed) else ""
 
 
-def estimate_words(e: Estimate) -> str:
-    """Return `a22 = 1.104 +/- 0.013 1/s`."""
-    return f"{e.name} = {with_error(e.value, e.std_error)} {e.unit}".rstrip()
-
-
 def base_words(model: Model) -> str:
-    """Return the base parameters of a model with their errors."""
+    """Return the base parameters of a model with their errors: `a22 = 1.104 +/- 0.013 1/s`."""
     from fieldsid.fitting.estimates import estimates
     from fieldsid.models.axis import NAMES
 
     base = NAMES[model.axis].base
-    return ", ".join(estimate_words(e) for e in estimates(model) if e.name in base)
+    known = (e for e in estimates(model) if e.name in base)
+    return ", ".join(f"{e.name} = {with_error(e.value, e.std_error)} {e.unit}".rstrip() for e in known)
 
 
 def parameter_block(model: Model) -> Block:
@@ -107,7 +101,7 @@ def percent(share: float) -> str:
     return f"{100 * share:.0f} %"
 
 
-def where_block(title: str, where: Iterable[Any], angles: Angles = RADIANS, most: int = 6) -> Block:
+def where_block(title: str, where: Iterable[Any], angles: Angles, most: int) -> Block:
     """Return where a model fails: condition, share of squared error and samples, rms over the whole run's, the worst time."""
     rows = [
         (
@@ -120,11 +114,6 @@ def where_block(title: str, where: Iterable[Any], angles: Angles = RADIANS, most
         for p in list(where)[:most]
     ]
     return Block(title, tuple(rows), ("", "of error", "of time", "rms ratio", "worst, s"))
-
-
-def where_rows(where: Iterable[Any]) -> list[dict[str, Any]]:
-    """Return where a model fails as rows of a table."""
-    return [body_of(p) for p in where]
 
 
 def table(rows: Iterable[Mapping[str, Any]], index: str | None = None) -> DataFrame:

@@ -10,7 +10,7 @@ from fieldsid.figures.kinds import sketch
 from fieldsid.page import Block, Page, Whole, cut, facts
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import RADIANS, Angles, number, p_value, times_noise
-from fieldsid.views._words import percent, speed_words, table, warned, where_block, where_rows
+from fieldsid.views._words import percent, speed_words, table, warned, where_block
 
 if TYPE_CHECKING:
     from fieldsid.comparison.compare import Comparison
@@ -73,7 +73,7 @@ def frames(found: Comparison) -> Frames:
     }
     return {
         "errors": lambda: table([row], "run"),
-        "where": lambda: table(where_rows(found.where)),
+        "where": lambda: table(map(body_of, found.where)),
         "motion": lambda: motion((found.shown,)),
     }
 

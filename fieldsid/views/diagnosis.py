@@ -11,7 +11,7 @@ from fieldsid.page import Block, Page, cut, paragraph
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import RADIANS, Angles
 from fieldsid.views._candidates import candidates
-from fieldsid.views._words import joined, parameter_rows, some, table, warned, where_block, where_rows
+from fieldsid.views._words import joined, parameter_rows, some, table, warned, where_block
 
 if TYPE_CHECKING:
     from fieldsid.diagnosis import Candidate, Diagnosis
@@ -63,7 +63,7 @@ def frames(found: Diagnosis) -> Frames:
     """Return the candidates, where the model as it is fails, and the parameters of the model with the named effects."""
     return {
         "candidates": lambda: table(map(candidate_row, found.candidates), "effect"),
-        "where": lambda: table(where_rows(found.where)),
+        "where": lambda: table(map(body_of, found.where)),
         "parameters": lambda: table(parameter_rows(found.model), "parameter"),
     }
 

@@ -11,8 +11,7 @@ from guide.session import TOUR
 from fieldsid.cli.commands import demo
 from fieldsid.demo import steps, vehicle
 from fieldsid.demo.steps import PLAN, STEPS, Step
-from fieldsid.demo.trial import PLANNED_SPEED
-from fieldsid.demo.vehicle import SPEED_NOISE
+from fieldsid.demo.vehicle import SPEED, SPEED_NOISE
 from fieldsid.logs import load_run
 from fieldsid.maneuvers import pick_maneuver
 from fieldsid.planning.design.leg import commands_of
@@ -34,7 +33,7 @@ def folder(guide_session, tour):
 
 def test_the_tour_is_told_on_one_screen_and_ends_with_the_report(tour, folder):
     pairs = zip((PLAN, *STEPS), tour["steps"], strict=True)
-    told = "".join(f"{i:2d}. {step.title} {step.brief(s['result'])}\n" for i, (step, s) in enumerate(pairs, 1))
+    told = "".join(f"{i:2d}. {step.title} {step.tells(s['result'])[0]}\n" for i, (step, s) in enumerate(pairs, 1))
     assert sum(1 + len(line) // 80 for line in told.splitlines()) <= 30
     assert tour["steps"][-1]["command"] == f"sysid report {tour['folder']}"
     assert (folder / "report.html").is_file()
@@ -71,19 +70,19 @@ def test_the_tour_begins_with_a_plan_that_says_what_it_buys_and_the_vehicle_flie
     assert leg["expected"]["a22"]["relative"] < 0.05
     assert f"a22 to {100 * leg['expected']['a22']['relative']:.1f} %" in first["means"]
     plan = load_plan(folder / "plan" / "plan.yaml")
-    run = load_run(folder / "runs" / f"learn_{PLANNED_SPEED:.1f}.parquet")
+    run = load_run(folder / "runs" / f"learn_{SPEED:.1f}.parquet")
     _, fin, autopilot = commands_of(plan.legs[0], plan.envelope)
     about_trim = run["rudder_rad"] - run["rudder_rad"][0]
     assert len(run) == fin.size
     # the logger writes the fin to a thousandth of a degree
     assert np.abs(about_trim - fin)[autopilot == 0].max() < 1e-4
-    assert run["surge_m_s"].mean() == pytest.approx(PLANNED_SPEED, abs=SPEED_NOISE)
+    assert run["surge_m_s"].mean() == pytest.approx(SPEED, abs=SPEED_NOISE)
 
 
 def test_the_planned_run_buys_what_the_plan_says_once_the_effect_is_in_the_model(tour):
     promised = tour["steps"][0]["result"]["legs"][0]["expected"]["a22"]["relative"]
     (fitted,) = (s["result"] for s in tour["steps"] if "/speeds" in s["command"] and s["command"].split()[1] == "identify")
-    (planned,) = (f for f in fitted["fits"] if f["run"] == f"learn_{PLANNED_SPEED:.1f}")
+    (planned,) = (f for f in fitted["fits"] if f["run"] == f"learn_{SPEED:.1f}")
     a22 = planned["parameters"]["a22"]
     assert a22["std_error"] / a22["value"] <= promised
 
@@ -120,11 +119,11 @@ def test_a_comparison_that_is_down_to_the_noise_sends_nobody_looking():
     compared = next(s for s in STEPS if s.line.startswith("compare"))
     over = {"judged_by": "angle", "over_noise": 1.02, "over_floor": {"angle": 1.02}}
     run = {"run": "a", **over, "angle_fit_percent": 96.0, "failing": [], "where": []}
-    assert compared.means({"runs": [run]}).endswith("That is the noise: here the model lacks nothing.")
+    assert compared.tells({"runs": [run]})[1].endswith("That is the noise: here the model lacks nothing.")
 
 
 def test_a_step_that_needs_what_nobody_learned_is_left_out():
-    step = Step("", "extend {models}/a.yaml --add {effects}", str, str)
+    step = Step("", "extend {models}/a.yaml --add {effects}", lambda _result: ("", ""))
     assert not step.possible({"models": "m"})
     assert step.possible({"models": "m", "effects": "stall"})
 
@@ -133,7 +132,7 @@ def test_an_undecided_search_that_names_nothing_adds_nothing():
     (diagnose,) = (s for s in STEPS if s.line.startswith("diagnose"))
     assert diagnose.learns({"effects": []}) == {}
     assert diagnose.learns({"effects": ["stall", "delay"]}) == {"effects": "stall,delay"}
-    assert "unexplained" in diagnose.means({"effects": [], "verdict": "unexplained"})
+    assert "unexplained" in diagnose.tells({"effects": [], "verdict": "unexplained"})[1]
 
 
 def test_the_textbook_model_leaves_more_than_the_noise_on_the_tour(run_cli, tmp_path):

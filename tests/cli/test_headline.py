@@ -30,7 +30,7 @@ def test_of_a_short_line_nothing_is_left(capsys):
 @pytest.mark.parametrize("quiet", [False, True])
 def test_the_rest_is_told_below_the_first_lines_unless_the_command_is_to_be_quiet(capsys, quiet):
     take([QUIET] if quiet else [])
-    emit({}, as_json=False, render=lambda to: to.print("table"), headline=Headline(CLAUSES, CLAUSES, "sysid status"))
+    emit({}, render=lambda to: to.print("table"), headline=Headline(CLAUSES, CLAUSES, "sysid status"))
     take([])
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines[:3])) <= LONGEST

@@ -166,18 +166,21 @@ def test_a_day_is_pasted_from_one_next_line_to_the_other(tmp_path, monkeypatch):
 
 def test_json_has_the_same_headline(capsys):
     headline = Headline("one is 1.5", "two runs", "sysid status")
-    for as_json in (True, False):
-        body = emit({"schema": "x"}, as_json=as_json, render=lambda to: to.print("table"), headline=headline)
+    for said in (["--json"], []):
+        take(said)
+        body = emit({"schema": "x"}, render=lambda to: to.print("table"), headline=headline)
         shown = capsys.readouterr().out
         assert body["headline"] == body_of(headline)
-        if as_json:
+        if said:
             assert json.loads(shown)["headline"] == {"says": "one is 1.5", "rests_on": "two runs", "next": "sysid status"}
         else:
             assert shown == "one is 1.5\nrests on two runs\nnext: sysid status\n\ntable\n"
 
 
 def test_warnings_are_not_said_under_json(capsys):
-    emit({}, as_json=True, render=lambda _to: None, headline=Headline("a", "b"), notes=[Note("code", "said", {})])
+    take(["--json"])
+    emit({}, render=lambda _to: None, headline=Headline("a", "b"), notes=[Note("code", "said", {})])
+    take([])
     assert capsys.readouterr().err == ""
 
 

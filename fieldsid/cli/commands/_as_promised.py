@@ -13,13 +13,12 @@ from fieldsid.cli.headlines.typed import pasted
 from fieldsid.cli.voice import angles
 from fieldsid.errors import DataError
 from fieldsid.page import Block, Page, counted
-from fieldsid.records.keys import body_of
 
 if TYPE_CHECKING:
     from fieldsid.change.promise import KeptStep
 
 
-def as_promised(gains: Path, runs: Sequence[Path], reading: Mapping[str, Any], *, as_json: bool) -> Mapping[str, Any]:
+def as_promised(gains: Path, runs: Sequence[Path], reading: Mapping[str, Any]) -> Mapping[str, Any]:
     """Compare the steps flown in runs with what was promised of them and print it; return the body."""
     from fieldsid.change.promise import kept_steps
     from fieldsid.cli.console import say
@@ -47,9 +46,7 @@ def as_promised(gains: Path, runs: Sequence[Path], reading: Mapping[str, Any], *
             flown += 1
     told = AsPromised(gains=str(gains), axis=schedule.axis, steps=tuple(steps), skipped_runs=tuple(skips.records))
     headline = _headline(gains, source.paths, runs, steps)
-    result = emit(body_of(told), as_json=as_json, render=_page(steps), headline=headline)
-    skips.end(flown)
-    return result
+    return skips.end(emit(told, render=_page(steps), headline=headline), flown)
 
 
 def _headline(gains: Path, models: Sequence[Path], runs: Sequence[Path], steps: Sequence[KeptStep]) -> Headline:

@@ -17,12 +17,10 @@ from fieldsid.figures.kinds import sketch
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import own_kind
 from fieldsid.page import Block, Page, Whole, counted, written
-from fieldsid.records.keys import body_of
 from fieldsid.views.change import blocks_of
 
 if TYPE_CHECKING:
     from fieldsid.change.record import Change
-    from fieldsid.plant.parameter_source import ParameterSource
     from fieldsid.results.comparisons import AxisChange
 
 
@@ -42,7 +40,7 @@ def is_side(path: Path) -> bool:
         return False
 
 
-def before_after(old: Path, new: Path, output: Path | None, *, force: bool, as_json: bool) -> Mapping[str, Any]:
+def before_after(old: Path, new: Path, output: Path | None, *, force: bool) -> Mapping[str, Any]:
     """Compare two states and print what has changed; return the body."""
     sides = (_side(old), _side(new))
     axes = [a for a in sides[0].files if a in sides[1].files]
@@ -65,8 +63,7 @@ def before_after(old: Path, new: Path, output: Path | None, *, force: bool, as_j
         said = f"both sides were fitted to {', '.join(twice)}: a difference is one of the models alone"
         notes.append(Note("shared_runs", said, {}))
     page = Page("", blocks=tuple(b for t in told for b in _blocks(t, title=t.change.axis.value if len(told) > 1 else "")))
-    body = body_of(BeforeAfter(str(old), str(new), told))
-    return emit(body, as_json=as_json, render=page, headline=_headline(told), notes=notes)
+    return emit(BeforeAfter(str(old), str(new), told), render=page, headline=_headline(told), notes=notes)
 
 
 def _headline(told: Sequence[AxisChange]) -> Headline:
@@ -113,20 +110,16 @@ def _in_both(sides: Sequence[Side]) -> list[str]:
 
 def _compared(sides: Sequence[Side], axis: str) -> Change:
     from fieldsid.change.compare import compare_models
-    from fieldsid.cli.user_effects import check_effects
-    from fieldsid.face.arguments import fin_rate_of
-    from fieldsid.plant.parameter_source import load_parameter_source
+    from fieldsid.cli.user_effects import read_source
+    from fieldsid.face.arguments import UNKNOWN
     from fieldsid.schedule.linear_plant import FinLimits
     from fieldsid.vehicle import find_vehicle
 
-    sources: list[ParameterSource] = [load_parameter_source(s.files[axis]) for s in sides]
-    for source in sources:
-        check_effects(zip(source.paths, source.models, strict=False))
+    before, after = (read_source(s.files[axis]) for s in sides)
     folders = [s.given if s.given.is_dir() else Path() for s in reversed(sides)]
-    vehicle = next((v for f in (*folders, Path()) if (v := find_vehicle(f)) is not None), None)
-    limit = None if vehicle is None else vehicle.fin_max_rad(axis)
-    stated = FinLimits(rate=fin_rate_of(vehicle))
-    return compare_models(sources[0], sources[1], fin_limit=limit, stated=stated)
+    vehicle = next((v for f in (*folders, Path()) if (v := find_vehicle(f)) is not None), UNKNOWN)
+    stated = FinLimits(rate=vehicle.fin_rate_rad_s)
+    return compare_models(before, after, fin_limit=vehicle.fin_max_rad(axis), stated=stated)
 
 
 def _next(found: Change, sides: Sequence[Side]) -> str | None:

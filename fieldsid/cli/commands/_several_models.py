@@ -18,7 +18,6 @@ from fieldsid.errors import UsageError
 from fieldsid.figures.kinds import sketch
 from fieldsid.logs.several.run_names import short_names
 from fieldsid.page import Block, Page, Whole, written
-from fieldsid.records.keys import body_of
 
 if TYPE_CHECKING:
     from fieldsid.cli.skipped_logs import Skips
@@ -37,7 +36,6 @@ def several_models(
     reading: Mapping[str, Any],
     output: Path | None,
     force: bool,
-    as_json: bool,
 ) -> Mapping[str, Any]:
     """Compare several models with the same runs and print which follows them best; return the body.
 
@@ -90,9 +88,8 @@ def several_models(
 
     headline = of_several(told, names, models[least], files_of(logs), inputs_of(paths[least]))
     notes = left_out(logs, models[0].axis)
-    result = emit(body_of(told), as_json=as_json, render=_page(told, found_of, names), headline=headline, notes=notes)
-    skips.end(len(found_of[0]))
-    return result
+    result = emit(told, render=_page(told, found_of, names), headline=headline, notes=notes)
+    return skips.end(result, len(found_of[0]))
 
 
 def _loop(paths: Sequence[Path], found_of: Sequence[Sequence[Comparison]]) -> Loop | None:

@@ -14,11 +14,10 @@ import typer
 
 from fieldsid.cli.console import emit, progress, say
 from fieldsid.cli.exit_codes import GATE_FAILED
-from fieldsid.cli.options import AxisOption, FigureFile, Force, JsonFlag, MappingFile, Method, VehicleFile, argument, flag, option
+from fieldsid.cli.options import AxisOption, FigureFile, Force, MappingFile, Method, VehicleFile, argument, flag, option
 from fieldsid.cli.session import drawn_at
 from fieldsid.figures.kinds import sketch
 from fieldsid.page import Page, written
-from fieldsid.records.keys import body_of
 from fieldsid.rounding import number, with_error
 
 if TYPE_CHECKING:
@@ -46,7 +45,6 @@ def command(
     vehicle: VehicleFile = None,
     figure: FigureFile = None,
     force: Force = False,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Inspect, import, identify and diagnose every log of an archive: one table with a row for each run, Parquet and CSV.
 
@@ -101,7 +99,7 @@ def command(
     )
     from fieldsid.cli.headlines.trial import of_batch
 
-    result = emit(body_of(told), as_json=as_json, render=_page(told), headline=of_batch(told, trend=trend))
+    result = emit(told, render=_page(told), headline=of_batch(told, trend=trend))
     if (trend or figure is not None) and not trends:
         say(f"no trend: fewer than 6 runs of different dates know a parameter of {axis.value}")
     if trends and (dated := sum(row.get("time_from") == "file" for row in rows)):

@@ -11,7 +11,7 @@ import typer
 
 from fieldsid.cli.console import complain, emit
 from fieldsid.cli.inputs import fitted_to
-from fieldsid.cli.options import FigurePlace, Figures, Force, FromS, JsonFlag, MappingFile, ToS, argument, option
+from fieldsid.cli.options import FigurePlace, Figures, Force, FromS, MappingFile, ToS, argument, option
 from fieldsid.cli.progress import get_ready, refuse_place
 from fieldsid.cli.session import drawn_in
 from fieldsid.cli.voice import angles
@@ -19,7 +19,6 @@ from fieldsid.errors import UsageError
 from fieldsid.figures.kinds import sketch
 from fieldsid.logs.several.run_names import short_names
 from fieldsid.page import Block, Page, Whole, written
-from fieldsid.records.keys import body_of
 from fieldsid.rounding import beside, number
 from fieldsid.views._words import merit_blocks
 from fieldsid.views.comparison import MOST_PLACES, blocks_of
@@ -44,7 +43,6 @@ def command(
     output: FigurePlace = None,
     figures: Figures = True,
     force: Force = False,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Compare a model with runs by free simulation, and show where it fails.
 
@@ -71,7 +69,7 @@ def command(
     if own_kind(model) == "schedule":
         from fieldsid.cli.commands._as_promised import as_promised
 
-        return as_promised(model, runs, reading, as_json=as_json)
+        return as_promised(model, runs, reading)
     sides = [p for p in (model, *runs) if is_side(p)]
     others, output = [p for p in runs if p not in sides], output if figures else None
     if len(sides) == len(runs) + 1 == 2:
@@ -79,7 +77,7 @@ def command(
             raise UsageError(
                 "`--from`, `--to`, `--mapping` and `--min-fit` are for runs", found="two models and no run", hint="leave them out"
             )
-        return before_after(sides[0], sides[1], output, force=force, as_json=as_json)
+        return before_after(sides[0], sides[1], output, force=force)
     from fieldsid.cli.inputs import model_first, read_runs
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.cli.user_effects import check_effects
@@ -92,7 +90,7 @@ def command(
             raise UsageError("several models are compared over runs", found=given, hint="sysid compare M1.yaml M2.yaml RUN")
         from fieldsid.cli.commands._several_models import several_models
 
-        several = several_models(sides, others, Skips(), reading=reading, output=output, force=force, as_json=as_json)
+        several = several_models(sides, others, Skips(), reading=reading, output=output, force=force)
         _gate([run for m in several["models"] for run in m["runs"]], min_fit)
         return several
     model, runs = model_first(model, runs)
@@ -115,10 +113,9 @@ def command(
     from fieldsid.records.named_inputs import inputs_of
 
     headline = of_compare(told, known, files_of(logs), inputs_of(model))
-    result = emit(body_of(told), as_json=as_json, render=_page(found, compared, top), headline=headline, notes=notes)
+    result = emit(told, render=_page(found, compared, top), headline=headline, notes=notes)
     _gate(result["runs"], min_fit)
-    skips.end(len(compared))
-    return result
+    return skips.end(result, len(compared))
 
 
 def _gate(entries: Sequence[Mapping[str, Any]], least: float | None) -> None:

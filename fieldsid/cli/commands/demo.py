@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 from fieldsid.cli.app import run
 from fieldsid.cli.console import WIDTH, emit
 from fieldsid.cli.headlines.trial import of_demo
-from fieldsid.cli.options import Force, JsonFlag, OutputDir, flag, option
+from fieldsid.cli.options import Force, OutputDir, flag, option
 from fieldsid.cli.progress import compiling
 from fieldsid.cli.session import Session
 from fieldsid.cli.voice import voice
 from fieldsid.errors import ArtifactError
 from fieldsid.page import Page, folded, written
-from fieldsid.records.keys import body_of
 from fieldsid.runtime.background_tasks import BackgroundTasks
 
 if TYPE_CHECKING:
@@ -51,7 +50,6 @@ def command(
     output: OutputDir = None,
     verbose: Annotated[bool, flag("--verbose -v", "Print each command with all that it says, and what it means.")] = False,
     force: Force = False,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Take a tour of all commands: a line for each with its result, or with `--verbose` all that they say and what it means.
 
@@ -61,14 +59,14 @@ def command(
     Example: sysid demo --effect sway_coupling -o tour
     """
     began = perf_counter()
-    told = SILENT if as_json or voice().is_quiet else VERBOSE if verbose else BRIEF
+    told = SILENT if voice().is_json or voice().is_quiet else VERBOSE if verbose else BRIEF
     with compiling(_compile_loops) as warmup:
         tour = _tour(effect, output, began, warmup, force=force, told=told)
     if told != SILENT:
         sys.stdout.write("\n")
     figures = written(figure=[f for f in tour.files if verbose and f.endswith(".png")])
     page = Page("", closing=(*figures, "`sysid --help` lists every command."))
-    return emit(body_of(tour), as_json=as_json, render=page, headline=of_demo(tour))
+    return emit(tour, render=page, headline=of_demo(tour))
 
 
 def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, force: bool, told: str) -> Demo:
@@ -135,9 +133,9 @@ def _taken(place: int, step: Step, known: Mapping[str, str], session: Session, *
     with nullcontext() if told == VERBOSE else _silence():
         result = run([*expanded(words), *(["--force"] if force else [])], session)
     sys.stderr.flush()
-    meaning = step.means(result)
+    brief, meaning = step.tells(result)
     if told == BRIEF:
-        said = f"{place:2d}. {step.title}{'' if step.title.endswith('?') else ':'} {step.brief(result)}"
+        said = f"{place:2d}. {step.title}{'' if step.title.endswith('?') else ':'} {brief}"
         sys.stdout.write(f"{folded(said, WIDTH, rest='    ')}\n")
         sys.stdout.flush()
     if told == VERBOSE:

@@ -13,7 +13,6 @@ from fieldsid.cli.options import (
     ExcitedAxis,
     FigureFile,
     Force,
-    JsonFlag,
     MappingFile,
     OutputFile,
     RunFiles,
@@ -54,7 +53,6 @@ def command(
         bool, flag("--apply", "Add what is named, an effect at a time, each a model in `models/` with its errors.")
     ] = False,
     force: Force = False,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Say which physical effect the model is missing, how sure that is, and what else it could be.
 
@@ -97,9 +95,8 @@ def command(
     from fieldsid.cli.headlines.missing import Searched, of_diagnosis
 
     headline = of_diagnosis(told, Searched(files_of(training), files_of(unseen), model, thorough))
-    result = emit(body_of(told), as_json=as_json, render=_page(told), headline=headline, notes=found.notes)
-    skips.end(len(training) + len(unseen))
-    return result
+    result = emit(told, render=_page(told), headline=headline, notes=found.notes)
+    return skips.end(result, len(training) + len(unseen))
 
 
 def _known(path: Path | None, axis: Axis | None) -> Model | None:

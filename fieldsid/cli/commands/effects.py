@@ -12,13 +12,12 @@ import typer
 from fieldsid.cli.console import emit
 from fieldsid.cli.headlines.missing import of_catalogue, of_effect, of_new_effect
 from fieldsid.cli.headlines.typed import pasted
-from fieldsid.cli.options import Force, JsonFlag, argument, option
+from fieldsid.cli.options import Force, argument, option
 from fieldsid.cli.progress import refuse_existing
 from fieldsid.cli.user_effects import OWN_EFFECTS, load_own_effects
 from fieldsid.errors import UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.page import Block, Page, Whole, paragraph, written
-from fieldsid.records.keys import body_of
 from fieldsid.rounding import in_unit
 
 if TYPE_CHECKING:
@@ -29,9 +28,7 @@ command = typer.Typer(help="List the physical effects, show one, start one of yo
 
 
 @command.command("list", short_help="List every effect by stage.")
-def list_(
-    axis: Annotated[Axis | None, option("--axis", "", "Only the effects of this plane.")] = None, as_json: JsonFlag = False
-) -> Mapping[str, Any]:
+def list_(axis: Annotated[Axis | None, option("--axis", "", "Only the effects of this plane.")] = None) -> Mapping[str, Any]:
     """List every effect by its stage of the signal path: actuator, hydrodynamics, sensor.
 
     Example: sysid effects list --axis yaw
@@ -40,14 +37,12 @@ def list_(
     from fieldsid.results.effects import Catalogue, Described
 
     known = tuple(all_effects(axis).values())
-    body = body_of(Catalogue(axis, tuple(map(Described, known))))
-    return emit(body, as_json=as_json, render=_list_page(known), headline=of_catalogue(known))
+    told = Catalogue(axis, tuple(map(Described, known)))
+    return emit(told, render=_list_page(known), headline=of_catalogue(known))
 
 
 @command.command("show", short_help="Show all that is known of one effect.")
-def show(
-    name: Annotated[str, argument("NAME", "Name of an effect, as in `sysid effects list`.")], as_json: JsonFlag = False
-) -> Mapping[str, Any]:
+def show(name: Annotated[str, argument("NAME", "Name of an effect, as in `sysid effects list`.")]) -> Mapping[str, Any]:
     """Show one effect: equation, coefficients, telltale, what excites it, what it is mistaken for, source.
 
     Example: sysid effects show servo_lag
@@ -56,8 +51,7 @@ def show(
     from fieldsid.results.effects import Described, ShownEffect
 
     effect = pick_effect(name)
-    body = body_of(ShownEffect(Described(effect)))
-    return emit(body, as_json=as_json, render=_page(effect), headline=of_effect(effect))
+    return emit(ShownEffect(Described(effect)), render=_page(effect), headline=of_effect(effect))
 
 
 @command.command("new", short_help="Start an effect of your own.")
@@ -66,7 +60,6 @@ def new(
     axis: Annotated[Axis, option("--axis", "", "The plane that it acts on.")] = Axis.YAW,
     output: Annotated[Path | None, option("-o --output", "FILE", "YAML file to write; effects/NAME.yaml if not given.")] = None,
     force: Force = False,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Write a file for an effect of your own, to be edited: a YAML file with a moment as an expression.
 
@@ -84,7 +77,7 @@ def new(
     load_own_effects()  # what was broken in a file that is replaced is so no more
     told = NewEffect(name, axis, str(path))
     page = Page("", closing=written(effect=told.file))
-    return emit(body_of(told), as_json=as_json, render=page, headline=of_new_effect(told, _look_at(path, name)))
+    return emit(told, render=page, headline=of_new_effect(told, _look_at(path, name)))
 
 
 def _refuse_name(name: str, path: Path) -> None:

@@ -12,14 +12,13 @@ from fieldsid.cli.console import emit
 from fieldsid.cli.headlines.missing import left_says, of_extension, of_undoing
 from fieldsid.cli.headlines.typed import pasted, repeated
 from fieldsid.cli.headlines.words import used
-from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, ValidateRuns, argument, flag, option
+from fieldsid.cli.options import Force, MappingFile, ModelFile, OutputFile, ValidateRuns, argument, flag, option
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, trying
 from fieldsid.cli.skipped_logs import Skips
 from fieldsid.cli.voice import angles
 from fieldsid.comparison.sufficient import is_noise
 from fieldsid.errors import ArtifactError, UsageError
 from fieldsid.page import Block, Page, paragraph, written
-from fieldsid.records.keys import body_of
 from fieldsid.rounding import at_its_bound, number, with_error
 
 if TYPE_CHECKING:
@@ -41,7 +40,6 @@ def command(
     mapping: MappingFile = None,
     output: OutputFile = None,
     force: Force = False,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Add an effect to a model, refit everything, and watch the error fall.
 
@@ -57,7 +55,7 @@ def command(
             raise UsageError(
                 "`--undo` takes the model alone", found="runs or options beside it", hint=f"sysid extend {model} --undo"
             )
-        return _undone(model, output, force=force, as_json=as_json)
+        return _undone(model, output, force=force)
     from fieldsid.cli.inputs import model_first, read_groups
     from fieldsid.face.arguments import names_of
     from fieldsid.models.model import load_model
@@ -102,9 +100,8 @@ def command(
         next=next_,
         skipped_runs=tuple(skips.records),
     )
-    result = emit(body_of(told), as_json=as_json, render=_page(told), headline=of_extension(told), notes=told.notes)
-    skips.end(len(runs) + len(validate) - len(skips.records))
-    return result
+    result = emit(told, render=_page(told), headline=of_extension(told), notes=told.notes)
+    return skips.end(result, len(runs) + len(validate) - len(skips.records))
 
 
 def step_files(parent: Path, effects: Sequence[str], last: Path | None = None, *, force: bool = False) -> list[Path]:
@@ -155,7 +152,7 @@ def _coefficients(found: Extension) -> dict[str, AddedCoefficient]:
     }
 
 
-def _undone(path: Path, output: Path | None, *, force: bool, as_json: bool) -> Mapping[str, Any]:
+def _undone(path: Path, output: Path | None, *, force: bool) -> Mapping[str, Any]:
     from fieldsid.artifacts import replacing
     from fieldsid.extension.lineage import CHANGED, MISSING, history_of, parent_of
     from fieldsid.models.model import load_model
@@ -180,7 +177,7 @@ def _undone(path: Path, output: Path | None, *, force: bool, as_json: bool) -> M
         gain=step.gain if step else None, undone=str(path), model=str(back), effects=load_model(back).effects, parent=parent
     )
     page = Page("", closing=(f"model: {back}; {path} stays where it is",))
-    return emit(body_of(undone), as_json=as_json, render=page, headline=of_undoing(undone))
+    return emit(undone, render=page, headline=of_undoing(undone))
 
 
 def _page(told: Extended) -> Page:

@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 from fieldsid.cli.console import emit
-from fieldsid.cli.options import Figures, Force, JsonFlag, ModelFiles, OutputFile, flag
+from fieldsid.cli.options import Figures, Force, ModelFiles, OutputFile, flag
 from fieldsid.cli.progress import refuse_existing
 from fieldsid.cli.session import drawn_at
 from fieldsid.page import Page, written
-from fieldsid.records.keys import body_of
 from fieldsid.views.laws import blocks_of
 
 
@@ -20,7 +19,6 @@ def command(
     output: OutputFile = None,
     figures: Figures = True,
     force: Force = False,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Fit the laws that carry a model from one speed to the next: authority against u^2, damping and trim against u.
 
@@ -52,4 +50,4 @@ def command(
     told = FittedLaws(laws=laws, file=file, figure=drawn)
     notes = (*source.notes, *law_notes(laws))
     page = Page("", blocks=tuple(blocks_of(laws)), closing=written(file=file, figure=drawn))
-    return emit(body_of(told), as_json=as_json, render=page, headline=of_fit(told), notes=notes)
+    return emit(told, render=page, headline=of_fit(told), notes=notes)

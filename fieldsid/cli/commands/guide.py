@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 from fieldsid.cli.console import emit
-from fieldsid.cli.options import JsonFlag, argument
+from fieldsid.cli.options import argument
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,7 +24,6 @@ def command(
     topic: Annotated[
         str | None, argument("TOPIC", "A page, such as `trial` or `effects/servo_lag`; the contents if not given.")
     ] = None,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Show a page of the guide: on a terminal in a pager, else as text.
 
@@ -34,13 +33,12 @@ def command(
     Example: sysid guide effects/servo_lag
     """
     from fieldsid.guide import all_pages, pick_page
-    from fieldsid.records.keys import body_of
     from fieldsid.results.trial import Contents, Title, Topic
 
     page = pick_page(topic or "index")
     contents = Contents(tuple(Title(p.topic, p.title) for p in all_pages().values()))
-    body = body_of(contents if topic is None else Topic(page.topic, page.title, str(page.path), page.text))
-    return emit(body, as_json=as_json, render=lambda to: _show(to, page))
+    told = contents if topic is None else Topic(page.topic, page.title, str(page.path), page.text)
+    return emit(told, render=lambda to: _show(to, page))
 
 
 def _show(to: Console, page: Page) -> None:

@@ -7,14 +7,13 @@ from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.cli.console import emit, say
-from fieldsid.cli.options import FigureFile, Force, JsonFlag, ModelFile
+from fieldsid.cli.options import FigureFile, Force, ModelFile
 from fieldsid.cli.progress import refuse_figure
 from fieldsid.cli.session import drawn_at
 from fieldsid.cli.voice import angles
 from fieldsid.figures.kinds import sketch
 from fieldsid.logs.run import Note
 from fieldsid.page import Block, Page, Whole, paragraph, written
-from fieldsid.records.keys import body_of
 from fieldsid.rounding import number
 from fieldsid.views.extension import channels_of
 
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 KEPT = {"unseen": "unseen data are predicted better", "evidence": "the evidence pays for it", "--keep": "kept because of --keep"}
 
 
-def command(model: ModelFile, figure: FigureFile = None, force: Force = False, as_json: JsonFlag = False) -> Mapping[str, Any]:
+def command(model: ModelFile, figure: FigureFile = None, force: Force = False) -> Mapping[str, Any]:
     """Show how a model came about: its parents, the effects added, and how the error fell towards the noise floor.
 
     Every file's hash is checked against what its child and its data were when it was made.
@@ -56,7 +55,7 @@ def command(model: ModelFile, figure: FigureFile = None, force: Force = False, a
     from fieldsid.records.named_inputs import inputs_of
 
     headline = of_history(told, inputs_of(model))
-    return emit(body_of(told), as_json=as_json, render=_page(told, steps), headline=headline, notes=_notes(line))
+    return emit(told, render=_page(told, steps), headline=headline, notes=_notes(line))
 
 
 def _notes(line: Sequence[Generation]) -> list[Note]:

@@ -16,7 +16,6 @@ from fieldsid.cli.options import (
     Figures,
     Force,
     FromS,
-    JsonFlag,
     MappingFile,
     Method,
     OutputDir,
@@ -33,7 +32,6 @@ from fieldsid.figures.kinds import sketch
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import ShortNames, short_names
 from fieldsid.page import Block, Page, Whole, paragraph, written
-from fieldsid.records.keys import body_of
 from fieldsid.views._words import merit_blocks
 
 if TYPE_CHECKING:
@@ -61,7 +59,6 @@ def command(
     output: OutputDir = None,
     figures: Figures = True,
     force: Force = False,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Identify the yaw or pitch model of each run, or one model of all of them.
 
@@ -108,9 +105,7 @@ def command(
     from fieldsid.cli.headlines.models import of_identify
 
     page, headline = _page(entries, figures=figures), of_identify(told, files)
-    result = emit(body_of(told), as_json=as_json, render=page, headline=headline, notes=_warnings(entries))
-    skips.end(len(used))
-    return result
+    return skips.end(emit(told, render=page, headline=headline, notes=_warnings(entries)), len(used))
 
 
 def _written(

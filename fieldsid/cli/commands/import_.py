@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from fieldsid.cli.options import Force, FromS, Join, JsonFlag, MappingFile, MsgPath, ToS, VehicleFile, argument, flag, option
+from fieldsid.cli.options import Force, FromS, Join, MappingFile, MsgPath, ToS, VehicleFile, argument, flag, option
 
 if TYPE_CHECKING:
     from fieldsid.logs.importing import Importer
@@ -33,7 +33,6 @@ def command(
     ] = False,
     format_: Annotated[str, option("--format", "parquet|csv|csv.gz", "Kind of file in the folder.")] = "parquet",
     force: Force = False,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Turn logs into Runs: SI and radians, NED and forward-starboard-down, one clock, gaps left as gaps.
 
@@ -45,12 +44,12 @@ def command(
     from fieldsid.cli.console import alike, emit, tracked, warn
     from fieldsid.cli.inputs import between, mapping_of, one_run
     from fieldsid.cli.skipped_logs import Skips
-    from fieldsid.face.arguments import signal_limits, vehicle_of
+    from fieldsid.cli.voice import voice
+    from fieldsid.face.arguments import vehicle_of
     from fieldsid.logs.importing import Importer
     from fieldsid.logs.several.run_names import refuse_twice
     from fieldsid.logs.several.sifting import attempt, sifted
     from fieldsid.page import Block, Page
-    from fieldsid.records.keys import body_of
     from fieldsid.results.logs import Import
 
     joined: list[Path] = []
@@ -59,7 +58,7 @@ def command(
     importer = Importer(
         mapping_of(mapping), tuple(channel or ()), msg_path, between(from_s, to_s), max_gap, salvage, whole, tuple(joined)
     )
-    limits = signal_limits(vehicle_of(vehicle))
+    limits = vehicle_of(vehicle).signal_limits
     there = [] if force or importer != Importer(importer.mapping) else _already(importer, logs, output, format_, mapping)
     logs = [log for log in logs if log not in there]
     targets = dict(zip(logs, importer.targets(logs, output, format_, force=force), strict=True))
@@ -80,11 +79,10 @@ def command(
     headline = of_import(told, plane_of([d.run for d in done]))
     rows = tuple((d.file, str(d.samples), f"{d.duration_s:.2f}", f"{d.rate_hz:.4g}", str(len(d.signals))) for d in done)
     page = Page("", blocks=(Block("", rows, ("run", "samples", "s", "Hz", "signals")),))
-    result = emit(body_of(told), as_json=as_json, render=page, headline=headline, notes=notes)
-    if as_json:  # a run is used for long: what is odd about it is said however it is asked for
+    result = emit(told, render=page, headline=headline, notes=notes)
+    if voice().is_json:  # a run is used for long: what is odd about it is said however it is asked for
         warn(notes)
-    skips.end(len(done))
-    return result
+    return skips.end(result, len(done))
 
 
 def _already(importer: Importer, logs: list[Path], output: Path, form: str, mapping: Path | None) -> list[Path]:

@@ -6,13 +6,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
-from fieldsid.cli.options import JsonFlag, argument, option
+from fieldsid.cli.options import argument, option
 
 
 def command(
     name: Annotated[str, argument("NAME", "Name of the trial, and of the folder to make.")],
     template: Annotated[str, option("--template", "KIND", "Kind of vehicle: torpedo or surface.")] = "torpedo",
-    as_json: JsonFlag = False,
 ) -> None:
     """Make a trial folder with a vehicle.yaml, a mapping.yaml and notes to fill in; nothing is ever replaced.
 
@@ -24,7 +23,6 @@ def command(
     from fieldsid.cli.console import emit
     from fieldsid.cli.headlines.trial import of_trial
     from fieldsid.page import Page
-    from fieldsid.records.keys import body_of
     from fieldsid.results.trial import Init
     from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, append
     from fieldsid.trial_folder.make import new_trial
@@ -37,4 +35,4 @@ def command(
     append(folder, Entry(time, words, 0, 0.0, verdict, (), tuple(hashes.stamp(f) for f in files)))
     files = [*files, folder / JOURNAL]
     told = Init(name, template, tuple(map(str, files)))
-    emit(body_of(told), as_json=as_json, render=Page("", closing=told.files), headline=of_trial(told))
+    emit(told, render=Page("", closing=told.files), headline=of_trial(told))

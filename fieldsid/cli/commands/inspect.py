@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from fieldsid.cli.options import Force, Join, JsonFlag, LogAndTables, MappingFile, MsgPath, option
+from fieldsid.cli.options import Force, Join, LogAndTables, MappingFile, MsgPath, option
 from fieldsid.page import Block
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ def command(
         Path | None, option("--write-mapping", "FILE", "Write the mapping, for `sysid import --mapping`.")
     ] = None,
     force: Force = False,
-    as_json: JsonFlag = False,
 ) -> None:
     """Say what is in a log, which mapping it may need, and what would spoil an identification.
 
@@ -34,7 +33,6 @@ def command(
     from fieldsid.cli.headlines.logs import of_inspection
     from fieldsid.cli.inputs import one_run
     from fieldsid.logs.inspection import inspect_log, write_proposal
-    from fieldsid.records.keys import body_of
     from fieldsid.results.logs import inspected
 
     log, *joined = one_run("inspect", logs, join=join)
@@ -43,7 +41,7 @@ def command(
     written = write_proposal(found, write_mapping, force=force) if write_mapping is not None else None
     result = inspected(found, written)
     headline = of_inspection(result, mapping)
-    emit(body_of(result), as_json=as_json, render=lambda to: _render(found, result, to), headline=headline)
+    emit(result, render=lambda to: _render(found, result, to), headline=headline)
 
 
 def _render(found: Inspection, result: Inspected, to: Console) -> None:

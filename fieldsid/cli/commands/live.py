@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
+import time as clock
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
+from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,7 +16,7 @@ import typer
 from fieldsid.cli.console import emit, out, say
 from fieldsid.cli.exit_codes import GATE_FAILED
 from fieldsid.cli.live.feed import Feed
-from fieldsid.cli.options import AxisOption, Bandwidth, JsonFlag, MappingFile, VehicleFile, argument, flag, option
+from fieldsid.cli.options import AxisOption, Bandwidth, MappingFile, VehicleFile, argument, flag, option
 from fieldsid.cli.voice import voice
 from fieldsid.errors import UsageError
 
@@ -60,7 +62,6 @@ def command(
     bandwidth: Bandwidth = 4.0,
     forgetting: Annotated[float, option("--forgetting", "", "Forgetting factor; 1 forgets nothing.", min=0.5, max=1.0)] = 1.0,
     mapping: MappingFile = None,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Identify while the vehicle flies, sample by sample, and say when there is enough data.
 
@@ -80,10 +81,11 @@ def command(
 
     watch = Watch(goals(float("nan")))
     identifier, skipped = _begun(feed, state, watch, bandwidth, forgetting)
+    live = _Live(feed, identifier, watch, goals, goals_from, state, beside)
     body: Mapping[str, Any] = {}
-    with _shown(as_json=as_json) as show:
+    with _shown() as show:
         try:
-            for body in _looks(feed, identifier, watch, goals, goals_from, every, state, skipped, beside):
+            for body in live.looks(every, skipped):
                 show(body)
                 if until_enough and body["verdict"] == "enough":
                     break
@@ -93,9 +95,8 @@ def command(
         finally:
             if beside is not None:
                 beside.close()
-            if state is not None:
-                _save(state, identifier, watch, feed.name)
-    if not as_json:
+            live.save()
+    if not voice().is_json:
         _end(body)
     if until_enough and body["verdict"] != "enough":
         raise typer.Exit(GATE_FAILED)
@@ -163,67 +164,68 @@ def _begun(feed: Feed, state: Path | None, watch: Watch, bandwidth: float, forge
     return identifier, -inf
 
 
-def _looks(
-    feed: Feed,
-    identifier: OnlineIdentifier,
-    watch: Watch,
-    goals: Callable[[float], Mapping[str, Goal]],
-    goals_from: str,
-    every: float,
-    state: Path | None,
-    after: float,
-    beside: Beside | None,
-) -> Iterator[Mapping[str, Any]]:
-    """Yield a look every so many seconds of the log, one when it ends, and save the state as time goes on."""
-    import time as clock
+@dataclass(frozen=True, slots=True)
+class _Live:
+    """What is under way: samples, estimate, goals at a speed and their source, the file of its state, the second process."""
 
-    from fieldsid.online.look import look_body
+    feed: Feed
+    identifier: OnlineIdentifier
+    watch: Watch
+    goals: Callable[[float], Mapping[str, Goal]]
+    goals_from: str
+    state: Path | None
+    beside: Beside | None
 
-    due, saved, fresh, unreadable = -inf, clock.monotonic(), True, 0
+    def looks(self, every: float, after: float) -> Iterator[Mapping[str, Any]]:
+        """Yield a look every so many seconds of the log, one when it ends, and save the state as time goes on."""
+        due, saved, fresh, unreadable = -inf, clock.monotonic(), True, 0
+        with closing(self.feed.samples(after)) as samples:  # type: ignore[type-var]
+            for sample in samples:
+                if sample is None:
+                    continue
+                self.identifier.update(*sample[:5], fin_is_held=sample.fin_is_held, fin_line=sample.fin_line)
+                self.watch.excitation.hear(sample.time, sample.fin, sample.rate)
+                fresh = True
+                if self.beside is not None:
+                    self.beside.hear(sample)
+                if sample.time >= due or sample.time < due - 2.0 * every:
+                    due = sample.time + every
+                    yield self.look()
+                    fresh, unreadable = False, self.feed.unreadable
+                if clock.monotonic() - saved >= SAVE_EVERY_S:
+                    self.save()
+                    saved = clock.monotonic()
+        if fresh or self.feed.unreadable > unreadable or self.beside is not None:
+            yield self.look(ended=True)
 
-    def look(*, ended: bool = False) -> Mapping[str, Any]:
-        now = identifier.estimate()
-        watch.goals = dict(goals(now.speed))
-        progress = watch.look(now)
-        then = feed.then(usable=not progress.contradiction)
-        told: dict[str, Any] = {}
-        if beside is not None:
-            beside.look(now, progress, ended=ended)
-            told = {"gains": beside.gains, "diagnosed": beside.diagnosed}
-        return look_body(now, progress, source=feed.name, goals_from=goals_from, unreadable=feed.unreadable, then=then, **told)
+    def look(self, *, ended: bool = False) -> Mapping[str, Any]:
+        """Return what there is to say now."""
+        from fieldsid.online.look import look_body
 
-    with closing(feed.samples(after)) as samples:  # type: ignore[type-var]
-        for sample in samples:
-            if sample is None:
-                continue
-            identifier.update(*sample[:5], fin_is_held=sample.fin_is_held, fin_line=sample.fin_line)
-            watch.excitation.hear(sample.time, sample.fin, sample.rate)
-            fresh = True
-            if beside is not None:
-                beside.hear(sample)
-            if sample.time >= due or sample.time < due - 2.0 * every:
-                due = sample.time + every
-                yield look()
-                fresh, unreadable = False, feed.unreadable
-            if state is not None and clock.monotonic() - saved >= SAVE_EVERY_S:
-                _save(state, identifier, watch, feed.name)
-                saved = clock.monotonic()
-    if fresh or feed.unreadable > unreadable or beside is not None:
-        yield look(ended=True)
+        now = self.identifier.estimate()
+        self.watch.goals = dict(self.goals(now.speed))
+        progress = self.watch.look(now)
+        then = self.feed.then(usable=not progress.contradiction)
+        told: dict[str, Any] = {"source": self.feed.name, "goals_from": self.goals_from, "unreadable": self.feed.unreadable}
+        if self.beside is not None:
+            self.beside.look(now, progress, ended=ended)
+            told |= {"gains": self.beside.gains, "diagnosed": self.beside.diagnosed}
+        return look_body(now, progress, then=then, **told)
 
+    def save(self) -> None:
+        """Write the state, where it is to be kept."""
+        from fieldsid.online.state_file import save_state
 
-def _save(state: Path, identifier: OnlineIdentifier, watch: Watch, source: str) -> None:
-    from fieldsid.online.state_file import save_state
-
-    save_state(state, identifier, watch, source)
+        if self.state is not None:
+            save_state(self.state, self.identifier, self.watch, self.feed.name)
 
 
 @contextmanager
-def _shown(*, as_json: bool) -> Iterator[Callable[[Mapping[str, Any]], None]]:
+def _shown() -> Iterator[Callable[[Mapping[str, Any]], None]]:
     """Yield what shows a look: a line of JSON, a screen on a terminal, else a line of text; nothing where it is to be quiet."""
     from fieldsid.cli.live.screen import line, screen, told_of
 
-    if as_json:
+    if voice().is_json:
         import json
 
         def print_json(body: Mapping[str, Any]) -> None:
@@ -263,4 +265,4 @@ def _end(body: Mapping[str, Any]) -> None:
             to.print(text, soft_wrap=True)
 
     if body:
-        emit(body, as_json=False, render=render, headline=headline_of(body))
+        emit(body, render=render, headline=headline_of(body))

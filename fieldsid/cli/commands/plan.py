@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from fieldsid.cli.console import emit, progress, say
-from fieldsid.cli.options import LIMITS, WRITTEN, Figures, Force, JsonFlag, OutputDir, VehicleFile, flag, option
+from fieldsid.cli.options import LIMITS, WRITTEN, Figures, Force, OutputDir, VehicleFile, flag, option
 from fieldsid.cli.progress import compiling, refuse_closed, refuse_existing
 from fieldsid.cli.session import drawn_at
 from fieldsid.cli.voice import angles
 from fieldsid.figures.kinds import sketch
 from fieldsid.models.axis import Axis
 from fieldsid.page import Block, Page
-from fieldsid.records.keys import body_of
 from fieldsid.rounding import number, with_error
 
 if TYPE_CHECKING:
@@ -85,7 +84,6 @@ def command(
     output: OutputDir = None,
     figures: Figures = True,
     force: Force = False,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Plan maneuvers: the fin commands that buy the accuracy you want inside your limits, in the fewest minutes.
 
@@ -142,7 +140,7 @@ def command(
     from fieldsid.cli.headlines.trial import of_plan
 
     page = _page(made.plan, told.get("says", ()))
-    return emit(body_of(result), as_json=as_json, render=page, headline=of_plan(result, model))
+    return emit(result, render=page, headline=of_plan(result, model))
 
 
 def _check_write(write: str | None, output: Path | None) -> None:

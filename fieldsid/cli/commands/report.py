@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from fieldsid.cli.console import emit
-from fieldsid.cli.options import Force, JsonFlag, argument, option
+from fieldsid.cli.options import Force, argument, option
 from fieldsid.cli.progress import get_ready
 from fieldsid.logs.run import Note
 from fieldsid.page import Page
-from fieldsid.records.keys import body_of
 
 if TYPE_CHECKING:
     from fieldsid.trial_folder.state import FolderState
@@ -26,7 +25,6 @@ def command(
         Path | None, option("-o --output", "FILE", "report.html in the folder if not given; .pdf is printed by a browser.")
     ] = None,
     force: Force = False,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Write what a trial has come to into one file: HTML that needs no network, or PDF.
 
@@ -60,7 +58,7 @@ def command(
 
     notes = [Note("not_in_report", line, {}) for line in told.skipped]
     page = Page("", closing=tuple(f"{v.what}: {v.says}" for v in told.verdicts[1:]))
-    return emit(body_of(told), as_json=as_json, render=page, headline=of_report(told, state.folder), notes=notes)
+    return emit(told, render=page, headline=of_report(told, state.folder), notes=notes)
 
 
 def _state(given: Sequence[Path]) -> FolderState:

@@ -11,13 +11,12 @@ import typer
 
 from fieldsid.cli.console import emit, print_file, say
 from fieldsid.cli.headlines.gains import caveat, of_design, of_export, of_patch, of_verification
-from fieldsid.cli.options import LIMITS, Force, JsonFlag, ModelFiles, OutputFile, OwnLaw, VehicleFile, argument, flag, option
+from fieldsid.cli.options import LIMITS, Force, ModelFiles, OutputFile, OwnLaw, VehicleFile, argument, flag, option
 from fieldsid.cli.progress import refuse_existing, refuse_figure
 from fieldsid.cli.session import drawn_at
 from fieldsid.cli.voice import angles
 from fieldsid.figures.kinds import sketch
 from fieldsid.page import Page, written
-from fieldsid.records.keys import body_of
 from fieldsid.views.schedule import blocks_of as design_blocks
 from fieldsid.views.verification import blocks_of as verify_blocks
 
@@ -87,7 +86,6 @@ def design(
     vehicle: VehicleFile = None,
     output: OutputFile = None,
     force: Force = False,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Design gains per speed: PD or P with feed-forward, PI, PID, LQR; heading or pitch, by the models' axis.
 
@@ -100,11 +98,10 @@ def design(
     """
     from fieldsid.angles import FASTEST_FIN, FIN, FIN_RATE, HEADING, TILT, parse_angle, parse_margin
     from fieldsid.cli.inputs import models_among
-    from fieldsid.cli.user_effects import check_effects
-    from fieldsid.face.arguments import fin_limit_of, fin_rate_of, fins_of, length_of, runs_behind, vehicle_of
+    from fieldsid.cli.user_effects import read_source
+    from fieldsid.face.arguments import fin_limit_of, fins_of, runs_behind, vehicle_of
     from fieldsid.face.quantities import BANDWIDTH, parse_quantity, parse_share
     from fieldsid.face.speeds import speeds_of
-    from fieldsid.plant.parameter_source import load_parameter_source
     from fieldsid.results.gains import Design
     from fieldsid.schedule.linear_plant import FinLimits
     from fieldsid.schedule.make import design_schedule, usual_controller
@@ -115,11 +112,10 @@ def design(
     refuse_existing(output, force=force)
     given = None if fin_limit is None else parse_angle(fin_limit, "--fin-max", FIN)
     known = vehicle_of(vehicle)
-    fastest = fin_rate_of(known) if fin_rate is None else parse_angle(fin_rate, "--fin-rate", FIN_RATE, FASTEST_FIN)
+    fastest = known.fin_rate_rad_s if fin_rate is None else parse_angle(fin_rate, "--fin-rate", FIN_RATE, FASTEST_FIN)
     margin = parse_margin(phase_margin, "--phase-margin")
     models = models_among(models)
-    source = load_parameter_source(models, laws=law or ())
-    check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
+    source = read_source(models, law or ())
     schedule = design_schedule(
         source,
         fin_limit_of(known, source, say) if given is None else given,
@@ -137,7 +133,7 @@ def design(
         limits=FinLimits(_time(fin_lag, "--fin-lag"), _time(delay, "--delay"), fastest, _time(latency, "--latency")),
         depth=depth,
         runs=runs_behind(source, say),
-        length=length_of(known),
+        length=known.length_m,
         fins=fins_of(known, source.axis),
     )
     inputs = [p for p in source.paths if p.is_file()]
@@ -145,7 +141,7 @@ def design(
     told = Design(schedule, written_to)
     headline = of_design(told, models, caveat(source.models, models))
     page = Page("", blocks=tuple(design_blocks(schedule, angles(), lost(source))), closing=written(schedule=written_to))
-    return emit(body_of(told), as_json=as_json, render=page, headline=headline, notes=schedule.notes)
+    return emit(told, render=page, headline=headline, notes=schedule.notes)
 
 
 @command.command("verify", short_help="Margins and steps over the identified set.")
@@ -166,7 +162,6 @@ def verify(
     max_overshoot: Annotated[str | None, option("--max-overshoot", "SHARE", "Exit 1 when any step has more, `20%`.")] = None,
     output: Annotated[Path | None, option("-o --output", "FILE", "Draw a figure: .png, .svg or .pdf, by the suffix.")] = None,
     force: Force = False,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Check a schedule at its knots and between, over the errors of the models, against the best one gain for all speeds.
 
@@ -178,10 +173,9 @@ def verify(
     Example: sysid schedule verify gains.yaml --require-phase-margin 40 -o gains.png
     """
     from fieldsid.angles import parse_margin
-    from fieldsid.cli.user_effects import check_effects
+    from fieldsid.cli.user_effects import read_source
     from fieldsid.face.arguments import designed_from, runs_behind
     from fieldsid.face.quantities import DECIBEL, parse_quantity, parse_share, parse_time
-    from fieldsid.plant.parameter_source import load_parameter_source
     from fieldsid.results.gains import Verified
     from fieldsid.schedule.record import load_schedule
     from fieldsid.schedule.verdict import against_constant, gates_of, rests_on, verdict_of
@@ -190,8 +184,7 @@ def verify(
     refuse_figure(output, force=force)
     least = None if require_phase_margin is None else parse_margin(require_phase_margin, "--require-phase-margin")
     known = load_schedule(schedule)
-    source = load_parameter_source(models or designed_from(known, str(schedule)))
-    check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
+    source = read_source(models or designed_from(known, str(schedule)))
     checked = verify_schedule(known, source, runs=runs_behind(source, say))
     gain = None if require_gain_margin is None else parse_quantity(require_gain_margin, "--require-gain-margin", DECIBEL, "6dB")
     delay = None if require_delay_margin is None else parse_time(require_delay_margin, "--require-delay-margin", "0.3s")
@@ -216,7 +209,7 @@ def verify(
     headline = of_verification(told, schedule, models or source.paths)
     gates_said = (f"passed: {g.name} {g.found:.3g}, wanted {g.wanted:.3g}" for g in gates if g.passed and not told.passed)
     page = Page("", blocks=(*verify_blocks(checked), *gates_said), closing=written(figure=told.figure))
-    result = emit(body_of(told), as_json=as_json, render=page, headline=headline)
+    result = emit(told, render=page, headline=headline)
     if not told.passed:
         raise typer.Exit(1)
     return result
@@ -233,7 +226,6 @@ def export(
     write: Annotated[bool, flag("--write", "Change the file of `--into` (a backup is kept), not only show how.")] = False,
     output: OutputFile = None,
     force: Force = False,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Write a schedule as plain YAML, ROS 2 or PX4 parameters, DUNE ini, ArduPilot .param or MOOS block; to stdout without `-o`.
 
@@ -253,12 +245,12 @@ def export(
             "`--into` and `--key` go together", found=f"into {into}, key {key}", hint="`--into vehicle.yaml --key a.b.c`"
         )
     if into is not None and key is not None:
-        return _export_into(known, schedule, into, key, write=write, as_json=as_json)
+        return _export_into(known, schedule, into, key, write=write)
     target = pick_target(to)
     text = target.render(known, node or target.node, template)
     told = Exported(target.name, text, *(() if output is None else _written(output, text, force=force)))
     headline, is_file = of_export(told, schedule), told.file is None
-    return emit(body_of(told), as_json=as_json, render=lambda out: _render_export(out, told), headline=headline, is_file=is_file)
+    return emit(told, render=lambda out: _render_export(out, told), headline=headline, is_file=is_file)
 
 
 def _written(output: Path, text: str, *, force: bool) -> tuple[str, str, str | None]:
@@ -273,7 +265,7 @@ def _written(output: Path, text: str, *, force: bool) -> tuple[str, str, str | N
     return str(output), patch.difference, backup
 
 
-def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write: bool, as_json: bool) -> Mapping[str, Any]:
+def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write: bool) -> Mapping[str, Any]:
     from fieldsid.exports._patch import patch_yaml, write_patch
     from fieldsid.exports._target import columns_of
     from fieldsid.results.gains import Patched
@@ -281,8 +273,8 @@ def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write
     patch = patch_yaml(into, key, columns_of(known))
     backup = str(write_patch(patch)) if write else None
     told = Patched(patch.difference, str(into), backup)
-    headline, body = of_patch(told, schedule, key), body_of(told)
-    return emit(body, as_json=as_json, render=lambda out: print_file(out, patch.difference), headline=headline, is_file=not write)
+    headline = of_patch(told, schedule, key)
+    return emit(told, render=lambda out: print_file(out, patch.difference), headline=headline, is_file=not write)
 
 
 def _time(text: str | None, option: str, example: str = "0.1s") -> float | None:

@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from fieldsid.cli.console import emit
-from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, option
+from fieldsid.cli.options import Force, MappingFile, ModelFile, OutputFile, option
 from fieldsid.cli.voice import angles
 from fieldsid.errors import UsageError
 from fieldsid.page import Block, Page, written
-from fieldsid.records.keys import body_of
 from fieldsid.rounding import number
 
 if TYPE_CHECKING:
@@ -31,7 +30,6 @@ def command(
     noise: Annotated[int | None, option("--noise", "SEED", "Add the model's sensor noise from this seed.")] = None,
     output: OutputFile = None,
     force: Force = False,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Simulate a model: fly a maneuver with it, or replay a run's fin, and keep the motion as a run.
 
@@ -75,7 +73,7 @@ def command(
         signals=signals,
     )
     headline = of_simulation(told, known.axis.value, maneuver, run)
-    return emit(body_of(told), as_json=as_json, render=_page(told), headline=headline)
+    return emit(told, render=_page(told), headline=headline)
 
 
 def _flown(model: Model, spec: str, speed: float | None, fin_max: str, rate: float) -> Run:

@@ -5,20 +5,16 @@ from __future__ import annotations
 import shlex
 from collections import Counter
 from collections.abc import Mapping
-from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from fieldsid.cli.console import emit
 from fieldsid.cli.headlines.trial import of_status
-from fieldsid.cli.options import JsonFlag, argument
+from fieldsid.cli.options import argument
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.page import Block, Page, Whole, counted, paragraph
-from fieldsid.records.keys import body_of
-
-if TYPE_CHECKING:
-    from fieldsid.trial_folder.state import FolderState, Item
+from fieldsid.trial_folder.state import DONE, FolderState, Item, state_of
 
 NAMES = {
     "vehicle": "vehicle", "mapping": "mapping", "plan": "plan", "log": "log", "run": "run", "model": "model",
@@ -36,7 +32,6 @@ LAST = 3
 
 def command(
     folder: Annotated[Path, argument("FOLDER", "The trial folder; the one it is run in if not given.")] = Path(),
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Say what a folder holds, what was made from what, which files are stale, and what to do next.
 
@@ -49,7 +44,6 @@ def command(
     from fieldsid.results.trial import NextStep, Status
     from fieldsid.trial_folder.fin_limits import contradicted_limits
     from fieldsid.trial_folder.next_step import next_step
-    from fieldsid.trial_folder.state import state_of
 
     if not folder.is_dir():
         raise UsageError(
@@ -72,7 +66,7 @@ def command(
         warnings=tuple(notes),
         next=NextStep(why, line),
     )
-    return emit(body_of(told), as_json=as_json, render=_page(state), headline=of_status(told), notes=notes)
+    return emit(told, render=_page(state), headline=of_status(told), notes=notes)
 
 
 def _verdict(state: FolderState) -> str:
@@ -95,9 +89,8 @@ def _page(state: FolderState) -> Page:
     shown = sorted(listed, key=lambda i: (list(NAMES).index(i.kind), i.path))
     told = []
     for e in [e for e in state.entries if e.verdict][-LAST:]:
-        done = "" if e.exit in (0, 1) else "failed: "
-        when = datetime.fromisoformat(e.time).astimezone().strftime("%Y-%m-%d %H:%M")
-        told.append(f"{when}  sysid {e.name}: {done}{e.verdict}")
+        done = "" if e.exit in DONE else "failed: "
+        told.append(f"{e.when}  sysid {e.name}: {done}{e.verdict}")
     files = Block("", tuple(map(_row, shown)), ("file", "what", "made from", ""), left=4, kept=WIDEST_NAME)
     return Page("", blocks=(files, *paragraph(told, Whole)))
 
@@ -106,6 +99,6 @@ def _row(item: Item) -> tuple[str, ...]:
     names = [stem_of(Path(s.named)) for s in item.sources]
     said = ", ".join(names) if len(names) <= MOST_SOURCES else f"{names[0]} and {len(names) - 1} more"
     what = NAMES[item.kind]
-    effects = len((item.body or {}).get("effects", ())) if item.kind == "model" else 0
+    effects = len(item.effects) if item.kind == "model" else 0
     told = f"{what}, {counted(effects, 'effect')}" if effects else what
     return item.path, told, said.replace("+", " +"), item.standing  # a line ends between effects

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from fieldsid.cli.console import emit, say
-from fieldsid.cli.options import Figures, Force, JsonFlag, MappingFile, ModelFiles, OutputDir, OwnLaw, VehicleFile, option
+from fieldsid.cli.options import Figures, Force, MappingFile, ModelFiles, OutputDir, OwnLaw, VehicleFile, option
 from fieldsid.cli.progress import refuse_closed
 from fieldsid.cli.session import drawn_in
 from fieldsid.cli.skipped_logs import Skips
@@ -51,7 +51,6 @@ def command(
     output: OutputDir = None,
     figures: Figures = True,
     force: Force = False,
-    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Predict the turning radius over speed, port and starboard apart, with 95 % bands.
 
@@ -64,18 +63,16 @@ def command(
     from fieldsid.angles import FIN, parse_angle
     from fieldsid.cli.headlines.gains import caveat, of_turn
     from fieldsid.cli.inputs import models_among, read_runs
-    from fieldsid.cli.user_effects import check_effects
-    from fieldsid.face.arguments import fin_limit_of, length_of, vehicle_of
+    from fieldsid.cli.user_effects import read_source
+    from fieldsid.face.arguments import fin_limit_of, vehicle_of
     from fieldsid.face.speeds import speeds_of
-    from fieldsid.plant.parameter_source import load_parameter_source
     from fieldsid.results.turning import TurnRadius
     from fieldsid.turning.radius import turn_radius
 
     refuse_closed(output)
     given = None if rudder_max is None else parse_angle(rudder_max, "--fin-max", FIN)
     models, known = models_among(models), vehicle_of(vehicle)
-    source, skips = load_parameter_source(models, laws=law or ()), Skips()
-    check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
+    source, skips = read_source(models, law or ()), Skips()
     prediction = turn_radius(
         source,
         speeds_of(speeds) or source.knots,
@@ -85,7 +82,7 @@ def command(
         method=method,
         fin_zero=_fin_zero(fin_zero),
         unfit=skips.skip,
-        length=length_of(known),
+        length=known.length_m,
     )
     found = TurnRadius(prediction=prediction, skipped_runs=tuple(skips.records))
     if output is not None:
@@ -95,9 +92,8 @@ def command(
         found = replace(found, figures=tuple(drawn_in(output if figures else None, plots, force=force)))
     headline, notes = of_turn(prediction, models, caveat(source.models, models)), prediction.notes
     page = Page("", blocks=page_of(prediction, angles()).blocks, closing=written(figure=found.figures))
-    result = emit(body_of(found), as_json=as_json, render=page, headline=headline, notes=notes)
-    skips.end(len(runs or []) + len(measured or []) - len(skips.records))
-    return result
+    result = emit(found, render=page, headline=headline, notes=notes)
+    return skips.end(result, len(runs or []) + len(measured or []) - len(skips.records))
 
 
 def _fin_zero(text: str) -> float:

@@ -35,7 +35,8 @@ class CommandPage(TyperCommand):
                 own = "Arguments" if param.param_type_name == "argument" else ANSWER if param.name == "help" else OTHERS
                 groups.setdefault(getattr(param, "rich_help_panel", None) or own, []).append(record)
         has_own_v = ctx.info_name in HAS_OWN_V
-        groups.setdefault(ANSWER, []).extend((n, says) for n, says in SAYS.items() if not (has_own_v and n == VERBOSE))
+        first, *others = ((n, says) for n, says in SAYS.items() if not (has_own_v and n == VERBOSE))
+        groups[ANSWER] = [first, *groups[ANSWER], *others]
         for title in sorted(groups, key=lambda name: GROUPS.index(name) if name in GROUPS else -1):
             with formatter.section(title):
                 formatter.write_dl(groups[title])

@@ -12,6 +12,7 @@ from typing import Any
 
 from fieldsid.artifacts import write_text
 from fieldsid.cli.help.catalogue import entries
+from fieldsid.cli.voice import JSON
 from fieldsid.errors import UsageError
 
 PROGRAMS = ("sysid", "fieldsid")
@@ -60,7 +61,7 @@ def options() -> dict[str, tuple[str, ...]]:
         known = {
             o for c in under.values() or [command] for p in c.params for o in (*p.opts, *p.secondary_opts) if o.startswith("-")
         }
-        found[name] = (*under, *sorted(known), "--help")
+        found[name] = (*under, *sorted({*known, JSON}), "--help")
     return found
 
 

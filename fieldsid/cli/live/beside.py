@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from fieldsid.errors import DataError, FieldsidError, UsageError
-from fieldsid.face.arguments import fin_rate_of, own_effects, vehicle_of
+from fieldsid.face.arguments import own_effects, vehicle_of
 from fieldsid.fitting.identify import identify
 from fieldsid.logs.load import load_run
 from fieldsid.logs.run import Run
@@ -141,8 +141,7 @@ def wanted_at(axis: Axis, schedule: Path | None, vehicle: Path | None, depth: bo
         known = wanted_of(loaded)
         return lambda _now: replace(known, depth=known.depth or depth)
     own = vehicle_of(vehicle)
-    limit = None if own is None else own.fin_max_rad(axis.value)
-    limits = FinLimits(rate=fin_rate_of(own))
+    limit, limits = own.fin_max_rad(axis.value), FinLimits(rate=own.fin_rate_rad_s)
     return lambda now: usual(limit or now.fin_most, by_rate=now.by_rate, limits=limits, depth=depth)
 
 

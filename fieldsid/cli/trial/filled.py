@@ -16,10 +16,8 @@ from fieldsid.logs.unknown_file import own_kind
 from fieldsid.models.axis import Axis
 from fieldsid.trial_folder.make import LOGS, MODELS, RUNS
 from fieldsid.trial_folder.next_step import chosen_models, diagnosed_runs, logs_to_import, root_of, run_words, unseen_runs
+from fieldsid.trial_folder.patterns import FEW
 from fieldsid.trial_folder.state import LOG, MODEL, RUN, FolderState, Item
-
-FEW = 3
-"""Runs up to which each is named."""
 
 Fill = Callable[[Parsed, FolderState], list[str]]
 
@@ -72,7 +70,7 @@ def _output(parsed: Parsed, folder: str) -> list[str]:
 
 def _diagnose(parsed: Parsed, state: FolderState) -> list[str]:
     """Return the runs, the plane of the models, and a file that is free: the report shows it, and `plan --from` takes it."""
-    axis, planes = parsed.values.get("axis"), {str((i.body or {}).get("axis")) for i in state.models}
+    axis, planes = parsed.values.get("axis"), {str(i.axis) for i in state.models}
     if axis is None and len(planes) == 1 and not parsed.paths("runs", "model"):
         axis = Axis(planes.pop())
         whole = Parsed(parsed.name, {**parsed.values, "axis": axis})
@@ -175,16 +173,11 @@ def _gains(state: FolderState) -> list[str]:
 
 def _live(parsed: Parsed, state: FolderState) -> list[str]:
     """Return the newest run, where nothing else is listened to, and what the plan of the axis promised."""
-    runs = [] if parsed.values.get("log") or parsed.values.get("udp") else _newest(state)
+    newest = state.newest(state.of_kind(RUN) or state.of_kind(LOG))  # of runs and logs together where none was imported
+    runs = [] if newest is None or parsed.values.get("log") or parsed.values.get("udp") else [newest.path]
     axis, is_stated = parsed.values.get("axis"), parsed.values.get("plan") or parsed.values.get("want")
-    plans = [] if is_stated else [i.path for i in state.of_kind("plan") if (i.body or {}).get("axis") == axis]
+    plans = [] if is_stated else [i.path for i in state.of_kind("plan") if i.axis == axis]
     return [*runs, *[word for plan in plans[-1:] for word in ("--plan", plan)]]
-
-
-def _newest(state: FolderState) -> list[str]:
-    """Return the run that was written last, of runs and logs together where none was imported."""
-    items = state.of_kind(RUN) or state.of_kind(LOG)
-    return [max(items, key=lambda i: (state.place(i).stat().st_mtime_ns, i.path)).path] if items else []
 
 
 def _batch(parsed: Parsed, state: FolderState) -> list[str]:

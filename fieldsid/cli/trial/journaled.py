@@ -20,7 +20,7 @@ from fieldsid.cli.trial.parsed import Parsed, parse
 from fieldsid.errors import FieldsidError
 from fieldsid.records.named_inputs import is_there
 from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, Stamp, append, read
-from fieldsid.trial_folder.state import FolderState, state_of
+from fieldsid.trial_folder.state import state_of
 
 NOT_KEPT = ("guide", "status", "demo", "effects list", "effects show", "init")
 """Commands that make nothing of a trial: they leave no line. `init` writes its own, into the folder it makes."""
@@ -34,7 +34,7 @@ def run_in_trial(arguments: Sequence[str], run: Callable[[Sequence[str]], Any]) 
     parsed = parse(arguments)
     if parsed is None or parsed.name in NOT_KEPT:
         return run(arguments)
-    folder, state = Path(), cache(_state)
+    folder, state = Path(), cache(lambda: state_of(Path()))
     added = filled(parsed, state)
     if added:
         others = len(left_out(parsed, state()))
@@ -61,10 +61,6 @@ def run_in_trial(arguments: Sequence[str], run: Callable[[Sequence[str]], Any]) 
     return result
 
 
-def _state() -> FolderState:
-    return state_of(Path())
-
-
 class _Kept:
     """What the journal will hold of a command: what was there when it began."""
 
@@ -73,7 +69,8 @@ class _Kept:
         self._began, self._time = perf_counter(), datetime.now(UTC).isoformat(timespec="seconds")
         entries, _ = read(folder)
         self._hashes = Hashes(folder, entries)
-        read_from = [*_inputs(parsed), *([Path("vehicle.yaml")] if "vehicle" in parsed.values else [])]
+        named = parsed.paths(*(n for n in parsed.values if n not in WRITTEN))
+        read_from = [*named, *([Path("vehicle.yaml")] if "vehicle" in parsed.values else [])]
         self._inputs = self._stamps(dict.fromkeys(p for p in read_from if is_there(p)))
         self._before = _snapshot(folder)
 
@@ -94,10 +91,6 @@ class _Kept:
 
     def _stamps(self, paths: Any) -> tuple[Stamp, ...]:
         return tuple(self._hashes.stamp(p) for p in paths)
-
-
-def _inputs(parsed: Parsed) -> list[Path]:
-    return parsed.paths(*(n for n in parsed.values if n not in WRITTEN))
 
 
 def _snapshot(folder: Path) -> dict[str, tuple[int, int]]:

@@ -18,7 +18,7 @@ from fieldsid.cli.help.catalogue import entries
 ROOT = Path(__file__).resolve().parents[3]
 HEAVY = ("numpy", "pandas", "scipy", "numba", "matplotlib", "typer", "rich", "pyarrow", "pydantic", "rosbags")
 
-OF_FILES = {"output", "figure", "figures", "force", "as_json", "undo", "keep", "format_", "apply"}
+OF_FILES = {"output", "figure", "figures", "force", "undo", "keep", "format_", "apply"}
 """What a command takes for what it prints and writes; a function returns a record instead."""
 OF_SESSION = {"context"}
 """What a command is given by the command line that runs it."""
