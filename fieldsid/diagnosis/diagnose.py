@@ -15,7 +15,6 @@ from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.diagnosis.data.heading_span import shown_by_headings
 from fieldsid.diagnosis.data.holdout_split import holdout_split
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
-from fieldsid.diagnosis.evidence.acceptance import compared_error
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
 from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, with_free_run
@@ -30,6 +29,7 @@ from fieldsid.diagnosis.thresholds import MAIN_EXPLAINED_SHARE, RIVAL_PROBABILIT
 from fieldsid.diagnosis.verdict import (
     Verdict,
     added_effects,
+    error_left,
     excess_explained,
     left_of,
     names_added,
@@ -170,7 +170,7 @@ def _diagnosis(
         base=base.errors,
         final=named.errors,
         noise_floor=floor,
-        candidates=_candidates(end, floor, 1.0 if work.is_noiseless else compared_error(base, found, floor)),
+        candidates=_candidates(end, floor, 1.0 if work.is_noiseless else error_left(work, found, floor)),
         model=model,
         base_model=base_model,
         where=where,

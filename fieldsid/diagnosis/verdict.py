@@ -23,7 +23,6 @@ from fieldsid.diagnosis.records import Left
 from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import (
-    CERTAIN_P_VALUE,
     EQUAL_ERROR_RATIO,
     EVIDENCE_TEMPERATURE,
     FAR_ERROR_RATIO,
@@ -33,8 +32,6 @@ from fieldsid.diagnosis.thresholds import (
     MIN_P_VALUE,
     MISSING_ERROR_RATIO,
     RIVAL_LOG_ODDS,
-    SHARES_TO_EXPLAIN,
-    SHARES_TO_EXPLAIN_MISSING,
     SUFFICIENT_ERROR_RATIO,
     UNTRIED_LEAST,
     UNTRIED_MOST,
@@ -58,11 +55,9 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     Errors are relative to the reported noise floor, which includes the sensors' coloured noise. Where no effect was found, the
     verdict is `sufficient` if training and validation errors are within SUFFICIENT_ERROR_RATIO; else `disturbed` if the
     innovations pass the tests of a disturbance, and `unexplained` if not. The same two verdicts are given where the effects found
-    leave a visible error on the validation runs that is no smaller than without them, explain less than half of a large error, or
-    are hardly more evident than no effect: such an effect may exist and is still not what is missing. Nothing is named where
-    so much is left that what is hidden is more probably in no set tried, see `untried_probability`. A moment of the water, such
-    as a wave, is not named where the remaining error surely follows another measured signal, because the moment of a rolling hull
-    oscillates as that of a wave does.
+    leave a visible error on the validation runs that is no smaller than without them, or explain less than half of a large error:
+    such an effect may exist and is still not what is missing. Nothing is named where so much is left that what is hidden is more
+    probably in no set tried, see `untried_probability`.
     """
     floor = reported_noise_floor(search.floor, ml_fit.noise)
     was, now = compared_errors(search.base(), found, floor)
@@ -71,23 +66,20 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
         if worst_error(found, floor) <= SUFFICIENT_ERROR_RATIO:
             return Verdict("sufficient", ())
         return _unnamed(found, left, floor)
-    visible = error > SUFFICIENT_ERROR_RATIO
     large = error > MISSING_ERROR_RATIO and not search.is_noiseless
-    minor = large and share < MAIN_EXPLAINED_SHARE
-    sums = search.evidences()
-    doubtful = sums[frozenset(found.names)] - sums.get(search.root, -np.inf) < RIVAL_LOG_ODDS
-    if visible and (minor or doubtful or not now.mean < was.mean):
+    if error > SUFFICIENT_ERROR_RATIO and ((large and share < MAIN_EXPLAINED_SHARE) or not now.mean < was.mean):
         return _unnamed(found, left, floor)
-    asked = (*SHARES_TO_EXPLAIN, *(SHARES_TO_EXPLAIN_MISSING if large else ()))
-    added = [e for e in found.effects if e.name not in search.known]
-    doubted = not search.is_noiseless and untried_probability(error) > 0.5
-    follows = 3.0 * left.signals < CERTAIN_P_VALUE and any(e.is_of_the_water for e in added)
-    if doubted or follows or (visible and any(left.p < p and share < enough for enough, p in asked)):
+    if not search.is_noiseless and untried_probability(error_left(search, found, floor)) > 0.5:
         return Verdict("unexplained", ())
     rivals = rivals_of(search, found)
     if rivals:
         return Verdict("undecided", added_effects(search, found), rivals)
     return Verdict("effect", added_effects(search, found))
+
+
+def error_left(search: Search, found: ScoredModel, floor: Noise) -> float:
+    """Return the error over a noise floor that a model leaves, at the fitted runs' numbers or at those of all runs."""
+    return min(worst_error(found, floor), compared_error(search.base(), found, floor))
 
 
 def left_of(search: Search, named: ScoredModel, found: ScoredModel, tests: ResidualTests, floor: Noise) -> Left:

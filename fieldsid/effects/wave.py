@@ -135,7 +135,6 @@ EFFECT = Effect(
             says="phase at the run's first sample",
         ),
     ),
-    is_of_the_water=True,
     telltale="the residual swings at one period in every part of the run, with the fin still as well",
     excited_by=("square_pulses", "doublet", "multisine"),
     mistaken_for=("trim_drift", "roll_coupling", "depth_buoyancy", "step_change"),

@@ -150,7 +150,6 @@ class Effect:
     None for the textbook's own.
     `log_prior_penalty` is log evidence the effect must bring beyond others: where another says the same in simpler words,
     or where free event times make it fit anything.
-    `is_of_the_water` marks a moment that knows nothing of the vehicle: what is left beside it follows no measured signal.
     `heading_span` (rad) is what the runs' headings must span together for it to be told from what goes with the heading itself.
     `origin` says where the effect is defined, `definition` the same as a model keeps it; None where it is built in.
     """
@@ -180,7 +179,6 @@ class Effect:
     equivalent_solution: Callable[[Values, Axis], dict[str, float] | None] | None = None
     variants: tuple[Variant, ...] = ()
     log_prior_penalty: float = 0.0
-    is_of_the_water: bool = False
     heading_span: float = 0.0
     textbook: Effect | None = None
     origin: Annotated[str, Key("`built in`, or the file of a user's own.")] = field(default="built in")

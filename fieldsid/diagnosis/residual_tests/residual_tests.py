@@ -35,14 +35,10 @@ HOMOSCEDASTICITY_BLOCK_S, BLOCKS_PER_WINDOW = 0.5, 8
 
 @dataclass(frozen=True, slots=True)
 class ResidualTests:
-    """The p-values of the three tests, and where the windowed energy is largest: run, start and end in s, ratio to the mean.
-
-    `signals` is the part of `dependence` that is on what else was measured: neither the fin nor the motion of the axis.
-    """
+    """The p-values of the three tests, and where the windowed energy is largest: run, start and end in s, ratio to the mean."""
 
     colour: float
     dependence: float
-    signals: float
     bursts: float
     worst_run: str
     worst_start_s: float
@@ -73,8 +69,7 @@ def residual_tests(ml_fit: LikelihoodFit) -> ResidualTests:
     """
     runs = _training(ml_fit)
     memory = memory_score_test(ml_fit.fitted, ml_fit.noise)
-    signals = _other_signals(runs)
-    relation, name = min(_dependence(runs), signals, _breusch_pagan(runs), (memory.p, memory.what))
+    relation, name = min(_dependence(runs), _other_signals(runs), _breusch_pagan(runs), (memory.p, memory.what))
     relation = min(1.0, 4.0 * relation)
     bursts, run, window, ratio = _maximum_energy(runs)
     start = runs[run].record.time[0] + window * ENERGY_WINDOW_S
@@ -82,7 +77,6 @@ def residual_tests(ml_fit: LikelihoodFit) -> ResidualTests:
     return ResidualTests(
         _colour(runs),
         relation,
-        min(1.0, 4.0 * signals[0]),
         bursts,
         runs[run].record.name,
         float(start),
