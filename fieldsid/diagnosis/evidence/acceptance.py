@@ -23,6 +23,7 @@ from fieldsid.diagnosis.thresholds import (
     SUFFICIENT_ERROR_RATIO,
 )
 from fieldsid.models.model import Noise
+from fieldsid.numerics.arrays import FloatArray
 
 
 def is_accepted(
@@ -92,10 +93,15 @@ def _explains_most(before: Sequence[Errors], now: Sequence[Errors], floor: Noise
     It must also remove LEAST_EXPLAINED_SHARE of that on the validation runs, since an effect of the vehicle acts in all runs.
     Some run without it must have an error above `least` times the floor.
     """
-    was, left = (np.array([max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in side]) for side in (before, now))
+    was, left = (_excess(side, floor) for side in (before, now))
     leaves = max(run.over(floor) for errors in before for run in errors.runs) > least
     shown = before[0].over(floor) <= EXPLAINED_ERROR_RATIO or was[0] - left[0] > LEAST_EXPLAINED_SHARE * was[0]
     return bool(leaves and shown and was.sum() - left.sum() > MAIN_EXPLAINED_SHARE * was.sum())
+
+
+def _excess(side: Sequence[Errors], floor: Noise) -> FloatArray:
+    """Return the squared errors over a noise floor less the noise's own, (m,), of each of m errors; zero below it."""
+    return np.array([max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in side])
 
 
 def _explains_beyond_misfit(before: Sequence[Errors], now: Sequence[Errors], floor: Noise) -> bool:
@@ -105,11 +111,8 @@ def _explains_beyond_misfit(before: Sequence[Errors], now: Sequence[Errors], flo
     explains beyond the misfit that remains. On the fitted runs none is larger with it: the motion without it is one of its own,
     and a free run that follows them less comes of a likelihood that weighs a hull that is hardly stable by its next samples.
     """
-
-    def excess(*of: Errors) -> float:
-        return float(np.mean([max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in of]))
-
-    was, left = excess(*before), excess(now[0], min(before[1], now[1], key=lambda errors: errors.over(floor)))
+    least = now[0], min(before[1], now[1], key=lambda errors: errors.over(floor))
+    was, left = (float(_excess(side, floor).mean()) for side in (before, least))
     visible = any(errors.over(floor) > SUFFICIENT_ERROR_RATIO for errors in now)
     return not visible or was - left > BELIEVED_SHARE_OF_MISFIT * left
 
