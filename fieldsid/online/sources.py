@@ -27,6 +27,7 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.online.samples import LONGEST_LINE, MessageReader, Sample, samples_of
 
 TICK_S = 0.2
+POLL_S = 0.5
 READING_SHARE = 0.25
 """Share of the time that reading a log that grows may take: it is read again as a whole, less often the longer that takes."""
 LOCALHOST = "127.0.0.1"
@@ -55,13 +56,13 @@ def followed(
     The newest row waits for the one behind it, for it may be half written. Raises MappingError and LogError as reading does;
     a log that holds nothing yet is waited for.
     """
-    seen, grown, pause = (-1, -1), clock.monotonic(), TICK_S
+    seen, grown, pause = (-1, -1), clock.monotonic(), POLL_S
     while clock.monotonic() - grown < idle_s:
         size = _size(path)
         if size != seen:
             begin = clock.monotonic()
             run = _so_far(path, mapping)
-            pause = max(TICK_S, (clock.monotonic() - begin) / READING_SHARE)
+            pause = max(POLL_S, (clock.monotonic() - begin) / READING_SHARE)
             seen = size
             if run is not None:
                 for sample in samples_of(run.between(-inf, _complete(run, axis)), axis, after):

@@ -18,15 +18,14 @@ from fieldsid.planning.design.leg import Expected, Leg
 from fieldsid.planning.design.plan import MOST_PASSES, Plan
 from fieldsid.planning.flight.excitation import Excitation, Window, fits
 from fieldsid.planning.safety.envelope import LARGEST_SPEED, Envelope
-from fieldsid.planning.specify.quantities import MOST_SPEEDS
 from fieldsid.planning.whole_file import whole_file
 from fieldsid.records.check import finite_number
 from fieldsid.records.keys import body_of
 from fieldsid.records.reading import load_record
 
 KIND = "fieldsid/plan"
-MOST_LEGS = 3 * MOST_SPEEDS
-"""A leg of each speed, and a circle to either side."""
+MAX_LEG_S = 3600.0
+MOST_LEGS = 200
 
 
 def save_plan(plan: Plan, path: Path, *, inputs: Sequence[Path] = (), force: bool = False) -> Path:
@@ -69,8 +68,8 @@ def _leg_of(body: Mapping[str, Any], envelope: Envelope) -> Leg:
     candidate = Excitation(maneuver.name, maneuver.checked({k: finite_number(v, k) for k, v in body["parameters"].items()}))
     _check_fins(candidate, envelope)
     w = body["window"]
-    length, lead, recover = (_number(w, k, 0.0) for k in ("length_s", "lead_s", "recover_s"))
-    window = Window(length, lead, recover, _number(body, "rate_hz"))
+    lead, recover = (_number(w, k, 0.0, MAX_LEG_S) for k in ("lead_s", "recover_s"))
+    window = Window(_number(w, "length_s", 1.0, MAX_LEG_S), lead, recover, _number(body, "rate_hz", 0.1, 1000.0))
     if not fits(candidate, window):
         raise ArtifactError(
             f"{candidate.duration:.1f} s of `{maneuver.name}` do not fit a window of {window.length:g} s",
@@ -81,8 +80,8 @@ def _leg_of(body: Mapping[str, Any], envelope: Envelope) -> Leg:
         speed=_number(body, "speed_m_s", 1e-3, LARGEST_SPEED),
         candidate=candidate,
         window=window,
-        run_up_s=_number(body, "run_up_s", 0.0),
-        turn_s=_number(body, "turn_s", 0.0),
+        run_up_s=_number(body, "run_up_s", 0.0, MAX_LEG_S),
+        turn_s=_number(body, "turn_s", 0.0, MAX_LEG_S),
         autopilot=Autopilot(_number(pilot, "angle_gain"), _number(pilot, "rate_gain"), envelope.fin),
         expected={str(n): _expected(e) for n, e in body["expected"].items()},
         excursions={str(k): finite_number(v, k) for k, v in body["excursions"].items()},

@@ -9,8 +9,7 @@ import numpy as np
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 from fieldsid.schedule.flown.closed_loop_kernel import DIVERGED_RATE_RAD_S, at_rest, commanded, gains_at
-from fieldsid.turning.maneuvering.equations import OFFSET, rudder_lift, slope
-from fieldsid.turning.steady.transient import LEAST_SURGE_M_S
+from fieldsid.turning.maneuvering.equations import LEAST_SURGE_M_S, OFFSET, rudder_lift, slope
 
 
 @jit

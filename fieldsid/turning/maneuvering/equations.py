@@ -20,7 +20,6 @@ import numpy.typing as npt
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import inner, jit
 from fieldsid.records.check import LARGEST_SPEED_M_S
-from fieldsid.turning.steady.transient import LEAST_SURGE_M_S
 
 NAMES = (
     "length", "drag", "sway_surge", "thrust_slope", "rudder", "rudder_arm", "gyration", "sway_lift", "sway_rate",
@@ -46,6 +45,7 @@ FIRST_STATION, STATION_STEP = float(STATIONS[0]), float(STATIONS[1] - STATIONS[0
 OFFSET = NAMES.index("rudder_offset")
 DIFFERENCE = 1e-5
 """Width of a difference, of speed, of speed over length, in rad: its third order is below 1e-10 of what it is of."""
+LEAST_SURGE_M_S = 0.02
 
 
 @inner

@@ -20,7 +20,7 @@ TURNING_SHARE = 0.5
 SETTLED_SHARE = 0.05
 SMOOTH_S = 2.0
 APPROACH_S = 5.0
-LEAST_TURN_RAD_S = 0.005
+LEAST_RATE_RAD_S = 0.01
 """Yaw rate below which nothing turns."""
 
 
@@ -116,7 +116,7 @@ def _heading(run: Run, rate: FloatArray) -> FloatArray:
 def _settled(run: Run, rate: FloatArray) -> tuple[int, int]:
     """Return the samples of the longest stretch of turning, its run-in left out: rate within 5 % of its later half."""
     peak = float(np.percentile(np.abs(rate), 95))
-    if peak < LEAST_TURN_RAD_S:
+    if peak < LEAST_RATE_RAD_S:
         raise DataError(
             f"run {run.name!r} does not turn", found=f"yaw rate up to {peak:.4f} rad/s", hint="give the run of a turning circle"
         )

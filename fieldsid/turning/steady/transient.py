@@ -20,7 +20,7 @@ from fieldsid.turning.steady.speed_loss import SpeedLoss
 
 STEP_S = 0.04
 MAX_TRANSIENT_S = 240.0
-LEAST_SURGE_M_S = 0.02
+LEAST_SURGE_M_S = 0.05
 
 
 @dataclass(frozen=True, slots=True)
