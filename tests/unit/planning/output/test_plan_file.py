@@ -51,6 +51,9 @@ def written(tmp_path_factory):
         (("legs", 0, "passes"), 10_000), (("envelope", "fin"), 3.0), (("envelope", "fin"), 0), (("envelope", "heading"), "wide"),
         (("axis",), "roll"), (("legs",), []), (("legs",), "none"), (("legs", 0, "parameters", "widht"), 2.0),
         (("legs", 1, "expected_fin_rad"), ["a"]), (("schema",), "fieldsid/model/1"), (("schema",), "fieldsid/plan/2"),
+        (("legs", 0, "run_up_s"), 3601.0),
+        (("legs", 0, "turn_s"), 3601.0),
+        (("legs", 0, "rate_hz"), 1001.0),
     ],
 )  # fmt: skip
 def test_a_plan_that_was_tampered_with_is_refused_in_three_parts(tmp_path, written, path, value):
