@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import islice
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from fieldsid.models.model import Model
 
 STDIN = Path("-")
+WHOLE = (-inf, inf)
 AXIS_OPTION = "`--axis {axis}`"
 """How an axis is stated on a command line."""
 READING = ("pandas", "pyarrow")
@@ -38,6 +40,7 @@ def read_groups(
     groups: Sequence[Sequence[Path]],
     *,
     mapping: Path | None = None,
+    model: Path | None = None,
     start: float | None = None,
     end: float | None = None,
     check: Callable[[], None] = lambda: None,
@@ -46,10 +49,11 @@ def read_groups(
 ) -> list[list[Run]]:
     """Return the runs of each group of files, each with a name no other has, cut to `start` .. `end` s where given.
 
-    check validates all other arguments; its errors come before those of a file. meanwhile is what this process does while a
-    forked worker reads the files, where it can be forked and has not read any before. refused is called with each of several
-    files that cannot be read, and the error; without it, and where no file of a group can be read, raises LogError, MappingError,
-    and DataError where the cut leaves nothing. Raises UsageError where two files hold the same data.
+    Without a mapping a log whose own names are not enough is read as the logs of the `model` were. check validates all other
+    arguments; its errors come before those of a file. meanwhile is what this process does while a forked worker reads the files,
+    where it can be forked and has not read any before. refused is called with each of several files that cannot be read, and the
+    error; without it, and where no file of a group can be read, raises LogError, MappingError, and DataError where the cut leaves
+    nothing. Raises UsageError where two files hold the same data.
     """
     from fieldsid.logs.several.run_names import refuse_twice
     from fieldsid.logs.several.sifting import attempt, sifted
@@ -57,7 +61,7 @@ def read_groups(
     paths = [path for group in groups for path in group]
     if paths.count(STDIN) > 1:
         raise UsageError("standard input can be read once", found="`-` twice", hint="save the second log to a file")
-    read = partial(_read, mapping=mapping_of(mapping), part=between(start, end))
+    read = partial(_read, mapping=mapping_of(mapping), otherwise=_mapping_behind(model), part=between(start, end))
     is_worth_forking = STDIN not in paths and not any(library in sys.modules for library in READING)
     known = _read_in_worker(read, paths, check, meanwhile) if meanwhile is not None and is_worth_forking else None
     if known is None:
@@ -90,9 +94,9 @@ def _apart(runs: Sequence[Run], used: Sequence[Path], paths: Sequence[Path]) -> 
     return [replace(run, name=own[path]) for run, path in zip(runs, used, strict=True)]
 
 
-def read_run(path: Path, *, mapping: Path | None = None) -> Run:
-    """Return the run of one file; raises LogError."""
-    return _read(path, mapping_of(mapping), between(None, None))
+def read_run(path: Path, *, mapping: Path | None = None, model: Path | None = None) -> Run:
+    """Return the run of one file as `read_groups` does; raises LogError."""
+    return _read(path, mapping_of(mapping), _mapping_behind(model))
 
 
 def mapping_of(path: Path | None) -> ChannelMap | None:
@@ -149,13 +153,28 @@ def files_of(runs: Sequence[Run]) -> list[Path]:
 
 def between(start: float | None, end: float | None) -> tuple[float, float]:
     """Return the part of a log that `--from` and `--to` ask for, in s."""
-    return (-float("inf") if start is None else start, float("inf") if end is None else end)
+    return (WHOLE[0] if start is None else start, WHOLE[1] if end is None else end)
 
 
-def _read(path: Path, mapping: ChannelMap | None, part: tuple[float, float]) -> Run:
+def mapping_used(mapping: Path | None, model: Path | None, runs: Sequence[Run]) -> Path | None:
+    """Return the mapping that runs were read with, for what is written: the one given, else the model's where all need one."""
+    from fieldsid.logs.load import needs_mapping
+    from fieldsid.records.named_inputs import mapping_of_record
+
+    behind = None if model is None or mapping is not None else mapping_of_record(model)
+    return behind if behind is not None and all(map(needs_mapping, files_of(runs))) else mapping
+
+
+def _mapping_behind(model: Path | None) -> ChannelMap | None:
+    from fieldsid.records.named_inputs import mapping_of_record
+
+    return None if model is None else mapping_of(mapping_of_record(model))
+
+
+def _read(path: Path, mapping: ChannelMap | None, otherwise: ChannelMap | None, part: tuple[float, float] = WHOLE) -> Run:
     from fieldsid.logs import load_run
 
-    return load_run(path, mapping, part=part, recognise=True)
+    return load_run(path, mapping, part=part, recognise=True, otherwise=otherwise)
 
 
 def _read_in_worker(

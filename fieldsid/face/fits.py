@@ -78,7 +78,7 @@ def compare(
     from fieldsid.comparison.compare import compare as compare_runs
 
     own_effects()
-    return Several(compare_runs(model_of(model), runs_mapped(runs, mapping, start, end)))
+    return Several(compare_runs(model_of(model), runs_mapped(runs, mapping, start, end, model=model)))
 
 
 def diagnose(
@@ -103,7 +103,7 @@ def diagnose(
     known, plane = None if model is None else model_of(model), axis_of(axis)
     if known is not None and plane is not None and known.axis is not plane:
         raise UsageError(f"that is a {known.axis.value} model", found=f"axis {plane.value}", hint=f'write `"{known.axis.value}"`')
-    learned, unseen = _both(runs, validate, mapping)
+    learned, unseen = _both(runs, validate, mapping, model)
     plane = known.axis if known else plane or axis_excited(learned)
     return diagnose_runs(learned, plane, unseen, model=known, thorough=thorough)
 
@@ -125,11 +125,13 @@ def extend(
 
     own_effects()
     known = model_of(model)
-    return whole_of(extend_in_steps(known, names_of(add), *_both(runs, validate, mapping)))
+    return whole_of(extend_in_steps(known, names_of(add), *_both(runs, validate, mapping, model)))
 
 
-def _both(runs: Logs, validate: Logs, mapping: ChannelMap | File | None) -> tuple[Several[Run], Several[Run]]:
+def _both(
+    runs: Logs, validate: Logs, mapping: ChannelMap | File | None, model: AnyModel | None
+) -> tuple[Several[Run], Several[Run]]:
     """Return the runs to learn from and those not seen, all names different."""
-    learned, unseen = runs_mapped(runs, mapping), runs_mapped(validate, mapping)
+    learned, unseen = (runs_mapped(logs, mapping, model=model) for logs in (runs, validate))
     both = runs_mapped((*learned, *unseen), None)
     return Several(both[: len(learned)]), Several(both[len(learned) :])

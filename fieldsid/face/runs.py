@@ -18,6 +18,7 @@ from fieldsid.logs import ChannelMap, Run
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
 from fieldsid.logs.importing import Importer
 from fieldsid.logs.reader import neighbours
+from fieldsid.records.named_inputs import mapping_of_record
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -114,10 +115,15 @@ def runs_of(logs: Logs, reading: Reading | None = None) -> Several[Run]:
 
 
 def runs_mapped(
-    logs: Logs, mapping: ChannelMap | File | None, start: float | None = None, end: float | None = None
+    logs: Logs, mapping: ChannelMap | File | None, start: float | None = None, end: float | None = None, *, model: object = None
 ) -> Several[Run]:
-    """Return the runs of logs as every command but `import` reads them, cut to start .. end s; raises as `load` does."""
-    return runs_of(logs, Reading(Importer(_mapping(mapping), whole=True, recognise=True), start=start, end=end))
+    """Return the runs of logs as every command but `import` reads them, cut to start .. end s; raises as `load` does.
+
+    Without a mapping a log whose own names are not enough is read as the logs of the file of a model were.
+    """
+    behind = mapping_of_record(Path(model)) if isinstance(model, (str, PathLike)) else None
+    importer = Importer(_mapping(mapping), whole=True, recognise=True, otherwise=_mapping(behind))
+    return runs_of(logs, Reading(importer, start=start, end=end))
 
 
 def files_of(name: File, what: str = "log") -> list[Path]:

@@ -59,7 +59,10 @@ def runs_under_way(load: Callable[[tuple[float, float], float], Run], max_gap_s:
 
 @dataclass(frozen=True, slots=True)
 class Importer:
-    """The choices of one import, the same for all its logs; `joined` are the other tables of a run of which the log is one."""
+    """The choices of one import, the same for all its logs; `joined` are the other tables of a run of which the log is one.
+
+    `otherwise` is the mapping of a log without one, see `load_run`.
+    """
 
     mapping: ChannelMap | None = None
     channels: tuple[str, ...] = ()
@@ -70,6 +73,7 @@ class Importer:
     whole: bool = False
     joined: tuple[Path, ...] = ()
     recognise: bool = False
+    otherwise: ChannelMap | None = None
 
     def targets(self, logs: Sequence[Path], output: Path, form: str, *, force: bool = False) -> list[Path]:
         """Return the file each log becomes; raises before anything is read what would be the same for all logs.
@@ -127,6 +131,7 @@ class Importer:
             fin_max_rad=fin_max_rad,
             progress=progress,
             recognise=self.recognise,
+            otherwise=self.otherwise,
         )
 
     def write(self, run: Run, path: Path, *, force: bool = False) -> Imported:

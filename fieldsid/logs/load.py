@@ -39,6 +39,7 @@ def load_run(
     fin_max_rad: Mapping[str, float] | None = None,
     progress: Callable[[float], None] | None = None,
     recognise: bool = False,
+    otherwise: ChannelMap | Path | None = None,
 ) -> Run:
     """Read a log file or bag folder as a Run, with the doctor's findings as notes; `-` reads standard input.
 
@@ -47,15 +48,15 @@ def load_run(
     which the log is one. salvage: take what is left of a damaged log. max_gap_s: longest gap allowed in a main signal. part: the
     times in s between which the log is taken and judged. fin_max_rad: fin limits by signal, for the finding of saturation.
     progress: given the share of the log that has been read, now and then. recognise: read a log without a mapping by what
-    `inspect` proposes, where nothing an axis needs is in doubt. Raises LogError or MappingError, and DataError where the part is
-    empty.
+    `inspect` proposes, where nothing an axis needs is in doubt. otherwise: the mapping of a log without one, whose own names are
+    not enough and that holds every column of it. Raises LogError or MappingError, and DataError where the part is empty.
     """
     if str(path) == "-":
         more = {"channels": channels, "salvage": salvage, "max_gap_s": max_gap_s, "part": part, "fin_max_rad": fin_max_rad}
-        return _from_stdin(mapping, **more, recognise=recognise)
+        return _from_stdin(mapping, **more, recognise=recognise, otherwise=otherwise)
     path = Path(path)
     reader, options = reader_of(path, joined), ReadOptions(msg_path, salvage, joined=tuple(joined))
-    chosen, notes = map_for(path, reader, options, mapping, channels or {}, recognise=recognise)
+    chosen, notes = map_for(path, reader, options, mapping, channels or {}, recognise=recognise, otherwise=otherwise)
     command = _command(path, chosen, channels or {}, options)
     options = replace(options, command=command, progress=progress or options.progress)
     raw = reader.read(path, chosen, options)
@@ -101,6 +102,7 @@ def map_for(
     channels: Mapping[str, Source],
     *,
     recognise: bool = False,
+    otherwise: ChannelMap | Path | None = None,
 ) -> tuple[ChannelMap, list[Note]]:
     """Return the mapping a log is read with, and a note where a file was picked up, or the log recognised.
 
@@ -111,6 +113,9 @@ def map_for(
     if chosen is None:
         file = next((f for f in (Path(MAPPING_FILE), path.parent / MAPPING_FILE) if f.is_file() and maps_anything(f)), None)
         chosen = None if file is None else _loaded(file)
+    if mapping is None and otherwise is not None and (chosen is None or not is_enough(chosen.sources)):
+        named = _loaded(otherwise)
+        chosen = named if _is_in(named, reader.inventory(path, options, named.table)) else chosen
     complete = chosen_map(None, chosen, channels)
     is_open = mapping is None and not channels and (chosen is None or chosen.origin is None)
     told = frozenset[str]() if complete is None else frozenset(complete.sources)
@@ -158,6 +163,13 @@ def to_map(log: Path, joined: Sequence[Path] = ()) -> str:
     """Return the command that writes a first mapping of a log, in place of one that maps nothing."""
     words = ["sysid", "inspect", *(["--join"] if joined else []), str(log), *map(str, joined), "--write-mapping", MAPPING_FILE]
     return shlex.join([*words, *(["--force"] if Path(MAPPING_FILE).is_file() else [])])
+
+
+def _is_in(mapping: ChannelMap, found: Inventory) -> bool:
+    """Return whether a log holds every column and topic that a mapping names."""
+    sources = [*mapping.sources.values(), *([] if mapping.time is None else [mapping.time])]
+    named = {str(place) for s in sources for place in (s.places if s.topic is None else (s.topic,))}
+    return named <= {c.name for c in found.channels}
 
 
 def _loaded(mapping: ChannelMap | Path) -> ChannelMap:

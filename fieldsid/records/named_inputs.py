@@ -79,6 +79,14 @@ def inputs_in(body: Mapping[str, Any], record: Path) -> tuple[Path, ...]:
     return tuple(dict.fromkeys(p for p in found if p is not None))
 
 
+def mapping_of_record(path: Path) -> Path | None:
+    """Return the mapping that the logs of a record were read with, as `mapping_in` does; None where it cannot be read."""
+    try:
+        return mapping_in(read_yaml(path), path)
+    except ArtifactError:
+        return None
+
+
 def mapping_in(body: Mapping[str, Any], record: Path) -> Path | None:
     """Return the mapping that a record's body says its logs were read with, where it still is; None where none was named."""
     entry = body.get("mapping")

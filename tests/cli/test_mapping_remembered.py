@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+
 import pytest
 from cli import trial
 
@@ -51,3 +53,41 @@ def test_a_model_is_stale_where_its_mapping_has_changed(run_cli, models, tmp_pat
     file = tmp_path / "kanaele.yaml"
     file.write_text(file.read_text() + "# the rudder again\n")
     assert "kanaele.yaml has changed" in run_cli("status").out
+
+
+def test_a_new_log_is_read_as_the_models_logs_were(run_cli, models, tmp_path):
+    new = tmp_path / "new.csv"
+    new.write_bytes((tmp_path / "log_1.8.csv").read_bytes()[:-200].rsplit(b"\n", 1)[0] + b"\n")
+    made = run_cli("identify", "log_1.0.csv", "-m", "kanaele.yaml", "--axis", "yaw", "-o", "plain")
+    assert made.code == 0
+    for model, is_named in ((models[0], True), ("plain/log_1.0_yaw.yaml", False)):
+        told = run_cli("compare", model, new)
+        assert told.code == 0
+        line = next(line for line in told.out.splitlines() if line.startswith("next: ")).removeprefix("next: sysid ")
+        assert ("--model" in line, "--mapping kanaele.yaml" in line) == (is_named, not is_named)
+        assert run_cli(*shlex.split(line), "--json").code == 0
+    assert fieldsid.compare(models[0], new)[0].run == "new"
+    added = run_cli("extend", models[0], new, "--add", "quadratic_damping", "--keep", "-o", "more.yaml")
+    assert added.code == 0
+    assert read_yaml(tmp_path / "more.yaml")["mapping"]["path"] == "kanaele.yaml"
+    assert run_cli("simulate", models[0], "--run", new).code == 0
+
+
+def test_own_names_of_a_log_count_more_than_the_models_mapping(run_cli, models, tmp_path):
+    own = tmp_path / "own.csv"
+    text = (tmp_path / "log_1.8.csv").read_text()
+    for name, column in NAMES.items():
+        text = text.replace(column, name, 1)
+    own.write_text(text)
+    assert run_cli("compare", models[0], own).code == 0
+    fitted = run_cli("extend", models[0], own, "--add", "quadratic_damping", "--keep", "-o", "more.yaml")
+    assert fitted.code == 0
+    assert "mapping" not in read_yaml(tmp_path / "more.yaml")
+
+
+def test_a_mapping_whose_columns_a_log_lacks_is_not_tried(run_cli, models, tmp_path):
+    foreign = tmp_path / "foreign.csv"
+    foreign.write_text("a,b\n" + "\n".join(f"{0.1 * i},{i}" for i in range(50)) + "\n")
+    told = run_cli("compare", models[0], foreign)
+    assert told.code == 2
+    assert "kanaele" not in told.err

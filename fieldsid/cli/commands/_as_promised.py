@@ -31,8 +31,8 @@ def as_promised(gains: Path, runs: Sequence[Path], reading: Mapping[str, Any]) -
     from fieldsid.schedule.verify import plants_behind
 
     schedule, skips = load_schedule(gains), Skips()
-    logs = read_runs(runs, refused=skips.skip, **reading)
     source = load_parameter_source(designed_from(schedule, str(gains)))
+    logs = read_runs(runs, model=next(iter(source.paths), None), refused=skips.skip, **reading)
     of, flown = plants_behind(schedule, source, runs_behind(source, say)), 0
     steps: list[KeptStep] = []
     for run in logs:

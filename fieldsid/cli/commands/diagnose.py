@@ -62,7 +62,7 @@ def command(
 
     Example: sysid diagnose runs/pulses_*.parquet --axis yaw --validate runs/zigzag.parquet
     """
-    from fieldsid.cli.inputs import AXIS_OPTION, files_of, read_groups
+    from fieldsid.cli.inputs import AXIS_OPTION, files_of, mapping_used, read_groups
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.cli.user_effects import check_effects
 
@@ -71,7 +71,9 @@ def command(
     known = _known(model, axis)
     skips, ready = Skips(), partial(get_ready, "fieldsid.diagnosis")
     held = partial(check_effects, [(model, known)] if model and known else [])
-    training, unseen = read_groups([runs, validate or []], mapping=mapping, check=held, meanwhile=ready, refused=skips.skip)
+    training, unseen = read_groups(
+        [runs, validate or []], mapping=mapping, model=model, check=held, meanwhile=ready, refused=skips.skip
+    )
     from fieldsid.diagnosis import diagnose
     from fieldsid.face.arguments import axis_excited
     from fieldsid.results.diagnoses import Diagnosed
@@ -91,7 +93,8 @@ def command(
     )
     told = replace(told, file=_saved(told, output, inputs, force=force), figure=drawn_at(figure, found.plot, force=force))
     if apply:
-        told = replace(told, applied=_applied(found, (known, model), training, unseen, mapping, force=force))
+        used = mapping_used(mapping, model, [*training, *unseen])
+        told = replace(told, applied=_applied(found, (known, model), training, unseen, used, force=force))
     from fieldsid.cli.headlines.missing import Searched, of_diagnosis
 
     headline = of_diagnosis(told, Searched(files_of(training), files_of(unseen), model, thorough))

@@ -39,6 +39,7 @@ def command(
     Example: sysid simulate model.yaml --maneuver zigzag:amplitude=15deg --speed 1.4 -o zigzag.csv
     """
     from fieldsid.cli.headlines.models import of_simulation
+    from fieldsid.cli.inputs import read_run
     from fieldsid.cli.user_effects import read_model
     from fieldsid.results.logs import SignalRange, Simulation
 
@@ -49,7 +50,10 @@ def command(
             hint="`--maneuver square_pulses` or `--run RUN`",
         )
     known = read_model(model)
-    made = _flown(known, maneuver or "", speed, fin_max, rate) if run is None else _replayed(known, run, mapping, speed)
+    if run is None:
+        made = _flown(known, maneuver or "", speed, fin_max, rate)
+    else:
+        made = _replayed(known, read_run(run, mapping=mapping, model=model), speed)
     if noise is not None:
         from fieldsid.planning.flight.dry_run import with_noise
 
@@ -90,15 +94,14 @@ def _flown(model: Model, spec: str, speed: float | None, fin_max: str, rate: flo
     )
 
 
-def _replayed(model: Model, path: Path, mapping: Path | None, speed: float | None) -> Run:
+def _replayed(model: Model, run: Run, speed: float | None) -> Run:
     from dataclasses import replace
 
-    from fieldsid.cli.inputs import read_run
     from fieldsid.dynamics.free_run import simulate
     from fieldsid.models.record import record_of
     from fieldsid.planning.flight.dry_run import replayed
 
-    record = record_of(read_run(path, mapping=mapping), model.axis)
+    record = record_of(run, model.axis)
     record = record if speed is None else replace(record, speed=speed)
     return replayed(model, record, simulate(model, record))
 

@@ -11,6 +11,8 @@ from pathlib import Path
 
 from fieldsid.cli.trial.parsed import parse
 from fieldsid.cli.trial.spared import without_the_filled
+from fieldsid.logs.load import needs_mapping
+from fieldsid.records.named_inputs import mapping_of_record
 from fieldsid.trial_folder.patterns import FEW, pattern_of
 
 _WORDS: ContextVar[tuple[str, ...]] = ContextVar("words", default=())
@@ -46,14 +48,20 @@ def pasted(*words: str | Path | Sequence[str | Path]) -> str:
 
 
 def _reading(words: Sequence[str]) -> list[str]:
-    """Return the mapping of the command under way, for a line of files that are read as that command has read them."""
-    typed = _WORDS.get()
-    under_way = parse(typed) if {"--mapping", "-m"} & {w.partition("=")[0] for w in typed} else None
-    next_ = parse(words) if under_way is not None else None
+    """Return the mapping of the command under way, for a line of files that are read as that command has read them.
+
+    Where it was not typed it is that of a model, for logs whose own names are not enough and a line without that model.
+    """
+    under_way, next_ = parse(_WORDS.get()), parse(words)
     if under_way is None or next_ is None or next_.values.get("mapping", "") is not None:
         return []
-    read = {p for p in under_way.paths() if p.suffix not in (".yaml", ".yml")}
-    return ["--mapping", str(under_way.values["mapping"])] if read & set(next_.paths()) else []
+    records = {p for p in under_way.paths() if p.suffix in (".yaml", ".yml")}
+    read = (set(under_way.paths()) - records) & set(next_.paths())
+    mapping = under_way.values.get("mapping")
+    if mapping is None and read and not records & set(next_.paths()):
+        behind = next(filter(None, map(mapping_of_record, sorted(records))), None)
+        mapping = behind if behind is not None and all(map(needs_mapping, read)) else None
+    return ["--mapping", str(mapping)] if mapping is not None and read else []
 
 
 def repeated(option: str, files: Sequence[str | Path]) -> list[str]:
