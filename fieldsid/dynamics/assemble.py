@@ -45,7 +45,7 @@ class Base:
 
 @dataclass(frozen=True, slots=True)
 class KernelInputs:
-    """Arrays of the core: drive (n-1, 6), constants (17,), pieces per interval; what they came from: fin path, terms, core."""
+    """Arrays of the core: drive (n-1, 6), constants (C,), pieces per interval; what they came from: fin path, terms, core."""
 
     drive: FloatArray
     constants: FloatArray

@@ -15,7 +15,7 @@ def integrate_motion(
 ) -> None:
     """Fill out (n, 3) with angle, rate and cross state; a diverged motion is NaN from there on.
 
-    steps (n-1,) s, drive (n-1, 6) in the order of DRIVES, c (17,) in that of CONSTANTS (models/hull.py), start (3,).
+    steps (n-1,) s, drive (n-1, 6) in the order of DRIVES, c (C,) in that of CONSTANTS (models/hull.py), start (3,).
     """
     if not linear_motion(steps, drive, c, start, pieces, out):
         nonlinear_motion(steps, drive, c, start, pieces, out)
@@ -38,7 +38,7 @@ def integrate_with_sensitivities(
     """Fill out (n, 3) and sens (P, 2, n): derivatives of angle and rate by P parameters.
 
     A parameter's derivative of a drive is factor (P, 6) times the row of columns (C, n-1) that place (P, 6) says.
-    d_c (P, 17) are those of the constants, d_start (P, 3) those of the initial state.
+    d_c (P, C) are those of the constants, d_start (P, 3) those of the initial state.
     """
     if not linear_sensitivities(steps, drive, c, start, pieces, columns, place, factor, d_c, d_start, out, sens):
         nonlinear_sensitivities(steps, drive, c, start, pieces, columns, place, factor, d_c, d_start, out, sens)

@@ -153,7 +153,7 @@ def _map_constants(
 
 @inner
 def _moved_constants(d_c: FloatArray) -> IntArray:
-    """Return the places of the constants that any parameter moves; d_c (P, 17)."""
+    """Return the places of the constants that any parameter moves; d_c (P, C)."""
     places, count = np.zeros(d_c.shape[1], dtype=np.intp), 0
     for l in range(d_c.shape[1]):
         size = 0.0

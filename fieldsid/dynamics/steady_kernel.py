@@ -21,7 +21,7 @@ MAX_ITERATIONS, DIGITS = 200, 1e-14
 
 @jit
 def straight_slopes(cores: FloatArray) -> FloatArray:
-    """Return the columns of STRAIGHT (5, d) that the constants (d, 17) of vehicles make, at rest on a straight run."""
+    """Return the columns of STRAIGHT (5, d) that the constants (d, C) of vehicles make, at rest on a straight run."""
     out = np.zeros((5, cores.shape[0]))
     for i in range(cores.shape[0]):
         now = slope(named(cores[i]), kinds_of(cores[i]), 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
@@ -62,7 +62,7 @@ def settled_rates(
 ) -> None:  # fmt: skip
     """Fill out (m,) with the steady rate toward `side` of m vehicles, the root of their equations, NaN where there is none.
 
-    cores (m, 17), damping, moment and fin (m,); moments (r,) rad/s^2 at rates (r,) come on top, none where they are empty.
+    cores (m, C), damping, moment and fin (m,); moments (r,) rad/s^2 at rates (r,) come on top, none where they are empty.
     """
     for i in range(out.size):
         k, kinds, x = named(cores[i]), kinds_of(cores[i]), 0.0

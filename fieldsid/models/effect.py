@@ -19,7 +19,7 @@ from fieldsid.errors import EffectError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.models.definition import NONE, Definition
 from fieldsid.models.fin_path import FinPath
-from fieldsid.models.hull import Core
+from fieldsid.models.hull import RISING, Core
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.records.keys import Key
 from fieldsid.records.named_inputs import sha256_of
@@ -193,6 +193,16 @@ class Effect:
     def stateless(self) -> Variant | None:
         """Its variant without the state of its textbook's, which takes that of an effect beside it; None without one."""
         return next((v for v in self.variants if self.extra_states and v.extra_states == ()), None)
+
+    @property
+    def limits_rate(self) -> bool:
+        """Whether it is a damping that grows with the rate, whatever else it is in another variant."""
+        textbook = self.textbook or self
+        return textbook.holds_rate(textbook.starts())
+
+    def holds_rate(self, values: Values) -> bool:
+        """Whether at these values its damping grows with the rate, and so holds a hull that is unstable at small angles."""
+        return self.core is not None and any(getattr(self.core(values, 1.0), name) > 0.0 for name in RISING)
 
     @property
     def shared(self) -> tuple[Coefficient, ...]:

@@ -29,7 +29,7 @@ SMALLEST_SPEED_RATIO = 0.01
 
 
 class Core(NamedTuple):
-    """The constants of the equations; zero where an effect is absent. In the order of the arrays (17,) that kernels take."""
+    """The constants of the equations; C of them, zero where an effect is absent, in the order of the arrays (C,) of kernels."""
 
     quadratic: float = 0.0
     heading_sin: float = 0.0
@@ -72,6 +72,8 @@ CONSTANTS = Core._fields
 ) = range(len(CONSTANTS))  # fmt: skip
 FACTORS = ("cross_share",)
 """The constants that are one where no effect sets them."""
+RISING = ("quadratic", "strip_moment")
+"""The constants of damping that grows with the rate: it holds a hull that is unstable at small angles."""
 OF_ANGLE = (HEADING_SIN, HEADING_COS, RIGHTING_SIN, RIGHTING_COS, HEADING_SIN2, HEADING_COS2, HEADING_TURN)
 """The constants of what goes with the angle itself: they hold for the course of a run, not for a circle or a step from any."""
 MULTIPLIERS = (BEYOND_SQUARE, HEADING_TURN, CROSS_SHARE, STRIP_FLOW)
@@ -117,7 +119,7 @@ class Slope(NamedTuple):
 
 @inner
 def named(c: FloatArray) -> Core:
-    """Return the constants (17,) by name."""
+    """Return the constants (C,) by name."""
     return Core(
         c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], c[10], c[11], c[12], c[13], c[14], c[15], c[16]
     )  # fmt: skip
@@ -125,7 +127,7 @@ def named(c: FloatArray) -> Core:
 
 @inner
 def kinds_of(c: FloatArray) -> Kinds:
-    """Return the kinds of terms of constants (17,), or of a parameter's derivatives of them."""
+    """Return the kinds of terms of constants (C,), or of a parameter's derivatives of them."""
     heading = abs(c[HEADING_SIN]) + abs(c[HEADING_COS]) + abs(c[HEADING_SIN2]) + abs(c[HEADING_COS2])
     crossing = abs(c[CROSS_DAMPING]) + abs(c[CROSS_RATE]) + abs(c[CROSS_QUADRATIC]) + abs(c[CROSS_FIN]) + abs(c[STRIP_FORCE])
     bent = 0.0
@@ -205,7 +207,7 @@ def by_constants(
     k: Core, kinds: Kinds, now: Slope, fin: float, factor: float, p: float, x: float, stage: int, of_rate: FloatArray,
     of_cross: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill column `stage` of of_rate and of_cross (17, 4) with the derivatives of p' and x' by each constant that is not nil."""
+    """Fill column `stage` of of_rate and of_cross (C, 4) with the derivatives of p' and x' by each constant that is not nil."""
     of_rate[QUADRATIC, stage] = -now.drag
     of_rate[CROSS_SHARE, stage] = x
     of_cross[CROSS_DAMPING, stage] = -factor * x
@@ -238,7 +240,7 @@ def power(ratio: float, exponent: float) -> float:
 
 @inner
 def core_at(core: FloatArray, powers: FloatArray, ratio: float, out: FloatArray) -> None:
-    """Fill out (17,) with the constants at a speed over the one that they are of, each with its power of the speed."""
+    """Fill out (C,) with the constants at a speed over the one that they are of, each with its power of the speed."""
     for j in range(core.shape[0]):
         out[j] = core[j] * power(ratio, powers[j]) if core[j] != 0.0 else 0.0
 

@@ -32,7 +32,7 @@ NEARBY = 0.9
 class YawPlant:
     """One model, d draws of its values; draw 0 is the estimate itself. Arrays (d, 1); `fin` by rate sign, (d, 1) rad.
 
-    `core` (d, 17) are the constants of the equations of motion at the reference speed, `powers` (17,) those of the speed they go
+    `core` (d, C) are the constants of the equations of motion at the reference speed, `powers` (C,) those of the speed they go
     with; `moment` (d, s) is at the speeds that turns are entered at.
     """
 
@@ -224,7 +224,7 @@ def _step(command: float) -> tuple[FloatArray, FloatArray]:
 
 
 def scaled_cores(parts: Sequence[Effect], values: Sequence[Mapping[str, float]], scale: float) -> tuple[FloatArray, FloatArray]:
-    """Return the constants (d, 17) of draws at `scale` times the reference speed, and the powers (d, 17) of it they go with.
+    """Return the constants (d, C) of draws at `scale` times the reference speed, and the powers (d, C) of it they go with.
 
     Those of the angle itself are nil.
     """

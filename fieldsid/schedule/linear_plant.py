@@ -39,10 +39,10 @@ LONGEST_LAG_S = 10.0
 class LinearPlant:
     """Coefficients (d,) over draws at one speed, the estimate first.
 
-    `core` (d, 17) are the constants of the equations of motion; what of them is of a second order, `powers` and `speed_loss` act
+    `core` (d, C) are the constants of the equations of motion; what of them is of a second order, `powers` and `speed_loss` act
     in time simulations only. `offset` is the fin's trim offset (rad): the fin acts as fin + offset. `fin_rate` is inf where not
-    limited. `powers` (d, 19) are the exponents of the speed of damping, authority and the constants; `speed_loss` (d, 3) is drag
-    a_u (1/m), the fin's and the turn's loss over it.
+    limited. `powers` (d, 2 + C) are the exponents of the speed of damping, authority and the constants; `speed_loss` (d, 3) is
+    drag a_u (1/m), the fin's and the turn's loss over it.
     Where the draws are those of a vehicle in surge, sway and yaw, `hull` (d, 22) are its coefficients
     (`turning/maneuvering/equations.py`): flights are of these, and the rest is what they are about a straight run.
     """
@@ -279,7 +279,7 @@ def _plant_of_model(
 
 
 def _powers(damping: FloatArray, own: FloatArray) -> FloatArray:
-    """Return the exponents (d, 19) of the speed: damping's, two of the fin's lift, and the constants' own (d, 17)."""
+    """Return the exponents (d, 2 + C) of the speed: damping's, two of the fin's lift, and the constants' own (d, C)."""
     return np.column_stack([damping, np.full_like(damping, 2.0), own])
 
 

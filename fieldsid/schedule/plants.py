@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fieldsid.dynamics.steady_kernel import settled_rates
 from fieldsid.errors import ModelError
 from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import Axis
-from fieldsid.models.hull import QUADRATIC, STRIP_MOMENT, Core
+from fieldsid.models.hull import OF_ANGLE, Core
 from fieldsid.models.model import Noise
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.records.keys import body_of
@@ -65,12 +66,13 @@ def slowing(plant: LinearPlant, surge: SurgeModel | None, fin_limit: float, seed
 
 
 def _full_rate(one: LinearPlant, fin_limit: float) -> float:
-    """Return the steady rate (rad/s) of a fin at its limit, r of a r + q r^2 = |b| delta; one that nothing holds by q alone."""
-    a, q = float(one.slow_damping[0]), float(one.core[0, QUADRATIC] + one.core[0, STRIP_MOMENT])
-    push = abs(float(one.slow_authority[0])) * fin_limit
-    if q > 0.0:
-        return float((-a + np.sqrt(a * a + 4.0 * q * push)) / (2.0 * q))
-    return push / max(a, 0.05)
+    """Return the steady rate (rad/s) of a fin at its limit, the root of the equations; by the damping where nothing holds one."""
+    core, push, rate, none = one.core.copy(), np.abs(one.authority) * fin_limit, np.empty(1), np.zeros(0)
+    core[:, OF_ANGLE] = 0.0
+    settled_rates(core, one.damping, push, np.sign(one.authority) * fin_limit, 1.0, none, none, rate)
+    if np.isfinite(rate[0]):
+        return float(rate[0])
+    return abs(float(one.slow_authority[0])) * fin_limit / max(float(one.slow_damping[0]), 0.05)
 
 
 def speed_kept_said(axis: Axis, surge: SurgeModel | None) -> str:

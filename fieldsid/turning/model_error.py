@@ -10,17 +10,16 @@ a zig-zag, and turned at 0.26 to 0.5 rad. Log of true over predicted radius ther
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from fieldsid.models.effect import Effect
 from fieldsid.numerics.arrays import FloatArray
 
 MIN_COVERED_SHARE = 0.8
 """Share of the turn's fin, rate or duration from which the data count as having reached it."""
-STEADY_TURN_EFFECTS = frozenset({"sway_coupling", "quadratic_damping", "crossflow_drag"})
-"""Effects that hold what a steady turn adds to a short pulse."""
 STEADY_TURN_LOG_SD = 0.05
 """Ensemble, pulses and zig-zag with these effects: -0.06 +/- 0.04 where 80 to 100 % of the rate was reached, -0.01 +/- 0.04
 beyond. Wider than either, since a fit that leaves the falling speed out was 8 to 10 % off on a vehicle outside the ensemble."""
@@ -79,11 +78,12 @@ def data_coverage(
     )
 
 
-def model_error(effects: tuple[str, ...], reach: DataCoverage, *, formula: bool) -> ModelError:
+def model_error(effects: Iterable[Effect], reach: DataCoverage, *, formula: bool) -> ModelError:
     """Return the model error of a radius, the less the further the data reached.
 
     `formula` is the u-turn formula (speed kept, ramps counted in), else the settled circle. Where the reach is not known
-    (a table), it is taken as a short pulse's.
+    (a table), it is taken as a short pulse's. What a steady turn adds to a short pulse is a
+    cross state and a damping that grows with the rate.
     """
     rate = 1.0 - _share(reach.rate, unknown=0.6)
     hold = 1.0 - _share(reach.hold, unknown=0.3)
@@ -91,7 +91,7 @@ def model_error(effects: tuple[str, ...], reach: DataCoverage, *, formula: bool)
     spread = 0.10 * max(rate, hold) + STALL_LOG_SD * fin
     if formula:
         return ModelError(0.04 + 0.30 * rate + 0.05 * hold, 0.10 + spread)
-    if not STEADY_TURN_EFFECTS & set(effects):
+    if not any(e.extra_states or e.limits_rate for e in effects):
         return ModelError(0.12 + 0.50 * rate + 0.10 * hold, 0.10 + spread)
     return ModelError(0.15 * max(rate, hold), STEADY_TURN_LOG_SD + spread + (0.0 if reach.sway_settles else UNSEEN_SWAY_LOG_SD))
 

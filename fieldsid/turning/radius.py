@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fieldsid.dynamics.free_run import effects_of
 from fieldsid.errors import ModelError, UsageError
 from fieldsid.logs.doctor.fin_findings import FIN_ZERO
 from fieldsid.logs.run import Note, Run
@@ -179,7 +180,8 @@ def _simulated_row(source: ParameterSource, turns: BlendedTurns, index: int, sid
         )
     time = turns.transient.time_180[index]
     coverage = _reach(source, speed, rudder, rate, float(np.nan_to_num(turns.transient.time_90[index], nan=60.0)))
-    spread = model_error(turns.effects, coverage, formula=False).factors(turns.radius.shape[0], SEED + 1)
+    effects = [e for model in source.models for e in effects_of(model)]
+    spread = model_error(effects, coverage, formula=False).factors(turns.radius.shape[0], SEED + 1)
     radius = turns.radius[:, index]
     value = _median(radius * spread)
     found = _found(coverage, radius, spread, time * radius / radius[0], value)

@@ -14,6 +14,7 @@ from fieldsid.fitting.checks import parameter_checks, score_tests
 from fieldsid.fitting.covariance import reml
 from fieldsid.fitting.predict import speed_correction
 from fieldsid.fitting.problem import parameters
+from fieldsid.models.effect import effect_named
 from fieldsid.noise import own_moment
 from fieldsid.schedule import verify
 from fieldsid.turning import model_error, paper_formulas, radius
@@ -65,7 +66,7 @@ def test_the_worked_u_turn_is_the_formulas():
 ROWS = {
     "u-turn formula": ((), True),
     "settled circle, no effect that shapes the turn": ((), False),
-    "settled circle, with sway, quadratic or cross-flow drag": (("sway_coupling",), False),
+    "settled circle, with sway, quadratic or cross-flow drag": ((effect_named("sway_coupling"),), False),
 }
 
 

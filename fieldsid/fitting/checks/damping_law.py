@@ -25,7 +25,6 @@ from fieldsid.models.effect import as_fitted, effect_named
 from fieldsid.models.model import Noise
 from fieldsid.numerics.arrays import FloatArray
 
-LIMITING_EFFECTS = ("quadratic_damping", "crossflow_drag")
 POWERS = (1.4, 4.0)
 """Powers of the rate that are tried: below the first, damping is next to linear and no slope can be told from it."""
 SQUARE = 2.0
@@ -69,7 +68,7 @@ class _Profile:
     def __init__(self, problem: Problem, x: FloatArray) -> None:
         known = dict(zip(problem.layout.names, x.tolist(), strict=False))
         start = {"quadratic": max(known.get("quadratic", 0.0), 0.05), "rate_power": SQUARE}
-        others = [e for e in problem.layout.effects if e.name not in LIMITING_EFFECTS]
+        others = [e for e in problem.layout.effects if not e.limits_rate]
         self.before = negative_log_likelihood(problem, x)
         self.problem = problem.with_effects((*others, as_fitted(effect_named("quadratic_damping"), start)))
         names = self.problem.layout.names

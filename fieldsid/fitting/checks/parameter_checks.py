@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from fieldsid.fitting.checks.authority_checks import authority_check
-from fieldsid.fitting.checks.damping_law import CLEAR_STD_ERRORS, LIMITING_EFFECTS, slope_at_rest
+from fieldsid.fitting.checks.damping_law import CLEAR_STD_ERRORS, slope_at_rest
 from fieldsid.fitting.problem.estimator import Solution
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.logs.run import Note
@@ -59,7 +59,7 @@ def _slope(problem: Problem, solution: Solution, values: Mapping[str, float], er
     if damping >= -CLEAR_STD_ERRORS * error:
         leaves = f"the model turns by itself, and its error of {error:.2g} leaves open whether the vehicle does"
         return Note("unstable", f"{shown} = {damping:.3g} 1/s is negative: {leaves}", data)
-    limited = "rate_power" not in values and any(e.name in LIMITING_EFFECTS for e in problem.layout.effects)
+    limited = "rate_power" not in values and any(e.limits_rate for e in problem.layout.effects)
     free = slope_at_rest(problem, solution.x) if limited else None
     if free is not None and not free.is_negative and free.gained > -CLEAR_GAIN:
         says = (
@@ -69,7 +69,8 @@ def _slope(problem: Problem, solution: Solution, values: Mapping[str, float], er
             "takes that power"
         )
         return Note("slope_at_rest", says, data | {"free": free.value, "std_error": free.std_error, "power": free.power})
-    tail = "held by quadratic damping" if values.get("quadratic", 0.0) > 0.0 else "nothing in the model holds it"
+    holding = [e.name.replace("_", " ") for e in problem.layout.effects if e.holds_rate(values)]
+    tail = f"held by {' and '.join(holding)}" if holding else "nothing in the model holds it"
     curve = ", the slope at rest of a curve fitted to turns," if limited or "rate_power" in values else ""
     return Note(
         "unstable", f"UNSTABLE: {shown} = {damping:.3g} 1/s{curve} is negative, the vehicle turns by itself; {tail}", data

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.fitting.checks.damping_law import LIMITING_EFFECTS, slope_at_rest
+from fieldsid.fitting.checks.damping_law import slope_at_rest
 from fieldsid.fitting.covariance.reml import MAX_NOISE_SAMPLES, gls_step, linearise_runs
 from fieldsid.fitting.initial.effect_screen import with_effect
 from fieldsid.fitting.optimise.levenberg_marquardt import covariance, levenberg_marquardt
@@ -42,7 +42,7 @@ def score_tests(problem: Problem, solution: Solution) -> tuple[Note, ...]:
     notes: list[Note] = []
     if not known & set(FIN_TIMING):
         notes += _timing(problem, solution)
-    if not known & set(LIMITING_EFFECTS):
+    if not any(e.limits_rate for e in problem.layout.effects):
         notes += _instability(problem, solution)
     return tuple(notes)
 

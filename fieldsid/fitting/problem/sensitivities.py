@@ -110,7 +110,7 @@ class Sensitivities:
         return sens
 
     def _input_jacobians(self, slots: tuple[int, ...]) -> tuple[list[DriveDerivatives], FloatArray, FloatArray]:
-        """Return the derivatives by the parameters: of the drives, of the constants (P, 17), of the initial states (P, 3)."""
+        """Return the derivatives by the parameters: of the drives, of the constants (P, C), of the initial states (P, 3)."""
         count = len(slots)
         drives: list[DriveDerivatives] = []
         d_c, d_start = np.zeros((count, len(CONSTANTS))), np.zeros((count, 3))
@@ -133,7 +133,7 @@ class Sensitivities:
         return combined_core(self.layout.effects, values, self.scales[0])
 
     def _initial_state_derivatives(self, d_c: FloatArray) -> FloatArray:
-        """Return the derivatives (P,) of the initial cross state by the constants (P, 17), the rate before the run fixed."""
+        """Return the derivatives (P,) of the initial cross state by the constants (P, C), the rate before the run fixed."""
         x, before, c = self.start[CROSS], self.values["rate_before"], self.arrays.constants
         by_flow = 2.0 * c[STRIP_FORCE] * c[STRIP_FLOW] * d_c[:, STRIP_FLOW]
         square = d_c[:, CROSS_QUADRATIC] + d_c[:, STRIP_FORCE] * c[STRIP_FLOW] ** 2 + by_flow
@@ -176,7 +176,7 @@ class Sensitivities:
         return out
 
     def _input_jacobian(self, name: str) -> tuple[DriveDerivatives, FloatArray | None]:
-        """Return the derivatives of the drives by a parameter, and of the constants (17,) where there are any."""
+        """Return the derivatives of the drives by a parameter, and of the constants (C,) where there are any."""
         names = NAMES[self.layout.axis]
         share, ratio = self.scales
         exponent = self.values.get("damping_exponent", 1.0)
@@ -193,7 +193,7 @@ class Sensitivities:
         return self._of_effect(name)
 
     def _damping_exponent(self, factor: float, exponent: float) -> tuple[DriveDerivatives, FloatArray | None]:
-        """Return the derivatives of the drives, and of the constants (17,), by the exponent of the speed law."""
+        """Return the derivatives of the drives, and of the constants (C,), by the exponent of the speed law."""
         of_damping = self._damping(factor)
         if all(e.core is None for e in self.layout.effects):
             return of_damping, None

@@ -92,8 +92,6 @@ def _noise(body: Mapping[str, Any]) -> Noise:
 
 
 FOLDER = "plan/priors"
-HELD_BY = ("quadratic", "strip_moment")
-"""Core terms whose damping grows with the rate: they hold a hull that is unstable at small angles."""
 WIDEST = 3.0
 """Draws stay within this many standard deviations."""
 
@@ -152,8 +150,7 @@ def growth_of(base: Base, core: Core) -> float:
 
 
 def _held(model: Model) -> bool:
-    core = [e.core(model.values, 1.0) for e in effects_of(model) if e.core is not None]
-    return any(getattr(c, field) > 0 for c in core for field in HELD_BY)
+    return any(e.holds_rate(model.values) for e in effects_of(model))
 
 
 def draws_of(model: Model, count: int, seed: int) -> tuple[Model, ...]:

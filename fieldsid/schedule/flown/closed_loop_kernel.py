@@ -26,7 +26,7 @@ SLOWEST_SHARE = 0.05
 class Plants(NamedTuple):
     """Plants at the speed that a flight begins at, (n,) each: damping, stiffness, authority, the fin's offset (rad).
 
-    Their constants (n, 17); the powers of the speed that damping and authority go with, and the constants (n, 17); of the fin
+    Their constants (n, C); the powers of the speed that damping and authority go with, and the constants (n, C); of the fin
     exp(-step/lag), delay in steps and largest move in a step; the drag, the fin's and the turn's loss of speed.
     """
 

@@ -9,6 +9,7 @@ from truth.paper import YAW
 from fieldsid.errors import ModelError, UsageError
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
+from fieldsid.models.effect import effect_named
 from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.plant.laws.axis_laws import save_laws
@@ -200,7 +201,7 @@ def test_doubt_shrinks_as_the_data_reach_further():
     far = data_coverage(PULSES, fin=0.5, rate=0.5, quarter_s=5.0, speed_flown=True)
     assert near.missing == ()
     assert len(far.missing) == 3
-    for effects, formula in (((), True), ((), False), (("sway_coupling",), False)):
+    for effects, formula in (((), True), ((), False), ((effect_named("sway_coupling"),), False)):
         a, b = model_error(effects, near, formula=formula), model_error(effects, far, formula=formula)
         assert a.sd < b.sd
         assert a.mean < b.mean
