@@ -227,7 +227,7 @@ def export(
     output: OutputFile = None,
     force: Force = False,
 ) -> Mapping[str, Any]:
-    """Write a schedule as plain YAML, ROS 2 or PX4 parameters, DUNE ini, ArduPilot .param or MOOS block; to stdout without `-o`.
+    """Write a schedule as the vehicle's software reads it; to stdout without `-o`.
 
     `--into FILE --key A.B.C` shows how an existing YAML file would change, comments and order kept, and changes it only with
     `--write`. A file that is changed, or replaced by `-o FILE --force`, is kept as it was as .bak, and the difference is shown.
