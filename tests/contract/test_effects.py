@@ -207,7 +207,8 @@ def test_a_path_cut_in_half_steps_keeps_its_area(effect):
     coarse = record(effect.axes[0], held=False)
     time = np.sort(np.r_[coarse.time, 0.5 * (coarse.time[1:] + coarse.time[:-1])])
     fin = np.interp(time, coarse.time, coarse.fin)
-    fine = replace(coarse, time=time, fin=fin)
+    signals = {role: np.interp(time, coarse.time, values) for role, values in coarse.signals.items()}
+    fine = replace(coarse, time=time, fin=fin, signals=signals)
     values = effect.starts()
     area = effect.fin(coarse.commanded, values, coarse).mean * coarse.steps
     halves = effect.fin(fine.commanded, values, fine).mean * fine.steps

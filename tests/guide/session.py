@@ -15,12 +15,15 @@ import sys
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from io import StringIO
+from math import inf
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
 from fieldsid.artifacts import plain
+from fieldsid.cli import progress
 from fieldsid.cli.app import main
 from fieldsid.cli.app import run as run_command
 from fieldsid.cli.commands.demo import HIDDEN
@@ -57,7 +60,8 @@ class Session:
 
     def _ours(self, line: str, words: list[str]) -> str:
         out = StringIO()
-        with chdir(self.folder), redirect_stdout(out), redirect_stderr(out):
+        # a line of progress now and then is what a busy machine says
+        with chdir(self.folder), redirect_stdout(out), redirect_stderr(out), patch.object(progress, "LINE_EVERY_S", inf):
             body = run_command(expanded(words))
         if body is not None:
             self.bodies[line] = json.loads(json.dumps(plain(body), allow_nan=False))

@@ -14,13 +14,8 @@ from fieldsid.models.hull import CONSTANTS, DRIVES, MULTIPLIERS, Core, named
 from fieldsid.numerics.jit import plain_of
 
 N, H = 80, 0.05
-C = dict(
-    zip(
-        CONSTANTS,
-        (0.8, 0.05, -0.04, 0.2, 0.1, 0.9, 0.3, 1.4, -0.3, 0.03, 0.06, 0.4, 0.7, 0.9, 1.2, 1.1, 0.5),
-        strict=True,
-    )
-)
+SIZES = (0.8, 0.05, -0.04, 0.2, 0.1, 0.9, 0.3, 1.4, -0.3, 0.03, 0.06, 0.4, 0.7, 0.9, 1.2, 1.1, 0.5)
+C = dict(zip(CONSTANTS, np.resize(SIZES, len(CONSTANTS)).tolist(), strict=True))
 LINEAR = np.array(Core())
 COUNT = len(CONSTANTS)
 

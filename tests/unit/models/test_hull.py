@@ -8,7 +8,8 @@ import pytest
 from fieldsid.dynamics.steady_kernel import settled_rates, straight_slopes
 from fieldsid.models.hull import CONSTANTS, Core, by_constants, crossflow, crossforce, either, kinds_of, named, slope
 
-FULL = np.array([0.8, 0.05, -0.04, 0.2, 0.1, 0.9, 0.3, 1.4, -0.3, 0.03, 0.06, 0.4, 0.7, 0.9, 1.2, 1.1, 0.5])
+SIZES = [0.8, 0.05, -0.04, 0.2, 0.1, 0.9, 0.3, 1.4, -0.3, 0.03, 0.06, 0.4, 0.7, 0.9, 1.2, 1.1, 0.5]
+FULL = np.resize(SIZES, len(CONSTANTS))
 DRIVES = {"damping": 1.1, "stiffness": 0.3, "moment": 0.2, "fin": 0.15, "factor": 0.9}
 STATES = ({"y": 0.7, "p": -0.4, "x": 0.3, "clock": 12.0}, {"y": -1.2, "p": 0.3, "x": 0.05, "clock": -4.0})
 STEP = 1e-6
