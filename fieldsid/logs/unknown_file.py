@@ -106,7 +106,7 @@ def _is_read_elsewhere(head: bytes) -> bool:
 
 def not_a_log(path: Path, suffixes: Sequence[str]) -> LogError:
     """Return the error of a file or folder that no reader takes; suffixes are those of the logs that are read."""
-    give = f"give a log: {', '.join(suffixes)}"
+    give = f"give a log: {', '.join(dict.fromkeys(suffixes))}"
     if path.is_dir():
         return _of_folder(path, suffixes, give)
     head, size = head_of(path), f"{path.stat().st_size} bytes"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import io
 import json
 from pathlib import Path
 
@@ -319,3 +320,10 @@ def test_the_rate_comes_from_the_time_that_names_or_mapping_tell(run_cli, tmp_pa
     rows = [head] * bool(head) + [f"{round((1.7e9 * (scale == 1e9) + t) * scale, 3):.17g},{0.01 * t:.4f}" for t in TIME]
     Path("plain.csv").write_text("\n".join(rows) + "\n")
     assert set(rates(run_cli, "plain.csv", *options).values()) == {rate}
+
+
+def test_a_log_on_standard_input_is_said_to_be_that(run_cli, log, tmp_path, monkeypatch):
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(log.read_bytes())))
+    told = run_cli("import", "-", "-o", tmp_path / "runs")
+    assert told.code == 0
+    assert "rests on standard input: SI" in told.out

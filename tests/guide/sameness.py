@@ -9,8 +9,6 @@ from itertools import islice
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*[a-f]\d)")
 HASH = re.compile(r"\b[0-9a-f]{12}(?:[0-9a-f]{52})?\b")
 SECONDS = re.compile(r"took [0-9.]+ s\b")
-PROGRESS = re.compile(r"^diagnosing: .*$", re.MULTILINE)
-"""A line of progress, which a slow machine prints more of."""
 DATE = re.compile(r"\b\d{4}-\d\d-\d\d \d\d:\d\d\b")
 SHARE = 0.02
 """Share by which two numbers may differ; besides, one and a half units of the last decimal that both have."""
@@ -20,7 +18,6 @@ MOST_LINES = 30
 
 def parts_of(text: str) -> tuple[list[str], list[str]]:
     """Return a text's words between its numbers, blanks made one, and its numbers; hashes, run times and dates are all alike."""
-    text = PROGRESS.sub("", text)
     text = " ".join(DATE.sub("some day", SECONDS.sub("took some time", HASH.sub("SHA-256", text))).split())
     return [w.strip() for w in NUMBER.split(text)], NUMBER.findall(text)
 

@@ -61,6 +61,6 @@ def of_import(told: Import, axis: str) -> Headline:
     logs = list(dict.fromkeys(Path(r.log).resolve().name for r in runs if r.log is not None))
     return Headline(
         says + (counted(noted, "note") if noted else "nothing to note"),
-        f"{named(logs)}: SI and radians, one clock, gaps left as gaps",
+        f"{named(logs) or 'standard input'}: SI and radians, one clock, gaps left as gaps",
         pasted("identify", files, "--axis", axis, *joint, "-o", "models/") if files else "",
     )

@@ -63,6 +63,8 @@ def test_a_model_says_which_logs_it_was_made_from_and_a_mapping_how_it_is_given(
     assert refused(model).hint == f"give logs, such as those it was made from: `'{log}'`"
     model.write_text("schema: fieldsid/model/1\ninputs: {broken\n")
     assert refused(model).hint.startswith("give a log: .alog")
+    suffixes = refused(model).hint.removeprefix("give a log: ").split(", ")
+    assert len(suffixes) == len(set(suffixes))
     mapping = tmp_path / "mapping.yaml"
     mapping.write_text("# mine\nschema: fieldsid/mapping/1\n")
     assert refused(mapping).hint == f"give it beside the log: `--mapping {mapping}`"
