@@ -110,7 +110,8 @@ class _Screen:
 
     def steps(self, points: Sequence[list[ScreenResult]]) -> list[_PendingMove]:
         """Return what is to be followed of the scan points of every effect."""
-        most, ranked = self.asked.most, sorted(points, key=lambda points: points[0].predicted_cost)
+        parent, most = self.asked.parent, self.asked.most
+        ranked = sorted(points, key=lambda points: points[0].predicted_cost + _price(parent, points[0].effect))
         follows = self.by_output_error and most is not None
         if most is not None:
             first = first_few(ranked, most + follows * EXTRA_ITERATED_EFFECTS, lambda points: points[0].effect)
@@ -160,9 +161,17 @@ def _least_cost_fall(parent: ScoredModel, effect: Effect) -> float:
 
     That is the prior odds against one and the price of the numbers it has of each run's own; validation runs gain in proportion.
     """
+    odds = 2.0 * ALTERNATIVE_LOG_ODDS * parent.training_share
+    return max(MIN_WHITENED_COST_FALL, (odds + _price(parent, effect)) / MAX_FIRST_ORDER_SHORTFALL)
+
+
+def _price(parent: ScoredModel, effect: Effect) -> float:
+    """Return the fall of the training runs' whitened cost that pays for the numbers an effect has of each run's own.
+
+    Without it an event in each run would always come before the drift that it imitates.
+    """
     records = parent.likelihood_fit.fitted.problem.records
-    asked = ALTERNATIVE_LOG_ODDS + price_of_runs(effect, (*records, *parent.validation))
-    return max(MIN_WHITENED_COST_FALL, 2.0 * asked * parent.training_share / MAX_FIRST_ORDER_SHORTFALL)
+    return 2.0 * price_of_runs(effect, (*records, *parent.validation)) * parent.training_share
 
 
 def _matters(move: SearchMove) -> bool:
