@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import islice
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.errors import FieldsidError, UsageError
+from fieldsid.records import named_inputs
 from fieldsid.runtime.pickling import dumps, loads
 from fieldsid.runtime.worker_pool import fork_worker
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from fieldsid.models.model import Model
 
 STDIN = Path("-")
-WHOLE = (-inf, inf)
 AXIS_OPTION = "`--axis {axis}`"
 """How an axis is stated on a command line."""
 READING = ("pandas", "pyarrow")
@@ -40,7 +39,7 @@ def read_groups(
     groups: Sequence[Sequence[Path]],
     *,
     mapping: Path | None = None,
-    model: Path | None = None,
+    models: Iterable[Path] = (),
     start: float | None = None,
     end: float | None = None,
     check: Callable[[], None] = lambda: None,
@@ -49,7 +48,7 @@ def read_groups(
 ) -> list[list[Run]]:
     """Return the runs of each group of files, each with a name no other has, cut to `start` .. `end` s where given.
 
-    Without a mapping a log whose own names are not enough is read as the logs of the `model` were. check validates all other
+    Without a mapping a log whose own names are not enough is read as the logs of the `models` were. check validates all other
     arguments; its errors come before those of a file. meanwhile is what this process does while a forked worker reads the files,
     where it can be forked and has not read any before. refused is called with each of several files that cannot be read, and the
     error; without it, and where no file of a group can be read, raises LogError, MappingError, and DataError where the cut leaves
@@ -61,7 +60,9 @@ def read_groups(
     paths = [path for group in groups for path in group]
     if paths.count(STDIN) > 1:
         raise UsageError("standard input can be read once", found="`-` twice", hint="save the second log to a file")
-    read = partial(_read, mapping=mapping_of(mapping), otherwise=_mapping_behind(model), part=between(start, end))
+    read = partial(
+        _read, mapping=mapping_of(mapping), otherwise=mapping_of(named_inputs.mapping_of(models)), part=between(start, end)
+    )
     is_worth_forking = STDIN not in paths and not any(library in sys.modules for library in READING)
     known = _read_in_worker(read, paths, check, meanwhile) if meanwhile is not None and is_worth_forking else None
     if known is None:
@@ -94,9 +95,9 @@ def _apart(runs: Sequence[Run], used: Sequence[Path], paths: Sequence[Path]) -> 
     return [replace(run, name=own[path]) for run, path in zip(runs, used, strict=True)]
 
 
-def read_run(path: Path, *, mapping: Path | None = None, model: Path | None = None) -> Run:
+def read_run(path: Path, *, mapping: Path | None = None, models: Iterable[Path] = ()) -> Run:
     """Return the run of one file as `read_groups` does; raises LogError."""
-    return _read(path, mapping_of(mapping), _mapping_behind(model))
+    return _read(path, mapping_of(mapping), mapping_of(named_inputs.mapping_of(models)), between(None, None))
 
 
 def mapping_of(path: Path | None) -> ChannelMap | None:
@@ -153,25 +154,18 @@ def files_of(runs: Sequence[Run]) -> list[Path]:
 
 def between(start: float | None, end: float | None) -> tuple[float, float]:
     """Return the part of a log that `--from` and `--to` ask for, in s."""
-    return (WHOLE[0] if start is None else start, WHOLE[1] if end is None else end)
+    return (-float("inf") if start is None else start, float("inf") if end is None else end)
 
 
-def mapping_used(mapping: Path | None, model: Path | None, runs: Sequence[Run]) -> Path | None:
-    """Return the mapping that runs were read with, for what is written: the one given, else the model's where all need one."""
+def mapping_behind(models: Iterable[Path], logs: Iterable[Path]) -> Path | None:
+    """Return the mapping that the logs of models were read with, where each of some logs needs one; None elsewhere."""
     from fieldsid.logs.load import needs_mapping
-    from fieldsid.records.named_inputs import mapping_of_record
 
-    behind = None if model is None or mapping is not None else mapping_of_record(model)
-    return behind if behind is not None and all(map(needs_mapping, files_of(runs))) else mapping
-
-
-def _mapping_behind(model: Path | None) -> ChannelMap | None:
-    from fieldsid.records.named_inputs import mapping_of_record
-
-    return None if model is None else mapping_of(mapping_of_record(model))
+    behind = named_inputs.mapping_of(models)
+    return behind if behind is not None and all(map(needs_mapping, logs)) else None
 
 
-def _read(path: Path, mapping: ChannelMap | None, otherwise: ChannelMap | None, part: tuple[float, float] = WHOLE) -> Run:
+def _read(path: Path, mapping: ChannelMap | None, otherwise: ChannelMap | None, part: tuple[float, float]) -> Run:
     from fieldsid.logs import load_run
 
     return load_run(path, mapping, part=part, recognise=True, otherwise=otherwise)
@@ -199,12 +193,14 @@ def fitted_to(path: Path, model: Model, runs: Iterable[Run]) -> frozenset[str]:
     By their hashes. Where the model's own log is gone, or of another format, its name is all there is to go by.
     """
     from fieldsid.logs.several.run_names import stem_of
-    from fieldsid.records.named_inputs import inputs_of, sha256_of, sha256_of_named
 
-    own = {(stem_of(p), p.suffix): p for p in inputs_of(path)}
+    own = {(stem_of(p), p.suffix): p for p in named_inputs.inputs_of(path)}
     pairs = [(r.name, r.source, own.get((stem_of(r.source), r.source.suffix))) for r in runs if r.source is not None]
     return frozenset(model.runs) - frozenset(
         name
         for name, here, there in pairs
-        if there is not None and here.is_file() and there.is_file() and sha256_of(here) != sha256_of_named(there)
+        if there is not None
+        and here.is_file()
+        and there.is_file()
+        and named_inputs.sha256_of(here) != named_inputs.sha256_of_named(there)
     )

@@ -78,7 +78,7 @@ def compare(
     from fieldsid.comparison.compare import compare as compare_runs
 
     own_effects()
-    return Several(compare_runs(model_of(model), runs_mapped(runs, mapping, start, end, model=model)))
+    return Several(compare_runs(model_of(model), runs_mapped(runs, mapping, start, end, models=[model])))
 
 
 def diagnose(
@@ -132,6 +132,6 @@ def _both(
     runs: Logs, validate: Logs, mapping: ChannelMap | File | None, model: AnyModel | None
 ) -> tuple[Several[Run], Several[Run]]:
     """Return the runs to learn from and those not seen, all names different."""
-    learned, unseen = (runs_mapped(logs, mapping, model=model) for logs in (runs, validate))
+    learned, unseen = (runs_mapped(logs, mapping, models=[model]) for logs in (runs, validate))
     both = runs_mapped((*learned, *unseen), None)
     return Several(both[: len(learned)]), Several(both[len(learned) :])

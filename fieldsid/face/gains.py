@@ -69,13 +69,12 @@ def turn_radius(
 
     own_effects()
     source, known = source_of(models, law), vehicle_of(vehicle)
-    first = next(iter(source.paths), None)
     return radius_over_speed(
         source,
         speeds_of(speeds) or source.knots,
         fin_limit_of(known, source, _say, "rudder") if rudder_max is None else rudder_max,
-        runs=_runs_named(source, mapping) if runs is None else runs_mapped(runs, mapping, model=first),
-        measured=runs_mapped(measured, mapping, model=first),
+        runs=_runs_named(source, mapping) if runs is None else runs_mapped(runs, mapping, models=source.paths),
+        measured=runs_mapped(measured, mapping, models=source.paths),
         method=method,
         fin_zero=fin_zero,
         length=known.length_m,

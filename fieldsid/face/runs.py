@@ -18,7 +18,7 @@ from fieldsid.logs import ChannelMap, Run
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
 from fieldsid.logs.importing import Importer
 from fieldsid.logs.reader import neighbours
-from fieldsid.records.named_inputs import mapping_of_record
+from fieldsid.records.named_inputs import mapping_of
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -115,13 +115,18 @@ def runs_of(logs: Logs, reading: Reading | None = None) -> Several[Run]:
 
 
 def runs_mapped(
-    logs: Logs, mapping: ChannelMap | File | None, start: float | None = None, end: float | None = None, *, model: object = None
+    logs: Logs,
+    mapping: ChannelMap | File | None,
+    start: float | None = None,
+    end: float | None = None,
+    *,
+    models: Iterable[object] = (),
 ) -> Several[Run]:
     """Return the runs of logs as every command but `import` reads them, cut to start .. end s; raises as `load` does.
 
-    Without a mapping a log whose own names are not enough is read as the logs of the file of a model were.
+    Without a mapping a log whose own names are not enough is read as the logs of the files of models were.
     """
-    behind = mapping_of_record(Path(model)) if isinstance(model, (str, PathLike)) else None
+    behind = mapping_of(Path(model) for model in models if isinstance(model, (str, PathLike)))
     importer = Importer(_mapping(mapping), whole=True, recognise=True, otherwise=_mapping(behind))
     return runs_of(logs, Reading(importer, start=start, end=end))
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -79,12 +80,13 @@ def inputs_in(body: Mapping[str, Any], record: Path) -> tuple[Path, ...]:
     return tuple(dict.fromkeys(p for p in found if p is not None))
 
 
-def mapping_of_record(path: Path) -> Path | None:
-    """Return the mapping that the logs of a record were read with, as `mapping_in` does; None where it cannot be read."""
-    try:
-        return mapping_in(read_yaml(path), path)
-    except ArtifactError:
-        return None
+def mapping_of(records: Iterable[Path]) -> Path | None:
+    """Return the first mapping that the logs of some records were read with, as `mapping_in` does; None where none names one."""
+    for path in records:
+        with suppress(ArtifactError):
+            if (mapping := mapping_in(read_yaml(path), path)) is not None:
+                return mapping
+    return None
 
 
 def mapping_in(body: Mapping[str, Any], record: Path) -> Path | None:

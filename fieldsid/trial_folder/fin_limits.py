@@ -22,9 +22,10 @@ def contradicted_limits(state: FolderState) -> list[Note]:
         reach = [r for i in state.of_kind(RUN) for name, r in i.fins.items() if name.startswith(fin)]
         beyond = [r for r in reach if limit is not None and r > limit]
         if beyond:
+            runs = counted(len(beyond), "run")
             message = (
                 f"vehicle.yaml: `{fin}_max_rad: {limit:.4g}` is less than the {max(beyond):.4g} rad that the {fin} went to in "
-                f"{counted(len(beyond), 'run')}: correct it, or log the measured fin where it stopped"
+                f"{runs}: correct it, or log the measured fin where it stopped"
             )
             found.append(Note("fin_limit", message, {"signal": f"{fin}_rad", "value": max(beyond), "limit": limit}))
     return found

@@ -82,8 +82,8 @@ def model_error(effects: Iterable[Effect], reach: DataCoverage, *, formula: bool
     """Return the model error of a radius, the less the further the data reached.
 
     `formula` is the u-turn formula (speed kept, ramps counted in), else the settled circle. Where the reach is not known
-    (a table), it is taken as a short pulse's. What a steady turn adds to a short pulse is a
-    cross state and a damping that grows with the rate.
+    (a table), it is taken as a short pulse's. What a steady turn adds to that is a cross state and a damping that grows with the
+    rate.
     """
     rate = 1.0 - _share(reach.rate, unknown=0.6)
     hold = 1.0 - _share(reach.hold, unknown=0.3)

@@ -13,6 +13,7 @@ from fieldsid.logs.doctor.fin_findings import FIN_ZERO
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.several.sifting import Refused
 from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.effect import Effect
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.plant.remedies import damping_that_holds, refuse_no_fin, wider_fin
@@ -167,10 +168,13 @@ def _simulated_rows(
 ) -> list[TurnRow]:
     entry = np.array(speeds, dtype=np.float64)
     both = blended_turns(source, entry, rudder, surge, draws, np.random.default_rng(SEED))
-    return [_simulated_row(source, turns, i, side, rudder) for side, turns in both.items() for i in range(entry.size)]
+    effects = [e for model in source.models for e in effects_of(model)]
+    return [_simulated_row(source, turns, i, side, rudder, effects) for side, turns in both.items() for i in range(entry.size)]
 
 
-def _simulated_row(source: ParameterSource, turns: BlendedTurns, index: int, side: str, rudder: float) -> TurnRow:
+def _simulated_row(
+    source: ParameterSource, turns: BlendedTurns, index: int, side: str, rudder: float, effects: Sequence[Effect]
+) -> TurnRow:
     speed, rate = float(turns.entry[index]), float(turns.rate[index])
     if not np.isfinite(turns.radius[0, index]):
         raise ModelError(
@@ -180,7 +184,6 @@ def _simulated_row(source: ParameterSource, turns: BlendedTurns, index: int, sid
         )
     time = turns.transient.time_180[index]
     coverage = _reach(source, speed, rudder, rate, float(np.nan_to_num(turns.transient.time_90[index], nan=60.0)))
-    effects = [e for model in source.models for e in effects_of(model)]
     spread = model_error(effects, coverage, formula=False).factors(turns.radius.shape[0], SEED + 1)
     radius = turns.radius[:, index]
     value = _median(radius * spread)

@@ -32,7 +32,7 @@ def as_promised(gains: Path, runs: Sequence[Path], reading: Mapping[str, Any]) -
 
     schedule, skips = load_schedule(gains), Skips()
     source = load_parameter_source(designed_from(schedule, str(gains)))
-    logs = read_runs(runs, model=next(iter(source.paths), None), refused=skips.skip, **reading)
+    logs = read_runs(runs, models=source.paths, refused=skips.skip, **reading)
     of, flown = plants_behind(schedule, source, runs_behind(source, say)), 0
     steps: list[KeptStep] = []
     for run in logs:

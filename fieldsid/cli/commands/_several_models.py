@@ -52,7 +52,7 @@ def several_models(
         raise UsageError("the models are not of one axis", found=found, hint="compare those of one axis")
     effects = partial(check_effects, list(zip(paths, models, strict=True)))
     ready = partial(get_ready, "fieldsid.comparison.compare")
-    logs = read_runs(runs, model=paths[0], check=effects, meanwhile=ready, refused=skips.skip, **reading)
+    logs = read_runs(runs, models=paths, check=effects, meanwhile=ready, refused=skips.skip, **reading)
     from fieldsid.comparison.compare import compare
     from fieldsid.results.comparisons import ComparedSeveral, OneOfSeveral, compared_run
 

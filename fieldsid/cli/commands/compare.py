@@ -97,7 +97,7 @@ def command(
     known = load_model(model)
     skips, ready = Skips(), partial(get_ready, "fieldsid.comparison.compare")
     effects = partial(check_effects, [(model, known)])
-    logs = read_runs(runs, model=model, check=effects, meanwhile=ready, refused=skips.skip, **reading)
+    logs = read_runs(runs, models=[model], check=effects, meanwhile=ready, refused=skips.skip, **reading)
     from fieldsid.comparison.compare import compare
     from fieldsid.results.comparisons import Compared, compared_run
 

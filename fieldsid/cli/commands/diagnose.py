@@ -62,7 +62,7 @@ def command(
 
     Example: sysid diagnose runs/pulses_*.parquet --axis yaw --validate runs/zigzag.parquet
     """
-    from fieldsid.cli.inputs import AXIS_OPTION, files_of, mapping_used, read_groups
+    from fieldsid.cli.inputs import AXIS_OPTION, files_of, mapping_behind, read_groups
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.cli.user_effects import check_effects
 
@@ -71,8 +71,9 @@ def command(
     known = _known(model, axis)
     skips, ready = Skips(), partial(get_ready, "fieldsid.diagnosis")
     held = partial(check_effects, [(model, known)] if model and known else [])
+    models = [model] if model else []
     training, unseen = read_groups(
-        [runs, validate or []], mapping=mapping, model=model, check=held, meanwhile=ready, refused=skips.skip
+        [runs, validate or []], mapping=mapping, models=models, check=held, meanwhile=ready, refused=skips.skip
     )
     from fieldsid.diagnosis import diagnose
     from fieldsid.face.arguments import axis_excited
@@ -82,7 +83,7 @@ def command(
     with compiling_first(), trying("diagnosing") as report:
         found = diagnose(training, axis, unseen, model=known, report=report, thorough=thorough, unfit=skips.skip)
     training, unseen = skips.left_of(training), skips.left_of(unseen)
-    inputs = [*files_of([*training, *unseen]), *([model] if model else [])]
+    logs = files_of([*training, *unseen])
     told = Diagnosed(
         found=found,
         runs=tuple(r.name for r in training),
@@ -91,9 +92,11 @@ def command(
         known=() if known is None else known.effects,
         skipped_runs=tuple(skips.records),
     )
-    told = replace(told, file=_saved(told, output, inputs, force=force), figure=drawn_at(figure, found.plot, force=force))
+    told = replace(
+        told, file=_saved(told, output, [*logs, *models], force=force), figure=drawn_at(figure, found.plot, force=force)
+    )
     if apply:
-        used = mapping_used(mapping, model, [*training, *unseen])
+        used = mapping or mapping_behind(models, logs)
         told = replace(told, applied=_applied(found, (known, model), training, unseen, used, force=force))
     from fieldsid.cli.headlines.missing import Searched, of_diagnosis
 

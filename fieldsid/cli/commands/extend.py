@@ -56,7 +56,7 @@ def command(
                 "`--undo` takes the model alone", found="runs or options beside it", hint=f"sysid extend {model} --undo"
             )
         return _undone(model, output, force=force)
-    from fieldsid.cli.inputs import mapping_used, model_first, read_groups
+    from fieldsid.cli.inputs import files_of, mapping_behind, model_first, read_groups
     from fieldsid.face.arguments import names_of
     from fieldsid.models.model import load_model
 
@@ -70,7 +70,7 @@ def command(
     targets = step_files(path, names, output, force=force) if names else []
     check, ready = partial(_check, path, known, names), partial(get_ready, "fieldsid.extension.extend")
     training, unseen = read_groups(
-        [runs, validate], mapping=mapping, model=path, check=check, meanwhile=ready, refused=skips.skip
+        [runs, validate], mapping=mapping, models=[path], check=check, meanwhile=ready, refused=skips.skip
     )
     from fieldsid.extension.extend import extend_in_steps, whole_of
     from fieldsid.extension.lineage import kept_by, save_steps
@@ -83,7 +83,7 @@ def command(
     training, unseen = skips.left_of(training), skips.left_of(unseen)
     kept = found.pays or keep
     if kept:
-        used = mapping_used(mapping, path, [*training, *unseen])
+        used = mapping or mapping_behind([path], files_of([*training, *unseen]))
         save_steps(steps, targets, path, (training, unseen), mapping=used, force=force)
     now = targets[-1] if kept else path
     left, next_ = _left(found, now, known, runs, validate, kept=kept)

@@ -53,7 +53,7 @@ def command(
     if run is None:
         made = _flown(known, maneuver or "", speed, fin_max, rate)
     else:
-        made = _replayed(known, read_run(run, mapping=mapping, model=model), speed)
+        made = _replayed(known, read_run(run, mapping=mapping, models=[model]), speed)
     if noise is not None:
         from fieldsid.planning.flight.dry_run import with_noise
 

@@ -73,13 +73,12 @@ def command(
     given = None if rudder_max is None else parse_angle(rudder_max, "--fin-max", FIN)
     models, known = models_among(models), vehicle_of(vehicle)
     source, skips = read_source(models, law or ()), Skips()
-    first = next(iter(source.paths), None)
     prediction = turn_radius(
         source,
         speeds_of(speeds) or source.knots,
         fin_limit_of(known, source, say, "rudder") if given is None else given,
         runs=_runs(runs, source, mapping, skips),
-        measured=read_runs(measured, mapping=mapping, model=first, refused=skips.skip) if measured else (),
+        measured=read_runs(measured, mapping=mapping, models=source.paths, refused=skips.skip) if measured else (),
         method=method,
         fin_zero=_fin_zero(fin_zero),
         unfit=skips.skip,
@@ -116,7 +115,7 @@ def _runs(given: Sequence[Path] | None, source: ParameterSource, mapping: Path |
     from fieldsid.logs.several.sifting import attempt
 
     if given:
-        return read_runs(given, mapping=mapping, model=next(iter(source.paths), None), refused=skips.skip)
+        return read_runs(given, mapping=mapping, models=source.paths, refused=skips.skip)
     chosen = mapping_of(mapping)
     outcomes = {log.now: attempt(lambda named: read_again(named, chosen), log) for log in run_files(source, say)}
     lost = [f"`{path}`" for path, outcome in outcomes.items() if not isinstance(outcome, Run)]

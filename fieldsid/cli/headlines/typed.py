@@ -9,10 +9,9 @@ from itertools import groupby
 from os.path import isfile
 from pathlib import Path
 
+from fieldsid.cli.inputs import mapping_behind
 from fieldsid.cli.trial.parsed import parse
 from fieldsid.cli.trial.spared import without_the_filled
-from fieldsid.logs.load import needs_mapping
-from fieldsid.records.named_inputs import mapping_of_record
 from fieldsid.trial_folder.patterns import FEW, pattern_of
 
 _WORDS: ContextVar[tuple[str, ...]] = ContextVar("words", default=())
@@ -52,16 +51,18 @@ def _reading(words: Sequence[str]) -> list[str]:
 
     Where it was not typed it is that of a model, for logs whose own names are not enough and a line without that model.
     """
-    under_way, next_ = parse(_WORDS.get()), parse(words)
-    if under_way is None or next_ is None or next_.values.get("mapping", "") is not None:
+    typed, taken = parse(_WORDS.get()), set(map(Path, words))
+    if typed is None:
         return []
-    records = {p for p in under_way.paths() if p.suffix in (".yaml", ".yml")}
-    read = (set(under_way.paths()) - records) & set(next_.paths())
-    mapping = under_way.values.get("mapping")
-    if mapping is None and read and not records & set(next_.paths()):
-        behind = next(filter(None, map(mapping_of_record, sorted(records))), None)
-        mapping = behind if behind is not None and all(map(needs_mapping, read)) else None
-    return ["--mapping", str(mapping)] if mapping is not None and read else []
+    records = {p for p in typed.paths() if p.suffix in (".yaml", ".yml")}
+    read = (set(typed.paths()) - records) & taken
+    next_ = parse(words) if read else None
+    if next_ is None or next_.values.get("mapping", "") is not None:
+        return []
+    mapping = typed.values.get("mapping")
+    if mapping is None and not records & taken:
+        mapping = mapping_behind(sorted(records), read)
+    return [] if mapping is None else ["--mapping", str(mapping)]
 
 
 def repeated(option: str, files: Sequence[str | Path]) -> list[str]:
