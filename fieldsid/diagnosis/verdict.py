@@ -86,12 +86,13 @@ def left_of(search: Search, named: ScoredModel, found: ScoredModel, tests: Resid
     """Return what a named model leaves over a noise floor; `tests` are those of the model found, which may hold more effects.
 
     An error that the tests accept as a disturbance is not unexplained, unless it is far larger on the unseen runs or larger than
-    a sea can leave.
+    a sea can leave. Where effects are named no disturbance is: above MISSING_ERROR_RATIO what they leave is unexplained too.
     """
     ratio = worst_error(named, floor)
     if ratio <= SUFFICIENT_ERROR_RATIO:
         return Left(ratio, unexplained=False)
-    odd = named is not found or _is_no_disturbance(named, tests, floor)
+    beside_effects = ratio > MISSING_ERROR_RATIO and frozenset(named.names) != search.root
+    odd = named is not found or beside_effects or _is_no_disturbance(named, tests, floor)
     moves_with = tests.moves_with if 3.0 * tests.dependence < MIN_P_VALUE else ""
     return Left(ratio, odd, tests.worst_run, tests.worst_start_s, tests.worst_end_s, tests.worst_ratio, moves_with)
 

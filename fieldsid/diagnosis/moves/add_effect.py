@@ -87,6 +87,11 @@ class SearchMove:
         """The effects of the model that it leads to."""
         return frozenset((*self.parent.names, self.screened.effect.name))
 
+    @property
+    def priced_cost(self) -> float:
+        """The predicted cost and what the effect costs, by which moves are ranked."""
+        return _priced_cost(self.parent, self.screened)
+
 
 def screen_addition(asked: Addition, parallel: ParallelMap) -> list[SearchMove]:
     """Return the moves worth evaluating of an addition: the best of two screens, by output-error and by whitened cost."""
@@ -111,7 +116,7 @@ class _Screen:
     def steps(self, points: Sequence[list[ScreenResult]]) -> list[_PendingMove]:
         """Return what is to be followed of the scan points of every effect."""
         parent, most = self.asked.parent, self.asked.most
-        ranked = sorted(points, key=lambda points: points[0].predicted_cost + _price(parent, points[0].effect))
+        ranked = sorted(points, key=lambda points: _priced_cost(parent, points[0]))
         follows = self.by_output_error and most is not None
         if most is not None:
             first = first_few(ranked, most + follows * EXTRA_ITERATED_EFFECTS, lambda points: points[0].effect)
@@ -129,7 +134,7 @@ class _Screen:
 def _worth_evaluating(addition: Addition, taken: Sequence[tuple[_PendingMove, ScreenResult]]) -> list[SearchMove]:
     """Return the moves of an addition: of those iterated the best, that have lowered the cost enough, and the others."""
     moves = [(s.is_iterated, SearchMove(p, s.screen.linearisation, s.screen.by_output_error, addition.parent)) for s, p in taken]
-    best = sorted((move for iterated, move in moves if iterated), key=lambda move: move.screened.predicted_cost)
+    best = sorted((move for iterated, move in moves if iterated), key=lambda move: move.priced_cost)
     found = [
         *first_few(best, addition.most, lambda move: move.screened.effect),
         *(move for iterated, move in moves if not iterated),
@@ -165,6 +170,11 @@ def _least_cost_fall(parent: ScoredModel, effect: Effect) -> float:
     return max(MIN_WHITENED_COST_FALL, (odds + _price(parent, effect)) / MAX_FIRST_ORDER_SHORTFALL)
 
 
+def _priced_cost(parent: ScoredModel, screened: ScreenResult) -> float:
+    """Return the cost that a screened effect is predicted to leave, and its price."""
+    return screened.predicted_cost + _price(parent, screened.effect)
+
+
 def _price(parent: ScoredModel, effect: Effect) -> float:
     """Return the fall of the training runs' whitened cost that pays for the numbers an effect has of each run's own.
 
@@ -197,11 +207,11 @@ def by_effects(found: Iterable[SearchMove]) -> list[list[SearchMove]]:
 
 
 def foremost(groups: Sequence[Sequence[SearchMove]], most: int) -> list[Sequence[SearchMove]]:
-    """Return the groups of moves of the effects that come first on either screen by the cost predicted, `most` of each."""
+    """Return the groups of moves of the effects that come first on either screen by the priced cost, `most` of each."""
     leading = set[str]()
     for plain in (True, False):
         ranked = sorted(
-            (nine_digits(move.screened.predicted_cost / move.linearisation.cost), move.screened.effect.name)
+            (nine_digits(move.priced_cost / move.linearisation.cost), move.screened.effect.name)
             for group in groups
             for move in group
             if move.by_output_error is plain

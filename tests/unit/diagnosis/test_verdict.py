@@ -10,6 +10,7 @@ import pytest
 
 from fieldsid.diagnosis import verdict
 from fieldsid.diagnosis.records import Errors
+from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests
 from fieldsid.models.effect import effect_named
 from fieldsid.models.model import Noise
 
@@ -128,3 +129,16 @@ def test_the_more_a_named_set_leaves_the_likelier_is_something_that_was_not_trie
     assert least < verdict.untried_probability(left) < most
     found = verdict.probabilities({frozenset(): 0.0, frozenset({"delay"}): 800.0}, left)
     assert found[frozenset({"delay"})] == pytest.approx(1.0 - verdict.untried_probability(left))
+
+
+@pytest.mark.parametrize(
+    ("named", "ratio", "unexplained"), [((), 2.5, False), (("servo_lag",), 2.5, True), (("servo_lag",), 1.3, False)]
+)
+def test_what_could_be_a_disturbance_is_unexplained_where_effects_are_named_and_no_disturbance_is(named, ratio, unexplained):
+    shown = errors(ratio)
+    h = SimpleNamespace(
+        names=named, train_under=lambda _std: shown, selection_errors=shown, train=shown, validation=(), validation_errors=None
+    )
+    tests = ResidualTests(0.5, 0.5, 0.5, "r0", 1.0, 3.0, 2.0, "")
+    left = verdict.left_of(SimpleNamespace(root=frozenset()), h, h, tests, FLOOR)
+    assert (left.unexplained, left.ratio) == (unexplained, pytest.approx(ratio))
