@@ -34,8 +34,6 @@ DPI = 120
 TWO_SIDED_99 = 2.576
 """Quantile 0.995 of the normal distribution: bands are those of 99 %."""
 MOST_DOTS = 4000
-NO_ENGINE = {"figure.autolayout": False, "figure.constrained_layout.use": False}
-"""Settings under which a figure's default is no layout engine; one that is named "none" still makes the writer draw twice."""
 
 
 class Sheet(Figure):
@@ -120,7 +118,8 @@ def _draw(figure: Figure, path: Path, *, force: bool) -> None:
     engine = figure.get_layout_engine()
     if engine is not None:  # laid out here, once: left to the writer it costs a whole drawing that is thrown away
         engine.execute(figure)
-        with rc_context(NO_ENGINE):
+        # no engine at all: one that is named "none" still makes the writer draw twice
+        with rc_context({"figure.autolayout": False, "figure.constrained_layout.use": False}):
             figure.set_layout_engine()
     kind = kind_of(path)
     with replacing(path, force=force) as temporary, rc_context({"svg.hashsalt": TOOL}):  # else an SVG's ids are drawn at random
