@@ -62,7 +62,8 @@ def settled_rates(
 ) -> None:  # fmt: skip
     """Fill out (m,) with the steady rate toward `side` of m vehicles, the root of their equations, NaN where there is none.
 
-    cores (m, C), damping, moment and fin (m,); moments (r,) rad/s^2 at rates (r,) come on top, none where they are empty.
+    cores (m, C), damping, moment and fin (m,); moments (n, r) rad/s^2 at rates (r,) come on top, the first of them for the
+    first vehicle and again for the one that follows the last of them, none where they are empty.
     """
     for i in range(out.size):
         k, kinds, x = named(cores[i]), kinds_of(cores[i]), 0.0
@@ -70,7 +71,7 @@ def settled_rates(
         out[i] = np.nan
         for count in range(MAX_ITERATIONS):
             x, now = _settled(k, kinds, damping[i], moment[i], fin[i], side * rate, x)
-            surplus = side * (now.rate + between(side * rate, rates, moments))
+            surplus = side * (now.rate + between(side * rate, rates, moments[i % moments.shape[0]]))
             if count == 0:  # at the upper bound, where a turn that settles has none left
                 if not surplus < 0.0:
                     break

@@ -2,7 +2,8 @@
 
 Its equations are those of motion (models/hull.py), with every coefficient at the speed kept in the turn, by the model's own
 speed law and its effects' own scaling.
-The actuator's effects are taken as they leave a fin that was told to stay at its limit.
+The actuator's effects are taken as they leave a fin that was told to stay at its limit. What follows a signal of the run, at any
+stage, is taken as it is at the speed that a turn is entered at.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ import numpy as np
 
 from fieldsid.dynamics.assemble import combined_core, combined_terms, fin_path
 from fieldsid.dynamics.free_run import command_record, effects_of
-from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Effect, Motion
+from fieldsid.models.axis import NAMES
+from fieldsid.models.effect import TERM_PARTS, Effect, Motion, Terms
 from fieldsid.models.hull import OF_ANGLE
 from fieldsid.models.model import Model
 from fieldsid.models.record import Record
@@ -26,14 +27,22 @@ STEP_S = 0.05
 EXPONENT = "damping_exponent"
 NEARBY = 0.9
 """Share of the speed at which the powers of an effect's own scaling are read off."""
+TABLE_RATES = np.linspace(-2.0, 2.0, 81)
+"""Rates in rad/s at which the moment of effects outside the core is known; it is straight between them."""
+ABSENT = {"damping_factor": 1.0, "authority_factor": 1.0, "moment": 0.0, "damping": 0.0}
+"""What stands for each part of terms where no effect has it."""
 
 
 @dataclass(frozen=True, slots=True)
 class YawPlant:
-    """One model, d draws of its values; draw 0 is the estimate itself. Arrays (d, 1); `fin` by rate sign, (d, 1) rad.
+    """One model, d draws of its values; draw 0 is the estimate itself.
+
+    Arrays are (d, 1), or (d, s) at the speeds that turns are entered at: `moment` always, `damping_more`, `factors` and the `fin`
+    by rate sign (rad) where an effect follows the run.
 
     `core` (d, C) are the constants of the equations of motion at the reference speed, `powers` (C,) those of the speed they go
-    with; `moment` (d, s) is at the speeds that turns are entered at.
+    with; `own_moment` by rate sign is the estimate's moment (s or 1, r) rad/s^2 of effects outside the core at rates (r,) rad/s,
+    empty where there are none.
     """
 
     model: Model
@@ -45,6 +54,7 @@ class YawPlant:
     core: FloatArray
     powers: FloatArray
     fin: Mapping[float, FloatArray]
+    own_moment: Mapping[float, tuple[FloatArray, FloatArray]]
     moment: FloatArray
     damping_more: FloatArray
     factors: tuple[FloatArray, FloatArray]
@@ -103,12 +113,8 @@ def yaw_plant(
     parts = effects_of(model)
     starts = {c.name: c.start for e in parts for c in e.nuisance}
     values = [starts | {EXPONENT: float(e)} | dict(d) for d, e in zip(draws, exponents, strict=True)]
-    sign = float(np.sign(model.base[names.authority])) or 1.0
-    steady = as_trained(model, _known(model.law.reference))
-    own = [e for e in parts if not follows_the_run(e)]
-    terms = [combined_terms(steady, parts, v) for v in values]
-    free = [combined_terms(steady, own, v) for v in values]
-
+    limit = (float(np.sign(model.base[names.authority])) or 1.0) * fin_limit
+    terms = straight_terms(model, parts, values, entry)
     core, powers = scaled_cores(parts, values, 1.0)
 
     def column(numbers: Sequence[float]) -> FloatArray:
@@ -123,42 +129,58 @@ def yaw_plant(
         trim=column([v[names.trim] for v in values]),
         core=core,
         powers=powers[0],
-        fin={s: column(steady_fins(parts, values, s * sign * fin_limit, steady.speed)) for s in (1.0, -1.0)},
-        moment=straight_moment(model, parts, values, entry) + column([_mean(t.moment, 0.0) for t in free]),
-        damping_more=column([_mean(t.damping, 0.0) for t in terms]),
-        factors=(
-            column([_mean(t.damping_factor, 1.0) for t in terms]),
-            column([_mean(t.authority_factor, 1.0) for t in terms]),
-        ),
+        fin={s: steady_fins(model, parts, values, s * limit, entry) for s in (1.0, -1.0)},
+        own_moment={s: _moment_table(model, parts, s * limit, entry) for s in (1.0, -1.0)},
+        moment=np.broadcast_to(terms.moment, (len(values), entry.size)),
+        damping_more=terms.damping,
+        factors=(terms.damping_factor, terms.authority_factor),
         law=_law_table(model),
         sway_seen=column([_seen_share(model, v) for v in values]),
     )
 
 
-def straight_moment(
+@dataclass(frozen=True, slots=True)
+class StraightTerms:
+    """The means of effects' terms on straight runs (models/effect.py), (d, s) by draws and speeds, (d, 1) where all are alike."""
+
+    damping_factor: FloatArray
+    authority_factor: FloatArray
+    moment: FloatArray
+    damping: FloatArray
+
+
+def straight_terms(
     model: Model, parts: Sequence[Effect], values: Sequence[Mapping[str, float]], speeds: FloatArray
-) -> FloatArray:
-    """Return the moment (d, s) rad/s^2 of thrust, depth and speed on straight runs at speeds (s,) in m/s, fin at zero."""
-    own = [e for e in parts if follows_the_run(e)]
-    out = np.zeros((len(values), speeds.size))
-    if own:
-        for j, speed in enumerate(speeds):
-            record = as_trained(model, float(speed))
-            out[:, j] = [_mean(combined_terms(record, own, v).moment, 0.0) for v in values]
-    return out
+) -> StraightTerms:
+    """Return what effects add on straight runs at speeds (s,) in m/s, fin at zero.
+
+    Those that follow no signal of the run are as at the reference speed.
+    """
+    out = {name: np.full((len(values), 1), absent) for name, absent in ABSENT.items()}
+    for follows in (False, True):
+        own = [e for e in parts if e.terms is not None and follows_the_run(e) == follows]
+        if own:
+            records = [as_trained(model, speed, *_step(0.0)) for speed in _speeds_told_apart(model, own, speeds)]
+            means = np.array([[_means(combined_terms(record, own, v)) for record in records] for v in values])
+            out = {name: TERM_PARTS[name](out[name], means[:, :, i]) for i, name in enumerate(ABSENT)}
+    return StraightTerms(**out)
 
 
 def follows_the_run(effect: Effect) -> bool:
-    """Return whether an effect's terms follow signals that a straight run has."""
-    return effect.terms is not None and bool({"thrust", "depth", "surge"} & set(effect.needs))
+    """Return whether an effect follows signals that a straight run has."""
+    return bool({"thrust", "depth", "surge"} & set(effect.needs))
 
 
-def as_trained(model: Model, speed: float) -> Record:
-    """Return a straight run at a speed in m/s with the fin at zero, at the thrust and depth of the runs the model is from.
+def _speeds_told_apart(model: Model, effects: Sequence[Effect], speeds: FloatArray) -> list[float]:
+    """Return the speeds in m/s at which effects are not alike: all where one follows the run, else the reference speed alone."""
+    return [float(s) for s in speeds] if any(map(follows_the_run, effects)) else [_known(model.law.reference)]
+
+
+def as_trained(model: Model, speed: float, time: FloatArray, fin: FloatArray) -> Record:
+    """Return a straight run at a speed in m/s under a fin (n,) rad, at the thrust and depth of the runs the model is from.
 
     The thrust goes with the speed as it did from run to run there.
     """
-    time, fin = _step(0.0)
     known = model.trained
     thrust, depth = known.get("thrust_mean", 0.0), known.get("depth_mean", 0.0)
     if "thrust_at_1_m_s" in known:
@@ -167,34 +189,49 @@ def as_trained(model: Model, speed: float) -> Record:
     return command_record(model.axis, time, fin, speed=speed, signals=signals)
 
 
-def steady_fins(parts: Sequence[Effect], values: Sequence[Mapping[str, float]], command: float, speed: float) -> list[float]:
-    """Return the steady fin angle, rad, for every draw, after a command step from zero."""
+def steady_fins(
+    model: Model, parts: Sequence[Effect], values: Sequence[Mapping[str, float]], command: float, speeds: FloatArray
+) -> FloatArray:
+    """Return the steady fin angle, rad, for every draw, after a command step from zero at speeds (s,) in m/s.
+
+    It is (d, s), or (d, 1) where no actuator follows the run.
+    """
     acting = [e for e in parts if e.fin is not None]
     if not acting:
-        return [command] * len(values)
-    record = command_record(Axis.YAW, *_step(command), speed=speed)
-    return [float(fin_path(record, acting, v).end[-1]) for v in values]
+        return np.full((len(values), 1), command)
+    records = [as_trained(model, speed, *_step(command)) for speed in _speeds_told_apart(model, acting, speeds)]
+    return np.array([[fin_path(record, acting, v).end[-1] for record in records] for v in values], dtype=np.float64)
 
 
-def fin_after_step(plant: YawPlant, side: float, command: float) -> tuple[FloatArray, FloatArray]:
-    """Return time (n,) s and fin angle (n,) rad of the estimate after a step of the command to its limit at time 0."""
-    sign = float(np.sign(plant.model.base[NAMES[plant.model.axis].authority])) or 1.0
-    record = command_record(Axis.YAW, *_step(side * sign * command), speed=_known(plant.model.law.reference))
-    values = {c.name: c.start for e in plant.effects for c in e.nuisance} | dict(plant.model.values)
-    path = fin_path(record, [e for e in plant.effects if e.fin is not None], values)
-    return record.time[1:] - STEP_S, np.append(path.start[1:], path.end[-1])
+def fins_after_step(plant: YawPlant, side: float, command: float, speeds: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+    """Return time (n,) s and fin angle (n,) rad of the estimate after a step of the command to its limit at time 0, by speed.
+
+    It is one for all where no actuator follows the run.
+    """
+    model, acting = plant.model, [e for e in plant.effects if e.fin is not None]
+    sign = float(np.sign(model.base[NAMES[model.axis].authority])) or 1.0
+    values = {c.name: c.start for e in plant.effects for c in e.nuisance} | dict(model.values)
+    records = [as_trained(model, speed, *_step(side * sign * command)) for speed in _speeds_told_apart(model, acting, speeds)]
+    paths = [fin_path(record, acting, values) for record in records]
+    return [(r.time[1:] - STEP_S, np.append(p.start[1:], p.end[-1])) for r, p in zip(records, paths, strict=True)]
 
 
-def own_moment(parts: Sequence[Effect], values: Mapping[str, float], rate: FloatArray, record: Record) -> FloatArray:
-    """Return the moment (k,) rad/s^2 at steady rates (k,) of effects the core does not know, a circle's mean of each."""
-    out = np.zeros(rate.size)
-    for effect in parts:
-        if effect.moment is None:
-            continue
-        for i, r in enumerate(rate):
-            angle = np.linspace(0.0, 2.0 * np.pi, len(record), endpoint=False)
-            out[i] += float(np.mean(effect.moment(Motion(angle, np.full(len(record), r)), values, record)))
-    return out
+def _moment_table(model: Model, parts: Sequence[Effect], command: float, speeds: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return rates (r,) and the estimate's moment there, a circle's mean of each, of effects that the core does not know.
+
+    It is (s, r), or (1, r) where none of them follows the run; empty where there are none.
+    """
+    own = [e for e in parts if e.moment is not None]
+    if not own:
+        return np.zeros(0), np.zeros((1, 0))
+    time: FloatArray = 0.1 * np.arange(40, dtype=np.float64)
+    angle = np.linspace(0.0, 2.0 * np.pi, time.size, endpoint=False)
+    values = {c.name: c.start for e in parts for c in e.nuisance} | dict(model.values)
+    records = [as_trained(model, speed, time, np.full(time.size, command)) for speed in _speeds_told_apart(model, own, speeds)]
+    turning = [Motion(angle, np.full(time.size, rate)) for rate in TABLE_RATES]
+    hooks = [e.moment for e in own if e.moment is not None]
+    means = [[sum(float(np.mean(hook(motion, values, r))) for hook in hooks) for motion in turning] for r in records]
+    return TABLE_RATES, np.array(means)
 
 
 def _seen_share(model: Model, values: Mapping[str, float]) -> float:
@@ -234,8 +271,10 @@ def scaled_cores(parts: Sequence[Effect], values: Sequence[Mapping[str, float]],
         return there, np.nan_to_num(np.log(slower / there) / np.log(NEARBY), posinf=0.0, neginf=0.0)
 
 
-def _mean(values: FloatArray | None, absent: float) -> float:
-    return absent if values is None else float(np.mean(values))
+def _means(terms: Terms) -> list[float]:
+    """Return the mean of each part of terms."""
+    parts = ((getattr(terms, name), absent) for name, absent in ABSENT.items())
+    return [absent if values is None else float(np.mean(values)) for values, absent in parts]
 
 
 def _known(speed: float) -> float:

@@ -23,7 +23,7 @@ from fieldsid.models.hull import CROSS_DAMPING, OF_ANGLE, Core
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import ComplexArray, FloatArray
 from fieldsid.plant.parameter_source import ParameterSource, draw_values
-from fieldsid.plant.yaw_plant import EXPONENT, follows_the_run, scaled_cores, straight_moment
+from fieldsid.plant.yaw_plant import EXPONENT, follows_the_run, scaled_cores, straight_terms
 from fieldsid.records.keys import Key
 
 PARTS = ("damping", "stiffness", "authority", "offset", "core", "lag", "delay", "fin_rate", "powers", "speed_loss")
@@ -259,15 +259,18 @@ def _plant_of_model(
     def column(name: str) -> FloatArray:
         return np.array([v[name] for v in values])
 
-    authority = column(names.authority) * ratio
+    followed = straight_terms(model, [e for e in parts if follows_the_run(e)], values, np.array([speed]))
+    authority = column(names.authority) * ratio * followed.authority_factor[:, 0]
     cores[:, CROSS_DAMPING] = np.where(cores[:, CROSS_DAMPING] > 0.0, cores[:, CROSS_DAMPING], 1.0)
-    shared = {n: np.array([v[n] for v in values]) for n in ACTUATOR if n in model.values}
+    following = {c.name for e in parts if follows_the_run(e) for c in e.shared}
+    shared = {n: column(n) for n in ACTUATOR if n in model.values and n not in following}
     trim = column(names.trim) * model.law.trim_factor(speed) + moved.get(names.trim, 0.0)
-    trim = trim + straight_moment(model, parts, values, np.array([speed]))[:, 0]
+    trim = trim + followed.moment[:, 0]
+    damping = column(names.damping) * scale**exponents + moved.get(names.damping, 0.0)
     return LinearPlant(
         axis=model.axis,
         speed=speed,
-        damping=column(names.damping) * scale**exponents + moved.get(names.damping, 0.0),
+        damping=damping * followed.damping_factor[:, 0] + followed.damping[:, 0],
         stiffness=np.zeros(draws) if names.stiffness is None else column(names.stiffness) + moved.get(names.stiffness, 0.0),
         authority=authority,
         offset=trim / authority,
@@ -310,4 +313,6 @@ def _left_out(effect: Effect, model: Model) -> set[str]:
     if effect.core is not None:
         core = effect.core({EXPONENT: model.law.damping_exponent} | dict(model.values), 1.0)
         return own if any(core[place] for place in OF_ANGLE) else set()
-    return set() if follows_the_run(effect) else own - set(ACTUATOR)
+    if follows_the_run(effect):
+        return set() if effect.terms is not None else own
+    return own - set(ACTUATOR)

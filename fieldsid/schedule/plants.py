@@ -67,9 +67,9 @@ def slowing(plant: LinearPlant, surge: SurgeModel | None, fin_limit: float, seed
 
 def _full_rate(one: LinearPlant, fin_limit: float) -> float:
     """Return the steady rate (rad/s) of a fin at its limit, the root of the equations; by the damping where nothing holds one."""
-    core, push, rate, none = one.core.copy(), np.abs(one.authority) * fin_limit, np.empty(1), np.zeros(0)
+    core, push, rate = one.core.copy(), np.abs(one.authority) * fin_limit, np.empty(1)
     core[:, OF_ANGLE] = 0.0
-    settled_rates(core, one.damping, push, np.sign(one.authority) * fin_limit, 1.0, none, none, rate)
+    settled_rates(core, one.damping, push, np.sign(one.authority) * fin_limit, 1.0, np.zeros(0), np.zeros((1, 0)), rate)
     if np.isfinite(rate[0]):
         return float(rate[0])
     return abs(float(one.slow_authority[0])) * fin_limit / max(float(one.slow_damping[0]), 0.05)

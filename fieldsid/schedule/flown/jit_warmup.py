@@ -25,6 +25,6 @@ def compile_loops() -> None:
     row, rows = np.zeros(1), np.zeros((1, len(CONSTANTS)))
     plants = Plants(**{name: rows if name.startswith("core") else row for name in Plants._fields})
     straight_slopes(rows)
-    settled_rates(rows, row, row, row, 1.0, np.zeros(0), np.zeros(0), np.zeros(1))
+    settled_rates(rows, row, row, row, 1.0, np.zeros(0), np.zeros((1, 0)), np.zeros(1))
     close_loop(plants, none, 0.0, 0.0, 0.0, 1.0, STEP_S, push, out)
     close_hull_loop(p[None], np.ones((1, 5)), none, 0.0, 1.0, STEP_S, push, out)

@@ -206,7 +206,7 @@ def _fin(models: Sequence[Model], speed: float, rudder: float, side: float) -> f
     sign = float(np.sign(near.base[NAMES[near.axis].authority])) or 1.0
     acting = [e for e in effects_of(near) if e.name not in OWN_EFFECTS]
     values = {c.name: c.start for e in acting for c in e.nuisance} | dict(near.values)
-    return -sign * steady_fins(acting, [values], side * sign * rudder, speed)[0]
+    return -sign * float(steady_fins(near, acting, [values], side * sign * rudder, np.array([speed]))[0, 0])
 
 
 def _median(values: FloatArray) -> float:

@@ -10,14 +10,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.dynamics.free_run import command_record
 from fieldsid.dynamics.steady_kernel import settled_rates
-from fieldsid.models.axis import Axis
 from fieldsid.models.hull import CROSS_SHARE
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.parameter_source import ParameterSource, draw_values
-from fieldsid.plant.yaw_plant import YawPlant, own_moment, yaw_plant
+from fieldsid.plant.yaw_plant import YawPlant, yaw_plant
 from fieldsid.runtime.parallel_map import parallel_map
 from fieldsid.turning.prediction import SIDES
 from fieldsid.turning.steady.speed_loss import SpeedLoss, SurgeModel, draw_speed_loss, no_speed_loss
@@ -46,9 +44,8 @@ def steady_turn(plant: YawPlant, speed_loss: SpeedLoss, entry: FloatArray, side:
     start = np.broadcast_to(entry[None, :], (plant.count, entry.size))
     surge = start / speed_loss.factor(fin, np.zeros_like(start))
     rate = np.zeros_like(surge)
-    moments = _moment_table(plant)
     for _ in range(MAX_TURN_ITERATIONS):
-        rate = balance(plant, surge, fin, side, moments)
+        rate = balance(plant, surge, side)
         new = start / speed_loss.factor(fin, np.nan_to_num(rate) / surge)
         change = float(np.max(np.abs(new - surge) / start))
         surge = new
@@ -60,28 +57,16 @@ def steady_turn(plant: YawPlant, speed_loss: SpeedLoss, entry: FloatArray, side:
     return SteadyTurn(rate, surge, path, radius)
 
 
-def balance(
-    plant: YawPlant, surge: FloatArray, fin: FloatArray, side: float, moments: tuple[FloatArray, FloatArray]
-) -> FloatArray:
+def balance(plant: YawPlant, surge: FloatArray, side: float) -> FloatArray:
     """Return the steady rate (d, s) toward `side` at a surge speed (d, s), NaN where there is none."""
+    fin = plant.fin[side]
     core = plant.core[:, None, :] * plant.scale(surge)[:, :, None] ** plant.powers
     core[:, :, CROSS_SHARE] *= plant.sway_seen
     moment = plant.authority_at(surge) * fin + plant.trim_at(surge) + plant.moment
     damping, moment, fins = (np.broadcast_to(part, surge.shape).flatten() for part in (plant.damping_at(surge), moment, fin))
     out = np.empty(surge.size)
-    settled_rates(core.reshape(surge.size, -1), damping, moment, fins, side, *moments, out)
+    settled_rates(core.reshape(surge.size, -1), damping, moment, fins, side, *plant.own_moment[side], out)
     return out.reshape(surge.shape)
-
-
-def _moment_table(plant: YawPlant) -> tuple[FloatArray, FloatArray]:
-    """Return rates and the moment there of effects outside the core, at the estimate; empty where there are none."""
-    if all(e.moment is None for e in plant.effects):
-        return np.zeros(0), np.zeros(0)
-    rate = np.linspace(-2.0, 2.0, 81)
-    reference = plant.model.law.reference
-    record = command_record(Axis.YAW, np.arange(40) * 0.1, np.zeros(40), speed=reference if np.isfinite(reference) else 1.0)
-    values = {c.name: c.start for e in plant.effects for c in e.nuisance} | dict(plant.model.values)
-    return rate, own_moment(plant.effects, values, rate, record)
 
 
 FALLBACK_CURVATURE = 0.3

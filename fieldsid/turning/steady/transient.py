@@ -15,7 +15,7 @@ from fieldsid.dynamics.steady_kernel import between
 from fieldsid.models.hull import core_at, kinds_of, named, power, slope, surge_slope
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
-from fieldsid.plant.yaw_plant import YawPlant, fin_after_step
+from fieldsid.plant.yaw_plant import YawPlant, fins_after_step
 from fieldsid.turning.steady.speed_loss import SpeedLoss
 
 STEP_S = 0.04
@@ -64,30 +64,39 @@ class _Vehicle(NamedTuple):
 
 def turn_transient(plant: YawPlant, speed_loss: SpeedLoss, entry: FloatArray, side: float, command: float) -> Transient:
     """Simulate the estimate (draw 0) of a plant through a turn to `side` at a rudder command (rad, magnitude)."""
-    vehicle, moment = _vehicle(plant, speed_loss.one()), np.broadcast_to(plant.moment[0], entry.shape)
-    fins = np.interp((np.arange(round(MAX_TRANSIENT_S / STEP_S)) + 0.5) * STEP_S, *fin_after_step(plant, side, command))
-    track = np.empty((entry.size, fins.size + 1, 4))
+    one, loss = plant.one(), speed_loss.one()
+    middles = (np.arange(round(MAX_TRANSIENT_S / STEP_S)) + 0.5) * STEP_S
+    fins = [np.interp(middles, *path) for path in fins_after_step(plant, side, command, entry)]
+    rates, moments = plant.own_moment[side]
+    track = np.empty((entry.size, middles.size + 1, 4))
     for j, speed in enumerate(entry):
-        fly_turn(vehicle, float(speed), float(moment[j]), fins, STEP_S, track[j])
-    return read_off(STEP_S * np.arange(fins.size + 1, dtype=np.float64), track.transpose(1, 2, 0), side)
+        vehicle, own = _vehicle(one, loss, j), moments[j % len(moments)]
+        fly_turn(vehicle, float(speed), float(plant.moment[0, j]), fins[j % len(fins)], (rates, own), STEP_S, track[j])
+    return read_off(STEP_S * np.arange(middles.size + 1, dtype=np.float64), track.transpose(1, 2, 0), side)
 
 
-def _vehicle(plant: YawPlant, loss: SpeedLoss) -> _Vehicle:
-    one, reference = plant.one(), plant.model.law.reference
+def _vehicle(one: YawPlant, loss: SpeedLoss, entry: int) -> _Vehicle:
+    """Return one draw alone as it enters at one of the plant's speeds, by its place."""
+    reference = one.model.law.reference
     known = reference if np.isfinite(reference) and reference > 0.0 else 0.0
     there = one.authority_at(np.full((1, 1), known or 1.0))
-    of_fin = one.trim * one.factors[1] / there if plant.model.law.trim_of_fin else np.zeros((1, 1))
-    trim = np.zeros((1, 1)) if plant.model.law.trim_of_fin else one.trim
+    of_fin = one.trim * one.factors[1] / there if one.model.law.trim_of_fin else np.zeros((1, 1))
+    trim = np.zeros((1, 1)) if one.model.law.trim_of_fin else one.trim
     numbers = (
         one.damping * one.factors[0], one.damping_exponent, one.damping_more, one.authority_ratio * one.factors[1], trim, of_fin,
         loss.drag, loss.fin, loss.turn, loss.drift_per_rate,
     )  # fmt: skip
-    return _Vehicle(one.core[0].copy(), one.powers, one.law, known, *(float(n[0, 0]) for n in numbers))
+    return _Vehicle(one.core[0].copy(), one.powers, one.law, known, *(float(n[0, entry % n.shape[1]]) for n in numbers))
 
 
 @jit
-def fly_turn(vehicle: _Vehicle, entry: float, pushed: float, fins: FloatArray, step: float, track: FloatArray) -> None:
+def fly_turn(
+    vehicle: _Vehicle, entry: float, pushed: float, fins: FloatArray, own: tuple[FloatArray, FloatArray], step: float,
+    track: FloatArray,
+) -> None:  # fmt: skip
     """Fill track (n + 1, 4) with heading, north, east and path of a turn under fins (n,) by the midpoint rule.
+
+    `own` are rates (r,) and the moment there that comes on top, none where they are empty.
 
     The cross state is a moment -a21 v with a21 ~ u: over the speed's scale it goes with v and stays itself while the speed falls.
     """
@@ -102,7 +111,7 @@ def fly_turn(vehicle: _Vehicle, entry: float, pushed: float, fins: FloatArray, s
             core_at(vehicle.core, vehicle.powers, scale, core)
             authority = vehicle.authority * between(np.log(u), *vehicle.law) * u * u
             damping = vehicle.damping * power(scale, vehicle.damping_exponent) + vehicle.damping_more
-            moment = authority * (fins[i] + vehicle.trim_per_authority) + vehicle.trim + pushed
+            moment = authority * (fins[i] + vehicle.trim_per_authority) + vehicle.trim + pushed + between(r, *own)
             now = slope(named(core), kinds, damping, 0.0, moment, fins[i], 1.0, 0.0, r, scale * (cross + t * to_cross), 0.0)
             sway = -vehicle.drift_per_rate * r
             to_heading, to_rate, to_cross = r, now.rate, now.cross / scale

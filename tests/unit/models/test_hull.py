@@ -82,7 +82,7 @@ def test_a_settled_rate_balances_the_equations(side):
         quadratic=1.5, cross_damping=0.5, cross_quadratic=0.8, cross_rate=0.4, strip_moment=3.0, strip_force=4.0, strip_flow=0.9
     )
     push, out = np.array([0.4, 0.0, 0.4]) * side, np.empty(3)
-    settled_rates(np.array([core] * 3), np.array([1.2, 1.2, 50.0]), push, push, side, np.zeros(0), np.zeros(0), out)
+    settled_rates(np.array([core] * 3), np.array([1.2, 1.2, 50.0]), push, push, side, np.zeros(0), np.zeros((1, 0)), out)
     assert np.isnan(out[1])
     balanced = [slope(core, kinds_of(np.array(core)), 1.2, 0.0, push[0], push[0], 1.0, 0.0, out[0], x, 0.0) for x in (-1.0, 1.0)]
     low, high = -1.0, 1.0

@@ -10,8 +10,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from truth.paper import PITCH, YAW
 
+from fieldsid.effects import add_effects, forget_effects
 from fieldsid.errors import ArtifactError, ModelError, UsageError
 from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Coefficient, Effect, Stage, Terms
 from fieldsid.models.hull import CONSTANTS, Core
 from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.speed_law import SpeedLaw
@@ -155,6 +157,32 @@ def test_effects_that_a_linear_plant_does_not_hold_are_named(tmp_path):
     inert = load_parameter_source([model_at(tmp_path, 1.4, inertia_share=0.5)])
     assert lost(inert) == ("not counted: servo_lag's inertia_share",), "its lag is: it stands beside"
     assert not_counted(load_parameter_source([model_at(tmp_path, 1.4)]).models) == {}
+
+
+def test_a_factor_that_follows_the_thrust_is_in_the_gains_of_each_speed_and_a_fin_that_does_is_named(tmp_path):
+    def terms(values, record):
+        return Terms(authority_factor=1.0 + values["washed"] * record["thrust"], damping=0.1 * record["thrust"])
+
+    wash = Effect(
+        name="wash", says="", stage=Stage.HYDRODYNAMICS, axes=(Axis.YAW,), equation="", needs=("thrust",), terms=terms,
+        coefficients=(Coefficient("washed", "1", -5.0, 5.0, 0.2),), telltale="", excited_by=(), mistaken_for=(), source="",
+    )  # fmt: skip
+    own = Coefficient("held", "1", 0.0, 1.0, 0.2)
+    fin = replace(wash, stage=Stage.ACTUATOR, terms=None, fin=lambda path, *_: path, coefficients=(own,))
+    values = {"a22": 1.5, "b2": -2.0, "C0": 0.02, "washed": 0.2}
+    trained = {"thrust_at_1_m_s": 1.0, "thrust_exponent": 2.0}
+    model = Model(Axis.YAW, ("wash",), values, {}, tuple(values), np.zeros((4, 4)), SpeedLaw(1.0), Noise(0.005, 0.005), trained)
+    try:
+        add_effects([wash])
+        source = load_parameter_source([save_model(model, tmp_path / "m.yaml")])
+        (plant, _), *_ = plants_at(source, 2.0, FinLimits(), 1, 1)
+        assert plant.authority[0] == pytest.approx(-2.0 * 4.0 * (1.0 + 0.2 * 4.0))
+        assert plant.damping[0] == pytest.approx(1.5 * 2.0**model.law.damping_exponent + 0.1 * 4.0)
+        assert not_counted(source.models) == {}
+        add_effects([fin])
+        assert not_counted([replace(model, values={**model.base, "held": 0.2})]) == {"wash": ("held",)}
+    finally:
+        forget_effects()
 
 
 @pytest.mark.parametrize("zeta", [0.6, 0.7071, 0.9])

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fieldsid.dynamics.free_run import command_record, simulate
+from fieldsid.effects import add_effects, forget_effects
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import as_fitted
+from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, as_fitted
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.plant.yaw_plant import yaw_plant
@@ -192,3 +195,56 @@ def test_a_propellers_moment_is_that_of_the_thrust_at_each_speed(exponent):
         assert turn.rate[0, at] == pytest.approx(wanted, rel=1e-6)
         after = turn_transient(plant, no_speed_loss(1), np.array([0.8, 1.5, 2.5]), 1.0, 0.3)
         assert np.isfinite(after.tactical_diameter[at])
+
+
+def followed(path, values, record):
+    """Return a fin that a faster flow holds back."""
+    held = 1.0 / (1.0 + values["flow_held"] * record["surge"][:-1] ** 2)
+    return replace(path, start=path.start * held, end=path.end * held)
+
+
+FOLLOWING = {
+    "fin": {"stage": Stage.ACTUATOR, "needs": ("surge",), "fin": followed},
+    "terms": {
+        "needs": ("thrust",),
+        "terms": lambda v, record: Terms(
+            authority_factor=1.0 + v["flow_held"] * record["thrust"], damping=0.1 * record["thrust"]
+        ),
+    },
+    "moment": {
+        "needs": ("surge", "thrust"),
+        "moment": lambda m, v, record: v["flow_held"] * record["thrust"] * record.fin - v["flow_held"] * m.rate * record["surge"],
+    },
+}
+
+
+@pytest.fixture(params=FOLLOWING)
+def following(request):
+    """An effect of the user's own that follows the speed or the thrust, known for the length of a test."""
+    held = (Coefficient("flow_held", "1", -5.0, 5.0, 0.2),)
+    effect = Effect(
+        name="flow_following", says="", stage=Stage.HYDRODYNAMICS, axes=(Axis.YAW,), equation="", coefficients=held, telltale="",
+        excited_by=(), mistaken_for=(), source="", origin="here",
+    )  # fmt: skip
+    add_effects([replace(effect, **FOLLOWING[request.param])])
+    yield request.param
+    forget_effects()
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_an_effect_that_follows_the_run_is_as_it_is_at_each_speed(following, side):
+    values = {"a22": 1.5, "b2": -2.0, "C0": 0.0, "flow_held": 0.2}
+    trained = {"thrust_at_1_m_s": 1.0, "thrust_exponent": 1.0}
+    model = Model(
+        Axis.YAW, ("flow_following",), values, {}, tuple(values), np.zeros((4, 4)), SpeedLaw(1.5), Noise(0.01, 0.01), trained
+    )
+    entry = [0.8, 1.5, 2.5]
+    plant, turn = turn_of(model, side, entry=entry)
+    after = turn_transient(plant, no_speed_loss(1), np.array(entry), side, 0.3)
+    for at, speed in enumerate(entry):
+        time = np.arange(0.0, 40.0, 0.02)
+        thrust = np.full(time.size, speed)
+        record = command_record(Axis.YAW, time, np.full(time.size, -side * 0.3), speed=speed, signals={"thrust": thrust})
+        wanted = simulate(model, record, state=(0.0, 0.0, 0.0))
+        assert turn.rate[0, at] == pytest.approx(float(wanted.rate[-1]), rel=1e-4)
+        assert after.time_180[at] == pytest.approx(float(np.interp(np.pi, side * wanted.angle, time)), rel=5e-3)
