@@ -112,7 +112,15 @@ def samples_of(columns: Columns, time: FloatArray, source: Source) -> Samples:
 
 
 def own_map_of(names: Sequence[str]) -> ChannelMap | None:
-    """Return the mapping of a table whose columns have canonical names (time among them), or None.
+    """Return the mapping of a table whose columns have canonical names (time among them), or None."""
+    sources = canonical_sources(names)
+    if TIME not in sources or len(sources) < 2:
+        return None
+    return ChannelMap({s: v for s, v in sources.items() if s != TIME}, time=sources[TIME])
+
+
+def canonical_sources(names: Sequence[str]) -> dict[str, Source]:
+    """Return the columns of a table that have canonical names, by signal, the time among them.
 
     Where two columns mean one signal, the one in SI is taken.
     """
@@ -121,10 +129,7 @@ def own_map_of(names: Sequence[str]) -> ChannelMap | None:
     for name, said in stated:
         if said.signal not in best or name.strip().lower() == said.signal:
             best[said.signal] = (name, said)
-    if TIME not in best or len(best) < 2:
-        return None
-    sources = {signal: Source(column=name, unit=said.unit) for signal, (name, said) in best.items()}
-    return ChannelMap({s: v for s, v in sources.items() if s != TIME}, time=sources[TIME])
+    return {signal: Source(column=name, unit=said.unit) for signal, (name, said) in best.items()}
 
 
 def used_by(mapping: ChannelMap, names: Sequence[str], width: int) -> set[int]:

@@ -12,12 +12,12 @@ from pathlib import Path
 from shlex import quote
 
 from fieldsid.errors import LogError
-from fieldsid.logs.channels import TableForm, is_enough
+from fieldsid.logs.channels import is_enough
 from fieldsid.logs.few_of import few_of
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import check_readable
-from fieldsid.logs.readers import csv_table
+from fieldsid.logs.readers import csv_table, parquet
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import common_start, name_of_run, names_apart, shared_start, stem_of
 
@@ -43,8 +43,11 @@ def runs_in(folder: Path) -> list[list[Path]]:
         if len(names) > 1:
             by_header.setdefault(names, []).append(path)
     kinds = list(by_header.values())
-    signals = {names: _signals(names) for names, kind in by_header.items() if len(kind) > 1}
-    if sum(map(len, kinds)) < 2 or any(map(is_enough, signals.values())) or (len(kinds) == 1 and any(signals.values())):
+    signals = {names: _signals(names) for names in by_header}
+    whole = [is_enough(signals[names]) for names in by_header]
+    if sum(map(len, kinds)) < 2 or all(whole) or any(w for w, kind in zip(whole, kinds, strict=True) if len(kind) > 1):
+        return []
+    if len(kinds) == 1 and any(signals.values()):
         return []
     marks = [_marks(kind) for kind in kinds]
     if len(kinds) > 1 and len(kinds[0]) > 1 and all(m.keys() == marks[0].keys() for m in marks):
@@ -88,11 +91,12 @@ def _marks(kind: Sequence[Path]) -> dict[str, Path]:
 
 def _names(path: Path) -> tuple[str, ...]:
     """Return the names of a table's columns; none of what is no table."""
-    if path.name.startswith(".") or not path.name.endswith(csv_table.READER.suffixes) or not path.is_file():
+    reader = next((r for r in (csv_table, parquet) if path.name.endswith(r.READER.suffixes)), None)
+    if reader is None or path.name.startswith(".") or not path.is_file():
         return ()
     try:
         check_readable(path)
-        return csv_table.names_of(path, TableForm()) if csv_table.sniff(path) else ()
+        return reader.names_of(path) if reader.sniff(path) else ()
     except LogError as error:
         if isinstance(error.__cause__, OSError):  # what is in it is not known
             raise

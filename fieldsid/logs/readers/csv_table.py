@@ -91,16 +91,16 @@ def columns_of(path: Path, form: TableForm, options: ReadOptions) -> tuple[Colum
         return table.columns(range(table.form.width)), tuple(table.notes)
 
 
-def names_of(path: Path, form: TableForm) -> tuple[str, ...]:
+def names_of(path: Path) -> tuple[str, ...]:
     """Return the names of a table's columns, none of an empty text; raises LogError where it is no table."""
-    with plain_text(path, form.encoding, limit=HEAD) as text:
+    with plain_text(path, None, limit=HEAD) as text:
         head = _head_of(path, text)
-        return form_of(head, form, path).names if head.strip() else ()
+        return form_of(head, TableForm(), path).names if head.strip() else ()
 
 
 def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
     """Return the mapping of a table with canonical names, or None."""
-    return own_map_of(names_of(path, TableForm()))
+    return own_map_of(names_of(path))
 
 
 def _head_of(path: Path, text: PlainText) -> str:

@@ -54,8 +54,18 @@ def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
 
 def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
     """Return the mapping of a table with canonical names, or None."""
+    return own_map_of(_schema_of(path).names)
+
+
+def names_of(path: Path) -> tuple[str, ...]:
+    """Return the names of a table's columns, none of a run of ours; raises LogError where it cannot be read."""
+    schema = _schema_of(path)
+    return () if METADATA_KEY in (schema.metadata or {}) else tuple(schema.names)
+
+
+def _schema_of(path: Path) -> Any:
     try:
-        return own_map_of(import_module("pyarrow.parquet").read_schema(path).names)
+        return import_module("pyarrow.parquet").read_schema(path)
     except (OSError, ValueError) as error:
         raise _unreadable(path, error) from error
 

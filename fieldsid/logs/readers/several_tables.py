@@ -16,16 +16,17 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import LogError
-from fieldsid.logs.channels import ATTITUDE, ChannelMap, TableForm
+from fieldsid.logs.channels import ATTITUDE, ChannelMap, TableForm, is_enough
 from fieldsid.logs.convert.times.clock_text import FEW_STEPS
 from fieldsid.logs.convert.times.time_column import EPOCH_FROM_S
 from fieldsid.logs.few_of import few_of
 from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.guesses import quaternion_of
+from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.reader import JOINED, TABLE, Inventory, RawLog, Reader, ReadOptions, reader_of
 from fieldsid.logs.readers import csv_table, parquet
 from fieldsid.logs.readers._clock import Clock, clock_of
-from fieldsid.logs.readers._columns import Columns, numbers_mostly
+from fieldsid.logs.readers._columns import Columns, canonical_sources, numbers_mostly
 from fieldsid.logs.readers._tables_of_run import names_in_run, run_of, runs_in
 from fieldsid.logs.readers._topics import MOST_DEVICES, Means, Topic, Topics, inventory_of, raw_log_of, topic_of, wanted_by
 from fieldsid.logs.run import Note
@@ -77,6 +78,19 @@ def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     topics = {name: part.topic for name, part in parts.items()}
     raw = raw_log_of(path, Topics(topics, notes=(*notes, *_joined(used))), mapping)
     return replace(raw, name=name_of_run(run_of(path, options.joined)) if options.joined else raw.name)
+
+
+def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
+    """Return the mapping of tables whose canonical names give what an axis needs, each signal in one of them only, or None."""
+    parts, _ = _parts(path, options, TableForm(), ChannelMap({}))
+    named = [
+        (signal, replace(source, column=None, topic=topic, path=str(source.column)))
+        for topic, part in parts.items()
+        for signal, source in canonical_sources([*map(str, part.topic.fields)]).items()
+        if signal != TIME
+    ]
+    sources = dict(named)
+    return ChannelMap(sources) if is_enough(sources) and len(sources) == len(named) else None
 
 
 def _parts(
@@ -193,6 +207,7 @@ READER = Reader(
     sniff=sniff,
     inventory=inventory,
     read=read,
+    own_map=own_map,
 )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
@@ -11,6 +12,8 @@ from fieldsid.logs.inspection import inspect_log
 from fieldsid.logs.load import load_run
 from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.reader import reader_of
+from fieldsid.logs.run import Run
+from fieldsid.logs.save import save_run
 
 TIME = 0.1 * np.arange(300)
 YAW, RATE = 0.5 * np.sin(0.4 * TIME), 0.2 * np.cos(0.4 * TIME)
@@ -214,3 +217,37 @@ def test_latitude_and_longitude_of_joined_tables_are_metres_in_either_unit(tmp_p
     assert_allclose(np.hypot(run["x_m"], run["y_m"])[-1], way[-1], rtol=0.01)
     assert_allclose(np.arctan2(run["y_m"], run["x_m"])[-1], 0.3, atol=0.01)
     assert_allclose(run["yaw_rad"], YAW[: len(run)], atol=1e-9)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_tables_with_canonical_names_are_read_as_they_are_whatever_their_clocks_are_called(tmp_path, suffix):
+    parts = {
+        "state": {"timestamp": EPOCH + TIME, "yaw_rad": YAW, "yaw_rate_rad_s": RATE},
+        "input": {"time_s": EPOCH + STAMPS, "rudder_deg": np.degrees(RUDDER)},
+    }
+    for name, columns in parts.items():
+        frame = pd.DataFrame(columns)
+        frame.to_csv(tmp_path / f"{name}.csv", index=False) if suffix == ".csv" else frame.to_parquet(
+            tmp_path / f"{name}{suffix}"
+        )
+    run = load_run(tmp_path)
+    known = run.time >= 0.03
+    assert_allclose(run["rudder_rad"][known], expected(run)[known])
+    assert {"joined"} <= {n.code for n in run.notes}
+    table(tmp_path / "aid.csv", ["time_s", "yaw_rad"], *listed(EPOCH + TIME, YAW))
+    with pytest.raises(MappingError, match="needs a mapping"):  # which yaw is meant nothing says
+        load_run(tmp_path)
+
+
+def test_runs_that_are_whole_each_with_columns_of_its_own_are_not_joined(tmp_path):
+    table(tmp_path / "a.csv", ["time_s", "yaw_rad", "rudder_rad"], *listed(TIME, YAW, RATE))
+    table(tmp_path / "b.csv", ["time_s", "yaw_rad", "yaw_rate_rad_s", "rudder_rad"], *listed(TIME, YAW, RATE, RATE))
+    with pytest.raises(LogError, match="is a folder, and no bag"):
+        reader_of(tmp_path)
+
+
+def test_runs_that_were_imported_are_not_the_tables_of_one(tmp_path):
+    for name, columns in {"a": ["yaw_rad"], "b": ["yaw_rate_rad_s", "yaw_rad"]}.items():
+        save_run(Run(name, TIME, dict.fromkeys(columns, YAW)), tmp_path / f"{name}.parquet")
+    with pytest.raises(LogError, match="is a folder, and no bag"):
+        reader_of(tmp_path)
