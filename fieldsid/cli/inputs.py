@@ -158,11 +158,12 @@ def between(start: float | None, end: float | None) -> tuple[float, float]:
 
 
 def mapping_behind(models: Iterable[Path], logs: Iterable[Path]) -> Path | None:
-    """Return the mapping that the logs of models were read with, where each of some logs needs one; None elsewhere."""
+    """Return the mapping that the logs of models were read with, where each of some logs that can be read needs one."""
     from fieldsid.logs.load import needs_mapping
+    from fieldsid.logs.several.sifting import attempt
 
     behind = named_inputs.mapping_of(models)
-    return behind if behind is not None and all(map(needs_mapping, logs)) else None
+    return behind if behind is not None and all(attempt(needs_mapping, log) is not False for log in logs) else None
 
 
 def _read(path: Path, mapping: ChannelMap | None, otherwise: ChannelMap | None, part: tuple[float, float]) -> Run:

@@ -15,6 +15,7 @@ from fieldsid.logs.load import load_run, maps_anything, needs_mapping, to_map
 from fieldsid.logs.run import Run
 from fieldsid.logs.segments import may_show, plane_of
 from fieldsid.logs.several.run_names import stem_of
+from fieldsid.logs.several.sifting import attempt
 from fieldsid.models.axis import Axis
 from fieldsid.records.named_inputs import sha256_of
 from fieldsid.rounding import MANY
@@ -121,7 +122,7 @@ def _data(state: FolderState) -> tuple[str, str] | None:
     if logs:
         new = logs_to_import(state)
         mappings = [i.path for i in state.of_kind("mapping") if maps_anything(state.place(i))]
-        foreign = next((log for log in new if needs_mapping(state.folder / log)), "") if not mappings else ""
+        foreign = next((log for log in new if attempt(needs_mapping, state.folder / log) is True), "") if not mappings else ""
         if foreign:
             with chdir(state.folder):
                 return f"{foreign} needs a mapping: its own names do not say what its numbers are", to_map(Path(foreign))

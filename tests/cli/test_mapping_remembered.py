@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import shlex
+from pathlib import Path
 
 import pytest
 from cli import trial
 
 import fieldsid
+from fieldsid.cli.inputs import mapping_behind
 from fieldsid.logs import load_run, save_run
 from fieldsid.models.axis import Axis
 from fieldsid.records.reading import read_yaml
@@ -91,3 +93,18 @@ def test_a_mapping_whose_columns_a_log_lacks_is_not_tried(run_cli, models, tmp_p
     told = run_cli("compare", models[0], foreign)
     assert told.code == 2
     assert "kanaele" not in told.err
+
+
+def test_a_log_that_cannot_be_read_does_not_stand_in_the_way_of_the_mapping_of_the_next_line(models, tmp_path):
+    (tmp_path / "spoilt.parquet").write_bytes(b"PAR1 and no more")
+    assert mapping_behind(models, [Path("spoilt.parquet"), Path("log_1.8.csv")]) == Path("kanaele.yaml")
+
+
+def test_a_log_that_cannot_be_read_does_not_stand_in_the_way_of_the_status(run_cli, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run_cli("init", ".")
+    (tmp_path / "logs").mkdir(exist_ok=True)
+    (tmp_path / "logs" / "spoilt.parquet").write_bytes(b"PAR1 and no more")
+    done = run_cli("status")
+    assert done.code == 0
+    assert "next: sysid" in done.out
