@@ -80,10 +80,17 @@ def _print_json(arguments: Sequence[str], code: int, what: str, found: str, hint
 
 def _as_usage(error: typer.TyperException, arguments: Sequence[str]) -> UsageError:
     """Give an error of the option parser our three parts; its own sentence already names the option."""
-    words = error.format_message().strip().removesuffix(".").replace("Value error, ", "")  # pydantic's own words
+    unknown = getattr(error, "option_name", None) if hasattr(error, "possibilities") else None
+    said = error.format_message() if unknown is None else f"no such option: {unknown}"
+    words = said.strip().removesuffix(".").replace("Value error, ", "")  # pydantic's own words
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else f"sysid {arguments[0]}"
     words, hint = words[:1].lower() + words[1:], f"see `{path} --help`"
+    if unknown is not None and context is not None:
+        from fieldsid.cli.help.meant_option import meant_by
+
+        meant = meant_by(unknown, context)
+        hint = f"did you mean {meant}? {hint}" if meant else hint
     if words.startswith("missing argument"):
         from fieldsid.cli.trial.filled import FILLS
         from fieldsid.trial_folder.journal import is_trial

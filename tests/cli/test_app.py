@@ -84,7 +84,35 @@ def test_a_mistyped_option_is_refused_in_three_parts(run_cli):
     assert (answer.code, answer.out) == (2, "")
     assert answer.err.startswith("error: no such option: --axes")
     assert "\n  found: sysid effects list --axes yaw\n" in answer.err
-    assert answer.err.endswith("\nhint: see `sysid effects list --help`\n")
+    assert answer.err.splitlines()[-1].startswith("hint: did you mean `--axis")
+    assert answer.err.endswith(" see `sysid effects list --help`\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        ("schedule export g.yaml --target ros2", "--to TARGET"),
+        ("schedule export g.yaml --format=ros2", "--to TARGET"),
+        ("import a.csv --out x", "--output DIR|FILE"),
+        ("import a.csv --end 3", "--to S"),
+        ("import a.csv --overwrite", "--force"),
+        ("import a.csv --map m.yaml", "--mapping YAML"),
+        ("identify a.csv --plane yaw", "--axis"),
+        ("diagnose a.csv --test b.csv", "--validate RUN"),
+        ("turn-radius m.yaml --max-rudder 0.3", "--fin-max ANGLE"),
+        ("turn-radius m.yaml --spedes 1", "--speeds LIST"),
+    ],
+)
+def test_an_option_in_other_words_is_led_to_ours(run_cli, words, meant):
+    answer = run_cli(*words.split())
+    assert answer.code == 2
+    assert answer.err.splitlines()[-1].startswith(f"hint: did you mean `{meant}")
+    assert "Possible options" not in answer.err
+
+
+def test_an_option_that_is_like_none_is_only_shown_the_help(run_cli):
+    answer = run_cli("import", "a.csv", "--xyzzy", "1")
+    assert answer.err.splitlines()[-1] == "hint: see `sysid import --help`"
 
 
 def test_an_interrupted_command_raises_in_the_command_that_runs_it_and_ends_with_130(run_cli, monkeypatch):
