@@ -27,11 +27,12 @@ def load_model(path: File) -> Model:
     return models.load_model(Path(path))
 
 
-def save(record: Kept, path: File, *, inputs: Sequence[File] = (), force: bool = False) -> Path:
+def save(record: Kept, path: File, *, inputs: Sequence[File] = (), mapping: File | None = None, force: bool = False) -> Path:
     """Write a record for the commands, and return the path: a run as Parquet or CSV, a model, laws or a schedule as YAML.
 
-    Of a fit, a diagnosis and an extension the model is written. inputs: the files it was made from, whose hashes are kept. force:
-    replace an existing file. Raises ArtifactError where the file exists or cannot be written, UsageError for another record.
+    Of a fit, a diagnosis and an extension the model is written. inputs: the files it was made from, whose hashes are kept.
+    mapping: the file that a model's logs were read with, for what reads them again. force: replace an existing file. Raises
+    ArtifactError where the file exists or cannot be written, UsageError for another record.
     """
     from fieldsid.plant.laws.axis_laws import Laws, save_laws
     from fieldsid.schedule.record import Schedule, save_schedule
@@ -45,7 +46,7 @@ def save(record: Kept, path: File, *, inputs: Sequence[File] = (), force: bool =
         return save_schedule(record, place, inputs=sources, force=force)
     known = record if isinstance(record, Model) else getattr(record, "model", None)
     if isinstance(known, Model):
-        return models.save_model(known, place, inputs=sources, force=force)
+        return models.save_model(known, place, inputs=sources, mapping=None if mapping is None else Path(mapping), force=force)
     raise UsageError(
         f"a {type(record).__name__} has no file of its own", found=repr(record), hint="keep its table: `to_frame().to_csv(path)`"
     )

@@ -50,6 +50,11 @@ def test_a_turn_gains_and_a_report_read_the_models_logs_by_it(run_cli, models, t
     assert "mapping.yaml" not in {p.name for p in tmp_path.iterdir()}
 
 
+def test_a_model_saved_from_python_keeps_it_too(models):
+    path = fieldsid.save(fieldsid.load_model(models[0]), "again.yaml", inputs=["log_1.0.csv"], mapping="kanaele.yaml")
+    assert read_yaml(path)["mapping"] == read_yaml(models[0])["mapping"]
+
+
 def test_a_model_is_stale_where_its_mapping_has_changed(run_cli, models, tmp_path):
     assert "nothing is stale" in run_cli("status").out
     file = tmp_path / "kanaele.yaml"
