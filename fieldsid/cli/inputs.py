@@ -61,7 +61,7 @@ def read_groups(
     if paths.count(STDIN) > 1:
         raise UsageError("standard input can be read once", found="`-` twice", hint="save the second log to a file")
     read = partial(
-        _read, mapping=mapping_of(mapping), otherwise=mapping_of(named_inputs.mapping_of(models)), part=between(start, end)
+        _read, mapping=mapping_of(mapping), otherwise=mapping_of(named_inputs.mapping_of(models)), start=start, end=end
     )
     is_worth_forking = STDIN not in paths and not any(library in sys.modules for library in READING)
     known = _read_in_worker(read, paths, check, meanwhile) if meanwhile is not None and is_worth_forking else None
@@ -97,7 +97,7 @@ def _apart(runs: Sequence[Run], used: Sequence[Path], paths: Sequence[Path]) -> 
 
 def read_run(path: Path, *, mapping: Path | None = None, models: Iterable[Path] = ()) -> Run:
     """Return the run of one file as `read_groups` does; raises LogError."""
-    return _read(path, mapping_of(mapping), mapping_of(named_inputs.mapping_of(models)), between(None, None))
+    return _read(path, mapping_of(mapping), mapping_of(named_inputs.mapping_of(models)))
 
 
 def mapping_of(path: Path | None) -> ChannelMap | None:
@@ -152,11 +152,6 @@ def files_of(runs: Sequence[Run]) -> list[Path]:
     return [run.source for run in runs if run.source is not None and run.source.exists()]
 
 
-def between(start: float | None, end: float | None) -> tuple[float, float]:
-    """Return the part of a log that `--from` and `--to` ask for, in s."""
-    return (-float("inf") if start is None else start, float("inf") if end is None else end)
-
-
 def mapping_behind(models: Iterable[Path], logs: Iterable[Path]) -> Path | None:
     """Return the mapping that the logs of models were read with, where each of some logs that can be read needs one."""
     from fieldsid.logs.load import needs_mapping
@@ -166,10 +161,13 @@ def mapping_behind(models: Iterable[Path], logs: Iterable[Path]) -> Path | None:
     return behind if behind is not None and all(attempt(needs_mapping, log) is not False for log in logs) else None
 
 
-def _read(path: Path, mapping: ChannelMap | None, otherwise: ChannelMap | None, part: tuple[float, float]) -> Run:
+def _read(
+    path: Path, mapping: ChannelMap | None, otherwise: ChannelMap | None, start: float | None = None, end: float | None = None
+) -> Run:
     from fieldsid.logs import load_run
+    from fieldsid.logs.convert.assemble import part_between
 
-    return load_run(path, mapping, part=part, recognise=True, otherwise=otherwise)
+    return load_run(path, mapping, part=part_between(start, end), recognise=True, otherwise=otherwise)
 
 
 def _read_in_worker(

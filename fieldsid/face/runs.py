@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from glob import glob, has_magic
 from os import PathLike
 from pathlib import Path
@@ -15,9 +14,11 @@ from fieldsid.errors import LogError, UsageError
 from fieldsid.face.arguments import File, vehicle_of
 from fieldsid.face.several import Several
 from fieldsid.logs import ChannelMap, Run
+from fieldsid.logs.convert.assemble import WHOLE, part_between
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
 from fieldsid.logs.importing import Importer
 from fieldsid.logs.reader import neighbours
+from fieldsid.logs.several.run_names import runs_apart
 from fieldsid.records.named_inputs import mapping_of
 
 if TYPE_CHECKING:
@@ -31,16 +32,14 @@ Logs: TypeAlias = "Log | Iterable[Log] | Mapping[str, DataFrame]"
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """How logs are read, the fin limits (rad) they are judged by, and the part of each run that is taken in s."""
+    """How logs are read, which part of each, and the fin limits (rad) they are judged by."""
 
     importer: Importer = field(default_factory=lambda: Importer(whole=True))
     fin_max_rad: Mapping[str, float] = field(default_factory=dict)
-    start: float | None = None
-    end: float | None = None
 
     def of_file(self, path: Path) -> list[Run]:
         """Return the run of a file, or where not all of it is wanted its stretches under way."""
-        return [self.part(run) for run in self.importer.read(path, self.fin_max_rad)]
+        return self.importer.read(path, self.fin_max_rad)
 
     def of_table(self, table: DataFrame, name: str) -> Run:
         """Return the run of a pandas table."""
@@ -48,17 +47,14 @@ class Reading:
         from fieldsid.logs.pandas_table import run_of_frame
 
         how = self.importer
-        run = run_of_frame(
+        return run_of_frame(
             table, name, how.mapping, channels=dict(map(channel_of, how.channels)), salvage=how.salvage, max_gap_s=how.max_gap_s,
-            fin_max_rad=self.fin_max_rad,
+            part=how.part, fin_max_rad=self.fin_max_rad,
         )  # fmt: skip
-        return self.part(run)
 
-    def part(self, run: Run) -> Run:
-        """Return the part of a run that is asked for."""
-        if self.start is None and self.end is None:
-            return run
-        return run.between(-float("inf") if self.start is None else self.start, float("inf") if self.end is None else self.end)
+    def of_run(self, run: Run) -> Run:
+        """Return the part of a run that was read before."""
+        return run if self.importer.part == WHOLE else run.between(*self.importer.part)
 
 
 def load(
@@ -89,12 +85,13 @@ def load(
         _mapping(mapping),
         tuple(channel),
         None if msg_path is None else Path(msg_path),
-        max_gap_s=max_gap,
-        salvage=salvage,
-        whole=whole or start is not None or end is not None,
+        part_between(start, end),
+        max_gap,
+        salvage,
+        whole,
         joined=tuple(files[1:]),
     )
-    return runs_of(files[0] if files else logs, Reading(importer, vehicle_of(vehicle).signal_limits, start, end))
+    return runs_of(files[0] if files else logs, Reading(importer, vehicle_of(vehicle).signal_limits))
 
 
 def _tables_of_one_run(logs: Logs) -> list[Path]:
@@ -111,7 +108,7 @@ def _tables_of_one_run(logs: Logs) -> list[Path]:
 
 def runs_of(logs: Logs, reading: Reading | None = None) -> Several[Run]:
     """Return the runs of logs, each with a name of its own; raises as `load` does."""
-    return Several(_apart(list(_read(logs, reading or Reading()))))
+    return Several(runs_apart(list(_read(logs, reading or Reading()))))
 
 
 def runs_mapped(
@@ -122,13 +119,13 @@ def runs_mapped(
     *,
     models: Iterable[object] = (),
 ) -> Several[Run]:
-    """Return the runs of logs as every command but `import` reads them, cut to start .. end s; raises as `load` does.
+    """Return the runs of logs as every command but `import` reads them, from start to end s; raises as `load` does.
 
     Without a mapping a log whose own names are not enough is read as the logs of the files of models were.
     """
     behind = mapping_of(Path(model) for model in models if isinstance(model, (str, PathLike)))
-    importer = Importer(_mapping(mapping), whole=True, recognise=True, otherwise=_mapping(behind))
-    return runs_of(logs, Reading(importer, start=start, end=end))
+    part = part_between(start, end)
+    return runs_of(logs, Reading(Importer(_mapping(mapping), part=part, whole=True, recognise=True, otherwise=_mapping(behind))))
 
 
 def files_of(name: File, what: str = "log") -> list[Path]:
@@ -144,7 +141,7 @@ def files_of(name: File, what: str = "log") -> list[Path]:
 
 def _read(logs: Logs, reading: Reading) -> Iterator[Run]:
     if isinstance(logs, Run):
-        yield reading.part(logs)
+        yield reading.of_run(logs)
     elif isinstance(logs, (str, PathLike)):
         yield from (run for path in files_of(logs) for run in reading.of_file(path))
     elif is_table(logs):
@@ -187,17 +184,3 @@ def _plain(pattern: Path) -> Path:
     parts = pattern.parts
     first = next(i for i, part in enumerate(parts) if has_magic(part))
     return Path(*parts[: first + 1])
-
-
-def _apart(runs: Sequence[Run]) -> list[Run]:
-    """Put the folder's name before the names that several runs share, and a number behind those that still do."""
-    shared = Counter(run.name for run in runs)
-    names: list[str] = []
-    for run in runs:
-        folder = "" if run.source is None or shared[run.name] == 1 else f"{run.source.resolve().parent.name}_"
-        name, n = f"{folder}{run.name}", 1
-        while name in names:
-            n += 1
-            name = f"{folder}{run.name}_{n}"
-        names.append(name)
-    return [run if run.name == name else replace(run, name=name) for run, name in zip(runs, names, strict=True)]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ChannelMap, Source
-from fieldsid.logs.convert.assemble import assemble
+from fieldsid.logs.convert.assemble import WHOLE, assemble
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
 from fieldsid.logs.load import chosen_map, judged
 from fieldsid.logs.mapping.vocabulary import TIME
@@ -37,6 +37,7 @@ def run_of_frame(
     channels: Mapping[str, Source] | None = None,
     salvage: bool = False,
     max_gap_s: float = MAX_GAP_S,
+    part: tuple[float, float] = WHOLE,
     fin_max_rad: Mapping[str, float] | None = None,
 ) -> Run:
     """Return the Run of a table with one row per sample; arguments as those of `load_run`.
@@ -52,7 +53,7 @@ def run_of_frame(
         columns = Columns(place, names, len(names), lambda i: _cells(table.iloc[:, i]))
         options = ReadOptions(None, salvage)
         raw = series_of(place, columns, chosen, (), options)
-        run = assemble(raw, chosen, place, options, max_gap_s=max_gap_s)
+        run = assemble(raw, chosen, place, options, part=part, max_gap_s=max_gap_s)
     except (LogError, MappingError) as error:  # the readers' own hints name commands that take files
         raise type(error)(error.what, found=error.found, hint=_HINT) from error
     return judged(replace(run, name=called, source=None), raw, chosen, fin_max_rad)

@@ -42,10 +42,11 @@ def command(
     """
     from fieldsid.artifacts import check_output
     from fieldsid.cli.console import alike, emit, tracked, warn
-    from fieldsid.cli.inputs import between, mapping_of, one_run
+    from fieldsid.cli.inputs import mapping_of, one_run
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.cli.voice import voice
     from fieldsid.face.arguments import vehicle_of
+    from fieldsid.logs.convert.assemble import part_between
     from fieldsid.logs.importing import Importer
     from fieldsid.logs.several.run_names import refuse_twice
     from fieldsid.logs.several.sifting import attempt, sifted
@@ -56,7 +57,7 @@ def command(
     if join:
         logs, joined = logs[:1], one_run("import", logs, join=True)[1:]
     importer = Importer(
-        mapping_of(mapping), tuple(channel or ()), msg_path, between(from_s, to_s), max_gap, salvage, whole, tuple(joined)
+        mapping_of(mapping), tuple(channel or ()), msg_path, part_between(from_s, to_s), max_gap, salvage, whole, tuple(joined)
     )
     limits = vehicle_of(vehicle).signal_limits
     there = [] if force or importer != Importer(importer.mapping) else _already(importer, logs, output, format_, mapping)

@@ -25,6 +25,13 @@ from fieldsid.logs.run import COLUMNS, PART, Note, Run, signal_of
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 WHOLE = (-np.inf, np.inf)
+
+
+def part_between(start: float | None, end: float | None) -> tuple[float, float]:
+    """Return the part of a log from one time to another in s, to its own start or end where one is None."""
+    return (WHOLE[0] if start is None else start, WHOLE[1] if end is None else end)
+
+
 BESIDE = 0.5
 """Share of a signal's numbers beside which the fastest angle or rate has one, below which it has rows of its own."""
 

@@ -6,7 +6,7 @@ import os
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from itertools import takewhile
 from pathlib import Path
@@ -55,6 +55,21 @@ def names_apart(names: Sequence[str], paths: Sequence[Path]) -> list[str]:
             for i, own in zip(places, _told_apart(name, [_real(paths[i]) for i in places]), strict=True):
                 out[i] = own
     return _numbered(out)
+
+
+def runs_apart(runs: Sequence[Run]) -> list[Run]:
+    """Return runs with names that no two share, as those of their files; of several from one file with a number behind each."""
+    of_file: dict[Path | int, list[int]] = defaultdict(list)
+    for i, run in enumerate(runs):
+        of_file[i if run.source is None else _real(run.source)].append(i)
+    first = [runs[places[0]] for places in of_file.values()]
+    named = names_apart([run.name for run in first], [run.source or Path("/", run.name) for run in first])
+    out = list(runs)
+    for name, places in zip(named, of_file.values(), strict=True):
+        for k, i in enumerate(places):
+            own = name if len(places) == 1 else f"{name}_{k + 1}"
+            out[i] = runs[i] if runs[i].name == own else replace(runs[i], name=own)
+    return out
 
 
 def name_of_run(tables: Sequence[Path]) -> str:

@@ -10,6 +10,7 @@ import fieldsid as fs
 from fieldsid.errors import DataError, LogError, MappingError, UsageError
 from fieldsid.logs import load_run, save_run
 from fieldsid.logs.mapping.mapping_file import mapping_of
+from fieldsid.logs.several.run_names import names_apart, stem_of
 
 
 @pytest.fixture
@@ -104,6 +105,31 @@ def test_a_part_is_cut_out_and_a_part_that_is_not_there_refused(folder):
     assert (run.time[0], run.time[-1]) == (2.0, pytest.approx(9.0))
     with pytest.raises(DataError, match="no samples between"):
         fs.load("runs/zigzag.parquet", start=90.0)
+
+
+def test_what_lies_outside_of_a_part_is_not_judged(tmp_path):
+    time = 0.1 * np.arange(400)
+    lost = np.where((time > 30.0) & (time < 35.0), np.nan, 1.0)
+    columns = {
+        "yaw_rad": lost * np.sin(0.3 * time),
+        "yaw_rate_rad_s": lost * 0.3 * np.cos(0.3 * time),
+        "rudder_rad": np.sin(time),
+    }
+    table = pd.DataFrame({"time_s": time, **columns})
+    table.to_csv(tmp_path / "gap.csv", index=False)
+    for log in (tmp_path / "gap.csv", table):
+        with pytest.raises(LogError, match="is missing for"):
+            fs.load(log, whole=True)
+        (run,) = fs.load(log, end=29.0)
+        assert run.time[-1] == 29.0
+
+
+def test_runs_of_one_name_are_told_apart_as_by_the_commands(tmp_path, made):
+    run = made.run("pulses")
+    paths = [save_run(run, tmp_path / name) for name in ("a/pulses.csv", "a/pulses.parquet", "b/pulses.parquet")]
+    runs = fs.load([*paths, *(r.between(0.0, 9.0) for r in fs.load(paths[:2])), run])
+    own = names_apart([stem_of(path) for path in paths], paths)
+    assert [r.name for r in runs] == [f"{own[0]}_1", f"{own[1]}_1", own[2], f"{own[0]}_2", f"{own[1]}_2", "pulses"]
 
 
 def test_files_of_one_name_are_told_apart_by_their_folders(tmp_path, made):
