@@ -18,7 +18,7 @@ PACKAGE = ROOT / "fieldsid"
 
 ORDER = (
     "_version", "text", "errors", "numerics", "runtime", "registry", "page", "display", "records",
-    "artifacts", "rounding", "angles", "strict",
+    "artifacts", "rounding", "settled", "angles", "strict",
     "templates", "guide", "logs", "maneuvers", "models", "vehicle", "effects", "dynamics", "noise", "fitting", "estimators",
     "comparison", "planning", "diagnosis", "extension", "batch", "plant", "turning", "schedule", "online", "exports",
     "trial_folder", "change", "figures", "views", "reporting", "face", "results",

@@ -29,9 +29,8 @@ from fieldsid.logs.run import Note
 from fieldsid.models.record import Record
 from fieldsid.noise.white_floor import white_noise_floor
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.settled import settled_band
 
-SETTLED_SHARE = 0.05
-"""A parameter is settled while it stays within this share of its last value, or within its last two standard errors."""
 LONGEST_HISTORY = 4000
 
 
@@ -115,7 +114,7 @@ def history_of(record: Record, names: list[str], values: FloatArray, errors: Flo
 
 def settle_time(time: FloatArray, values: FloatArray, last_error: float) -> float:
     """Return the seconds from the start of the record after which a parameter stays near its last value."""
-    band = max(SETTLED_SHARE * abs(float(values[-1])), 2.0 * last_error)
+    band = settled_band(float(values[-1]), 2.0 * last_error)
     outside = np.flatnonzero(np.abs(values - values[-1]) > band)
     first = int(outside[-1]) + 1 if outside.size else 0
     return float(time[min(first, time.size - 1)] - time[0])

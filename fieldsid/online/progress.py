@@ -16,6 +16,7 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.numerics.arrays import known
 from fieldsid.online.estimate import OnlineEstimate
 from fieldsid.records.keys import Key, Number
+from fieldsid.settled import settled_band
 
 Verdict = Literal["starting", "contradicts", "collecting", "not_excited", "moving", "enough"]
 DEFAULT_ACCURACY = 0.05
@@ -24,7 +25,6 @@ LOOK_BACK_S = 10.0
 """Time over which a parameter must stay where it is to be settled, and over which information is seen to grow."""
 MOST_LOOKS = 1000
 """Looks that a watch can have kept: there are some forty in the time that it looks back."""
-SETTLED_SHARE = 0.05
 MIN_WEIGHT = 0.2
 """Weight of what was heard, reached after two seconds, from which on a root mean square is told."""
 QUIET_FIN_RAD = 0.005
@@ -199,7 +199,7 @@ class Watch:
         value, error = now.values[name], now.std_errors[name]
         if not isfinite(error) or now.time - self._looks[0].time < 0.95 * LOOK_BACK_S:
             return False
-        band = max(SETTLED_SHARE * abs(value), error)
+        band = settled_band(value, error)
         return all(abs(look.values[name] - value) <= band for look in self._looks)
 
     def _left(self, least: ParameterProgress, now: OnlineEstimate) -> float:

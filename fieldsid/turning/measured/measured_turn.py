@@ -14,10 +14,10 @@ from fieldsid.logs.run import Run
 from fieldsid.models.record import knows_speed
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 from fieldsid.records.keys import INLINE, Key, Number, Side
+from fieldsid.settled import settled_band
 from fieldsid.turning.measured.circle import LEAST_TURN_FOR_CURRENT_RAD, Circle, fit_circle
 
 TURNING_SHARE = 0.5
-SETTLED_SHARE = 0.05
 SMOOTH_S = 2.0
 APPROACH_S = 5.0
 LEAST_RATE_RAD_S = 0.01
@@ -123,7 +123,7 @@ def _settled(run: Run, rate: FloatArray) -> tuple[int, int]:
     first, last = _longest(np.abs(rate) > TURNING_SHARE * peak)
     middle = (first + last) // 2
     level = float(np.median(rate[middle:last]))
-    allowed = max(SETTLED_SHARE * abs(level), 3.0 * float(np.std(rate[middle:last])))
+    allowed = settled_band(level, 3.0 * float(np.std(rate[middle:last])))
     off = np.flatnonzero(np.abs(rate[first:last] - level) > allowed)
     early = off[off < middle - first]
     late = off[off >= middle - first]

@@ -19,6 +19,7 @@ from fieldsid.logs.readers.bags.messages.topic import TopicDecoding, TopicSeries
 from fieldsid.logs.readers.bags.packets import CDR, ROS1, Collector, Connection, TopicPackets, keep_first
 from fieldsid.logs.readers.bags.stores import collected
 from fieldsid.logs.run import Note
+from fieldsid.logs.unknown_file import COPY_AGAIN
 
 MOST_NUMBERS = 200
 """Numbers in a message beyond which it is a picture or a cloud of points: of those only the first values are told."""
@@ -149,7 +150,7 @@ def check_not_empty(path: Path, collector: Collector) -> None:
     if damage or not known:
         what = "holds no message that can be read" if known else "has no messages"
         found = f"{damage}; topics {topics}" if known else damage or "no topics"
-        raise LogError(f"`{path}` {what}", found=found, hint="copy it from the vehicle again")
+        raise LogError(f"`{path}` {what}", found=found, hint=COPY_AGAIN)
     what = "has no messages" if wanted is None else "has no messages on the mapped topics"
     hint = "check that the recorder ran: its topics and their types are all that is in the file"
     raise LogError(f"`{path}` {what}", found=topics, hint=hint)

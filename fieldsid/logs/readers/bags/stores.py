@@ -13,7 +13,7 @@ from fieldsid.logs.readers.bags.containers import db3, mcap, ros1
 from fieldsid.logs.readers.bags.containers.metadata import check_against_metadata
 from fieldsid.logs.readers.bags.packets import Collector, Connection, Settle, TopicPackets, keep_all
 from fieldsid.logs.run import Note
-from fieldsid.logs.unknown_file import head_of
+from fieldsid.logs.unknown_file import COPY_AGAIN, head_of
 
 Scan = Callable[[Path, Collector], None]
 SCANS: Mapping[bytes, Scan] = {ros1.MAGIC: ros1.scan, mcap.MAGIC: mcap.scan, db3.MAGIC: db3.scan}
@@ -59,7 +59,7 @@ def collected(
 
 def _unknown(path: Path, collector: Collector) -> None:
     start = head_of(path)[:16]
-    raise LogError(f"`{path}` is not a bag", found=f"it starts with {start!r}", hint="copy it from the vehicle again")
+    raise LogError(f"`{path}` is not a bag", found=f"it starts with {start!r}", hint=COPY_AGAIN)
 
 
 def _scan_of(path: Path) -> Scan | None:
@@ -88,7 +88,7 @@ def _plain_part(part: Path, collector: Collector) -> Iterator[Path]:
             message = f"{part.name} is {cause}: {copy.stat().st_size} unpacked bytes were read"
             collector.notes.append(Note("truncated", message, {"bytes": copy.stat().st_size}))
         if not copy.stat().st_size:
-            raise LogError(f"`{part}` cannot be unpacked", found="damaged zstd data", hint="copy it from the vehicle again")
+            raise LogError(f"`{part}` cannot be unpacked", found="damaged zstd data", hint=COPY_AGAIN)
         yield copy
 
 

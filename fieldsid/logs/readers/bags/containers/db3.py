@@ -18,6 +18,7 @@ from urllib.parse import quote
 
 from fieldsid.errors import LogError
 from fieldsid.logs.readers.bags.packets import LAST_NS, SETTLE_BYTES, Collector, Connection, TopicPackets
+from fieldsid.logs.unknown_file import COPY_AGAIN
 
 MAGIC = b"SQLite format 3\x00"
 DAMAGE = (sqlite3.DatabaseError, MemoryError, UnicodeDecodeError)
@@ -91,13 +92,12 @@ def _connections(path: Path, base: sqlite3.Connection, collector: Collector) -> 
     try:
         topics = base.execute("SELECT id, name, type, serialization_format FROM topics ORDER BY id").fetchall()
     except sqlite3.OperationalError as error:
-        what, hint = f"`{path}` has no table of topics", "copy it from the vehicle again"
-        raise LogError(what, found=str(error), hint=hint) from error
+        raise LogError(f"`{path}` has no table of topics", found=str(error), hint=COPY_AGAIN) from error
     except DAMAGE as error:
         raise LogError(
             f"`{path}` is not a readable ROS 2 bag: {error}",
             found=f"{path.stat().st_size} bytes",
-            hint="copy it from the vehicle again",
+            hint=COPY_AGAIN,
         ) from error
     definitions = _definitions(base)
     packets: dict[int, TopicPackets | None] = {}
