@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from hashlib import sha256
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -127,6 +129,28 @@ def run_cli(capfd: pytest.CaptureFixture[str]) -> Callable[..., Answer]:
         return Answer(code, out, err)
 
     return call
+
+
+@pytest.fixture(scope="session")
+def run_shared() -> Callable[..., Answer]:
+    """Return `run_cli` for what several tests look at: a fixture of theirs runs the command once."""
+
+    def call(*arguments: object) -> Answer:
+        out, err = StringIO(), StringIO()
+        with redirect_stdout(out), redirect_stderr(err):
+            code = main([str(a) for a in arguments])
+        return Answer(code, out.getvalue(), err.getvalue())
+
+    return call
+
+
+@pytest.fixture
+def batch_here() -> Iterator[None]:
+    """Let a batch work on its logs in this process."""
+    from batches import in_this_process
+
+    with in_this_process():
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -10,6 +10,8 @@ import pandas as pd
 import pytest
 from cli import trial
 
+pytestmark = pytest.mark.usefixtures("batch_here")
+
 
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import chdir
+
 import hidden_lag
 import pytest
 from cli import trial
@@ -20,10 +22,37 @@ def logs(tmp_path_factory):
     return hidden_lag.files(tmp_path_factory.mktemp("lag"))
 
 
-def test_the_hidden_effect_is_named_first_and_kept_and_drawn(run_cli, logs, tmp_path):
-    kept, drawn = tmp_path / "d.yaml", tmp_path / "d.png"
-    asked = ("diagnose", *logs.train, "--axis", "yaw", "--validate", logs.unseen, "-o", kept, "--figure", drawn, "--json")
-    body = run_cli(*asked).json
+OWN = "name: own\nmoment: '{}'\ncoefficients: {{k_own: {{unit: rad/s^2, low: 0, high: 20, start: 1.0}}}}\n"
+
+
+def own_effect(folder, moment):
+    """Write an effect of one's own in a folder."""
+    (folder / "effects").mkdir(exist_ok=True)
+    (folder / "effects" / "own.yaml").write_text(OWN.format(moment))
+
+
+@pytest.fixture(scope="module")
+def kept(run_shared, logs, tmp_path_factory):
+    """The folder of a diagnosis and its figure, and what it is as JSON; no axis is named."""
+    folder = tmp_path_factory.mktemp("kept")
+    places = ("-o", folder / "d.yaml", "--figure", folder / "d.png", "--json")
+    return folder, run_shared("diagnose", *logs.train, "--validate", logs.unseen, *places).json
+
+
+@pytest.fixture(scope="module")
+def in_words(run_shared, logs, tmp_path_factory):
+    """What the same diagnosis says in words where an effect of the working folder cannot be read."""
+    folder = tmp_path_factory.mktemp("words")
+    own_effect(folder, "k_own * rr")
+    try:
+        with chdir(folder):
+            return run_shared("diagnose", *logs.train, "--axis", "yaw", "--validate", logs.unseen)
+    finally:
+        forget_effects()
+
+
+def test_the_hidden_effect_is_named_first_and_kept_and_drawn(kept):
+    folder, body = kept
     assert body["schema"] == "fieldsid/diagnose/1"
     assert (body["verdict"], body["effects"]) == ("effect", ["servo_lag"])
     first = body["candidates"][0]
@@ -35,32 +64,40 @@ def test_the_hidden_effect_is_named_first_and_kept_and_drawn(run_cli, logs, tmp_
     assert body["noise_floor"]["rate_rad_s"] == pytest.approx(hidden_lag.SENSOR, rel=0.2)
     assert {"condition", "share_of_error", "rms_ratio", "t_start_s", "t_end_s"} <= set(body["where"][0])
     assert set(body["skipped"]) >= {"roll_coupling", "prop_moment"}
-    assert drawn.read_bytes()[:4] == b"\x89PNG"
-    record = load_record(kept, "fieldsid/diagnosis")
+    assert (folder / "d.png").read_bytes()[:4] == b"\x89PNG"
+    record = load_record(folder / "d.yaml", "fieldsid/diagnosis")
     assert [len(i["sha256"]) for i in record["inputs"]] == [64] * 3
-    assert rivals_from(kept, ("servo_lag", "delay"))[0].effects == ("servo_lag",)
+    assert rivals_from(folder / "d.yaml", ("servo_lag", "delay"))[0].effects == ("servo_lag",)
 
 
-@pytest.mark.parametrize("of_model", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_the_axis_is_that_of_the_model_or_of_what_the_runs_excite(run_cli, logs, tmp_path, of_model):
+def test_the_axis_is_that_of_what_the_runs_excite(kept):
+    assert kept[1]["axis"] == "yaw"
+
+
+@pytest.mark.slow  # a model names its axis in test_a_model_of_the_other_axis_is_refused
+def test_the_axis_is_that_of_the_model(run_cli, logs, tmp_path):
     run_cli("identify", *logs.train, "--joint", "--no-figures", "-o", tmp_path)
-    known = ("--model", tmp_path / "joint_yaw.yaml") if of_model else ()
-    body = run_cli("diagnose", *logs.train, *known, "--validate", logs.unseen, "--json").json
+    body = run_cli("diagnose", *logs.train, "--model", tmp_path / "joint_yaw.yaml", "--validate", logs.unseen, "--json").json
     assert (body["axis"], body["effects"]) == ("yaw", ["servo_lag"])
 
 
-def test_text_says_verdict_candidates_place_what_was_skipped_and_what_to_do(run_cli, logs):
-    answer = run_cli("diagnose", *logs.train, "--axis", "yaw", "--validate", logs.unseen)
-    assert answer.code == 0
-    assert max(map(len, trial.below(answer.out))) <= 80
-    assert answer.out.startswith("effect: servo_lag: the error on unseen runs falls from")
-    assert "servo_lag: the fin follows" in answer.out
-    assert answer.out.count("falls from") == answer.out.count("the fin follows") == 1
+def test_text_says_verdict_candidates_place_what_was_skipped_and_what_to_do(logs, in_words):
+    assert in_words.code == 0
+    out = in_words.out
+    assert max(map(len, trial.below(out))) <= 80
+    assert out.startswith("effect: servo_lag: the error on unseen runs falls from")
+    assert "servo_lag: the fin follows" in out
+    assert out.count("falls from") == out.count("the fin follows") == 1
     for part in ("as it is", "evidence: log", "where the model as it is fails", "not tried: ", "needs roll, which the log lacks"):
-        assert part in answer.out
-    then = answer.out.splitlines()[2]
+        assert part in out
+    then = out.splitlines()[2]
     assert then.startswith("next: sysid identify ")
     assert then.endswith(f"--add servo_lag --validate {logs.unseen}")
+
+
+def test_a_users_effect_that_cannot_be_read_takes_no_part(in_words):
+    assert in_words.out.startswith("effect: servo_lag: ")
+    assert "`effects/own.yaml`: there is no signal or coefficient `rr`; it takes no part\n  found: k_own * rr\n" in in_words.err
 
 
 def test_a_model_of_the_other_axis_is_refused(run_cli, logs, tmp_path):
@@ -114,15 +151,11 @@ def test_a_run_whose_fin_hardly_moves_is_refused_at_once_and_named(run_cli, logs
     assert "never leaves its trim" in run_cli("identify", path, "--axis", "yaw", "-o", tmp_path).err
 
 
-OWN = "name: own\nmoment: '{}'\ncoefficients: {{k_own: {{unit: rad/s^2, low: 0, high: 20, start: 1.0}}}}\n"
-
-
 @pytest.fixture
 def own(tmp_path, monkeypatch):
     """Write the moment of an effect of one's own in the working folder."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "effects").mkdir()
-    yield lambda moment: (tmp_path / "effects" / "own.yaml").write_text(OWN.format(moment))
+    yield lambda moment: own_effect(tmp_path, moment)
     forget_effects()
 
 
@@ -140,10 +173,3 @@ def test_a_users_effect_that_fails_in_flight_is_refused_with_the_place(run_cli, 
     assert says in answer.err
     assert "\nhint: " in answer.err
     assert moment in answer.err
-
-
-def test_a_users_effect_that_cannot_be_read_takes_no_part(run_cli, logs, own):
-    own("k_own * rr")
-    answer = run_cli("diagnose", *logs.train, "--axis", "yaw", "--validate", logs.unseen, "--json")
-    assert answer.json["effects"] == ["servo_lag"]
-    assert "`effects/own.yaml`: there is no signal or coefficient `rr`; it takes no part\n  found: k_own * rr\n" in answer.err

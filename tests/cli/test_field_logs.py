@@ -2,6 +2,7 @@
 
 import json
 import re
+from functools import cache
 
 import numpy as np
 import pytest
@@ -20,15 +21,27 @@ def imported(run_cli, log, folder, *more):
     return load_run(folder / "run.parquet"), inspected.json, done.json
 
 
+@pytest.fixture(scope="module")
+def of_kind(run_shared, tmp_path_factory):
+    """Return a function that gives the folder of a kind of log with its run in it, and the same as `imported`; each once."""
+
+    @cache
+    def made(kind):
+        folder = tmp_path_factory.mktemp(kind)
+        return folder, *imported(run_shared, TABLES[kind](folder), folder)
+
+    return made
+
+
 @pytest.mark.parametrize("kind", TABLES)
-def test_a_log_of_the_field_is_imported_and_identified_without_an_edit(run_cli, tmp_path, kind):
-    run, _, _ = imported(run_cli, TABLES[kind](tmp_path), tmp_path)
+def test_a_log_of_the_field_is_imported_and_identified_without_an_edit(run_cli, of_kind, kind):
+    folder, run, _, _ = of_kind(kind)
     f = flight()
     assert len(run) == f["time"].size
     np.testing.assert_allclose(np.diff(run.time), STEP, atol=2e-3)
     off = run["yaw_rad"] - f["yaw"]
     np.testing.assert_allclose(off - 2 * np.pi * np.round(off / (2 * np.pi)), 0.0, atol=2e-3)
-    done = run_cli("identify", str(tmp_path / "run.parquet"), "--axis", "yaw", "-o", str(tmp_path / "models"), "--json")
+    done = run_cli("identify", folder / "run.parquet", "--axis", "yaw", "--json")
     values = {name: p["value"] for name, p in json.loads(done.out)["fits"][0]["parameters"].items()}
     counts, travel = PER_COUNT.get(kind, (1.0, np.radians(30.0)))
     assert -values["a22"] == pytest.approx(A, rel=0.1)
@@ -39,8 +52,8 @@ def findings(record, code):
     return [f["message"] for f in record["findings"] if f["code"] == code]
 
 
-def test_the_compass_is_taken_before_the_course_and_the_vehicle_before_its_goal(run_cli, tmp_path):
-    _, record, _ = imported(run_cli, TABLES["iver"](tmp_path), tmp_path)
+def test_the_compass_is_taken_before_the_course_and_the_vehicle_before_its_goal(of_kind):
+    record = of_kind("iver")[2]
     signals = record["mapping"]["signals"]
     columns = {s: item.get("column") for s, item in signals.items()}
     assert columns["yaw_rad"] == "C True Heading"
@@ -54,18 +67,15 @@ def test_the_compass_is_taken_before_the_course_and_the_vehicle_before_its_goal(
     assert record["mapping"]["time"] == {"column": "Time", "date": "Date"}
 
 
-def test_latitude_and_longitude_are_metres_from_the_first_fix(run_cli, tmp_path):
-    run, _, _ = imported(run_cli, TABLES["iver"](tmp_path), tmp_path)
+def test_latitude_and_longitude_are_metres_from_the_first_fix(of_kind):
+    run = of_kind("iver")[1]
     f = flight()
     np.testing.assert_allclose(run["x_m"], f["x"], atol=0.2 + 2e-3 * np.abs(f["x"]).max())
     np.testing.assert_allclose(run["y_m"], f["y"], atol=0.2 + 2e-3 * np.abs(f["y"]).max())
 
 
-def test_what_was_rebuilt_or_taken_is_said(run_cli, tmp_path):
-    said = {
-        kind: imported(run_cli, TABLES[kind](tmp_path), (tmp_path / kind, (tmp_path / kind).mkdir())[0])[2] for kind in TABLES
-    }
-    codes = {kind: {n["code"] for n in done["runs"][0]["notes"]} for kind, done in said.items()}
+def test_what_was_rebuilt_or_taken_is_said(of_kind):
+    codes = {kind: {n["code"] for n in of_kind(kind)[3]["runs"][0]["notes"]} for kind in TABLES}
     assert "lost_hours" in codes["spreadsheet"]
     assert {"coarse_time", "counts"} <= codes["pulses"]
     assert "coarse_time" in codes["tank"]
@@ -73,8 +83,8 @@ def test_what_was_rebuilt_or_taken_is_said(run_cli, tmp_path):
     assert "lost_hours" not in codes["iver"]
 
 
-def test_a_table_without_names_is_known_by_its_numbers_and_says_why(run_cli, tmp_path):
-    _, record, _ = imported(run_cli, TABLES["tank"](tmp_path), tmp_path)
+def test_a_table_without_names_is_known_by_its_numbers_and_says_why(run_cli, of_kind):
+    record = of_kind("tank")[2]
     columns = {s: item["column"] for s, item in record["mapping"]["signals"].items()}
     assert {"x_m": 1, "y_m": 2, "yaw_rad": 4, "surge_m_s": 5, "yaw_rate_rad_s": 7, "rudder_rad": 8}.items() <= columns.items()
     assert any("derivative of column 4" in m for m in findings(record, "evidence"))

@@ -80,6 +80,7 @@ def test_a_compass_slower_than_the_rows_counts_once_for_each_of_its_numbers(run_
     assert "repeated" in {w["code"] for w in fit["warnings"]}
 
 
+@pytest.mark.usefixtures("batch_here")
 @pytest.mark.parametrize("command", ["diagnose", "live", "batch"])
 def test_the_other_commands_read_it_too(run_cli, tmp_path, command):
     more = {"live": ("--speed", "0"), "batch": ("-o", tmp_path / "out", "--no-diagnose", "--workers", "1")}.get(command, ())

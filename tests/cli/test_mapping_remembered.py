@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shlex
+import shutil
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
@@ -18,23 +20,32 @@ NAMES = {"time_s": "uhr", "yaw_rad": "kurs", "yaw_rate_rad_s": "drehung", "rudde
 LAG = ("servo_lag", {"lag": 0.3})
 
 
-@pytest.fixture
-def models(run_cli, tmp_path, tmp_path_factory, monkeypatch):
-    """Models of two logs whose columns are in words of their own, made with a mapping called otherwise than mapping.yaml."""
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(scope="module")
+def prepared(run_shared, tmp_path_factory):
+    """A folder of two logs whose columns are in words of their own, and of models made with a mapping not called mapping.yaml."""
+    folder = tmp_path_factory.mktemp("own words")
     units = {"yaw_rad": "rad", "yaw_rate_rad_s": "rad/s", "rudder_rad": "rad", "surge_m_s": "m/s"}
     lines = [f"  {name}: {{column: {NAMES[name]}, unit: {unit}}}" for name, unit in units.items()]
     head = "schema: fieldsid/mapping/1\ntime: {column: uhr, unit: s}\nsignals:\n"
-    (tmp_path / "kanaele.yaml").write_text(head + "\n".join(lines) + "\n")
+    (folder / "kanaele.yaml").write_text(head + "\n".join(lines) + "\n")
     logs, flown = [], tmp_path_factory.mktemp("flown")
     for speed in (1.0, 1.8):
         run = load_run(trial.flown(flown, Axis.YAW, speed=speed, name=f"pulses_{speed}", hidden=LAG))
         table = save_run(run, flown / "own.csv", force=True).read_text().split("\n", 1)
         named = [NAMES.get(c, c) for c in table[0].split(",")]
-        logs.append(tmp_path / f"log_{speed}.csv")
-        logs[-1].write_text("\n".join([",".join(named), table[1]]))
-    done = run_cli("identify", *logs, "-m", "kanaele.yaml", "--axis", "yaw", "--effects", "servo_lag", "-o", "models")
-    assert done.code == 0
+        logs.append(f"log_{speed}.csv")
+        (folder / logs[-1]).write_text("\n".join([",".join(named), table[1]]))
+    with chdir(folder):
+        asked = ("--axis", "yaw", "--effects", "servo_lag", "-o", "models", "--no-figures")
+        assert run_shared("identify", *logs, "-m", "kanaele.yaml", *asked).code == 0
+    return folder
+
+
+@pytest.fixture
+def models(prepared, tmp_path, monkeypatch):
+    """The models in a copy of that folder, which is the working folder."""
+    shutil.copytree(prepared, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
     return sorted((tmp_path / "models").glob("*.yaml"))
 
 
@@ -65,7 +76,7 @@ def test_a_model_is_stale_where_its_mapping_has_changed(run_cli, models, tmp_pat
 def test_a_new_log_is_read_as_the_models_logs_were(run_cli, models, tmp_path):
     new = tmp_path / "new.csv"
     new.write_bytes((tmp_path / "log_1.8.csv").read_bytes()[:-200].rsplit(b"\n", 1)[0] + b"\n")
-    made = run_cli("identify", "log_1.0.csv", "-m", "kanaele.yaml", "--axis", "yaw", "-o", "plain")
+    made = run_cli("identify", "log_1.0.csv", "-m", "kanaele.yaml", "--axis", "yaw", "-o", "plain", "--no-figures")
     assert made.code == 0
     for model, is_named in ((models[0], True), ("plain/log_1.0_yaw.yaml", False)):
         told = run_cli("compare", model, new)

@@ -11,6 +11,7 @@ from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import pytest
+from batches import in_this_process
 from cli import trial
 
 from fieldsid.cli.app import main
@@ -95,7 +96,7 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, tuple[i
     """What every command said, one after the other in one folder."""
     folder = tmp_path_factory.mktemp("voice") / "trial"
     fly(folder / "runs")
-    with chdir(folder):
+    with chdir(folder), in_this_process():
         yield {line: run(line) for line in LINES}
 
 

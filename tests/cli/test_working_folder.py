@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+from contextlib import chdir
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
@@ -118,7 +119,8 @@ def plain(tmp_path_factory):
     """The figures that are drawn of the folder's run where there are no settings."""
     place = tmp_path_factory.mktemp("plain")
     trial.flown(place)
-    assert started("identify", "run7.parquet", "--axis", "yaw", "-o", "drawn", cwd=place).returncode == 0
+    with chdir(place):
+        assert main(["identify", "run7.parquet", "--axis", "yaw", "-o", "drawn"]) == 0
     return {p.name: p.read_bytes() for p in (place / "drawn").glob("*.png")}
 
 

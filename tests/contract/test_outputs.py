@@ -6,6 +6,7 @@ Angle, rate, sway and heave are outputs of a model; surge and depth, as far as t
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -39,6 +40,7 @@ FORMS = [
 ]
 
 
+@cache
 def run_of(axis: Axis) -> Run:
     """A log with every column that a record takes, none of them without noise."""
     rng, time, names = np.random.default_rng(5), 0.05 * np.arange(SAMPLES), NAMES[axis]
@@ -58,6 +60,12 @@ def with_noise(run: Run, column: str, seed: int = 8) -> Run:
     return replace(run, signals={**run.signals, column: run.signals[column] + noise})
 
 
+@cache
+def recorded(axis: Axis, noisy: str | None = None) -> Record:
+    """The record of the log, of which one channel may have more noise."""
+    return record_of(with_noise(run_of(axis), column_of(noisy, axis)) if noisy else run_of(axis), axis)
+
+
 def column_of(channel: str, axis: Axis) -> str:
     return ROLES[channel] if channel in ROLES else getattr(NAMES[axis], channel)
 
@@ -72,31 +80,29 @@ def motion(effect: Effect, axis: Axis, record: Record) -> np.ndarray:
 
 @pytest.mark.parametrize(("effect", "axis"), FORMS, ids=lambda v: v if isinstance(v, Axis) else f"{v.name}:{len(v.coefficients)}")
 def test_noise_on_a_measured_output_leaves_every_free_run(effect, axis):
-    run = run_of(axis)
-    plain = motion(effect, axis, record_of(run, axis))
+    plain = motion(effect, axis, recorded(axis))
     assert np.isfinite(plain).all()
     for channel in OUTPUTS:
-        np.testing.assert_array_equal(motion(effect, axis, record_of(with_noise(run, column_of(channel, axis)), axis)), plain)
+        np.testing.assert_array_equal(motion(effect, axis, recorded(axis, channel)), plain)
 
 
 @pytest.mark.parametrize("channel", ["surge", "depth"])
 @pytest.mark.parametrize(("effect", "axis"), FORMS, ids=lambda v: v if isinstance(v, Axis) else f"{v.name}:{len(v.coefficients)}")
 def test_what_is_an_input_acts_through_its_own_channel_alone(effect, axis, channel):
     """At the same speed of the run, which is a number of the whole of it."""
-    record = record_of(run_of(axis), axis)
-    noisy = record_of(with_noise(run_of(axis), ROLES[channel]), axis).at_speed(record.speed)
+    record = recorded(axis)
+    noisy = recorded(axis, channel).at_speed(record.speed)
     is_same = np.array_equal(motion(effect, axis, noisy), motion(effect, axis, record))
     assert is_same or channel in effect.needs
 
 
 @pytest.mark.parametrize("axis", Axis)
 def test_no_input_knows_an_output(axis):
-    run = run_of(axis)
-    plain = record_of(run, axis)
+    plain = recorded(axis)
     assert set(plain.signals) == set(ROLES)
     assert plain.cross_ok.all()
     for channel in OUTPUTS:
-        noisy = record_of(with_noise(run, column_of(channel, axis)), axis)
+        noisy = recorded(axis, channel)
         assert not np.array_equal(getattr(noisy, channel), getattr(plain, channel))
         assert noisy.speed == plain.speed
         for role, signal in plain.signals.items():
@@ -108,5 +114,5 @@ def test_no_input_knows_an_output(axis):
 @pytest.mark.parametrize("axis", Axis)
 @pytest.mark.parametrize("channel", ["surge", "roll", "depth"])
 def test_an_input_is_in_no_other_input(axis, channel):
-    plain, noisy = record_of(run_of(axis), axis), record_of(with_noise(run_of(axis), ROLES[channel]), axis)
+    plain, noisy = recorded(axis), recorded(axis, channel)
     assert {role for role in ROLES if not np.array_equal(plain.signals[role], noisy.signals[role])} == {channel}
