@@ -28,8 +28,16 @@ def parent(tmp_path):
     return trial.model_file(tmp_path)
 
 
-def test_an_effect_that_pays_is_kept_beside_its_parent_with_its_lineage(run_cli, logs, parent):
-    body = run_cli("extend", parent, *logs.train, "--add", "servo_lag", "--validate", logs.unseen, "--json").json
+@pytest.fixture(scope="module")
+def extended(run_shared, logs, tmp_path_factory):
+    """A model to which the hidden effect was added, and what was said of it."""
+    model = trial.model_file(tmp_path_factory.mktemp("extended"))
+    asked = ("extend", model, *logs.train, "--add", "servo_lag", "--validate", logs.unseen, "--json")
+    return model, run_shared(*asked).json
+
+
+def test_an_effect_that_pays_is_kept_beside_its_parent_with_its_lineage(logs, extended):
+    parent, body = extended
     assert body["schema"] == "fieldsid/extend/1"
     assert body["kept"] is True
     assert body["model"] == str(parent.with_name("truth+servo_lag.yaml"))
@@ -74,8 +82,8 @@ def test_where_an_addition_is_not_kept_the_next_command_is_about_the_parent(run_
     assert shlex.split(body["next"])[-3:] == ["--model", str(parent), "--thorough"]
 
 
-def test_at_the_noise_the_next_command_uses_the_model(run_cli, logs, parent):
-    body = run_cli("extend", parent, *logs.train, "--add", "servo_lag", "--validate", logs.unseen, "--json").json
+def test_at_the_noise_the_next_command_uses_the_model(run_cli, extended):
+    _, body = extended
     assert not body["left"]["more_than_noise"]
     assert body["next"] == f"sysid turn-radius {body['model']}"
     assert run_cli(*shlex.split(body["next"])[1:]).code == 0

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 from cli import trial
 from cli.test_fit import table
-from truth.paper import YAW
+from truth.paper import PITCH, YAW
 
 from fieldsid.cli.app import main
 from fieldsid.models.axis import Axis
@@ -168,7 +168,7 @@ def test_a_file_that_an_export_replaces_is_shown_and_kept(run_cli, gains, tmp_pa
     ],
 )
 def test_a_wish_that_cannot_be_had_is_refused_with_a_hint(run_cli, tmp_path, option, said):
-    answer = run_cli("schedule", "design", table(tmp_path), "--fin-limit", "0.26", "--controller", "pd", option)
+    answer = run_cli("schedule", "design", table(tmp_path, rows=YAW[1:4:2]), "--fin-limit", "0.26", "--controller", "pd", option)
     assert answer.code == 2
     assert said in answer.err
     assert "hint: " in answer.err
@@ -194,7 +194,7 @@ def test_depth_goes_through_pitch(run_cli, tmp_path):
     answer = run_cli(
         "schedule",
         "design",
-        table(tmp_path, "pitch"),
+        table(tmp_path, "pitch", rows=PITCH[1:4:2]),
         "--fin-limit",
         "0.26",
         "--controller",

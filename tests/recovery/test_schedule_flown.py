@@ -82,10 +82,10 @@ def flown(schedule, hull, speed, step):
 def test_steps_settle_as_said_and_nothing_hunts(trial):
     limits = FinLimits(lag=FINS.lag)
     assert usual_controller(trial.source) == "pd"
-    surges = [float(r["surge_m_s"][:40].mean()) for r in trial.runs]
+    surges = [float(r["surge_m_s"][:40].mean()) for r in trial.runs[::2]]
     schedule = design_schedule(trial.source, 0.26, speeds=surges, wish=Wish("pd"), limits=limits, runs=trial.runs)
     checked = {round(c.speed, 6): c for c in verify_schedule(schedule, trial.source, runs=trial.runs).scheduled}
-    for speed, surge in zip(SPEEDS, surges, strict=True):
+    for speed, surge in zip(SPEEDS[::2], surges, strict=True):
         check = checked[round(surge, 6)]
         for step, said in list(zip(STEPS_RAD[Axis.YAW], check.steps, strict=True)):
             time, heading, kept = flown(schedule, trial.hull, speed, step)

@@ -37,8 +37,14 @@ def runs_of(axis, values, seed, speeds=(1.0, 1.4), effects=()):
     return [replace(run, name=f"p{u}") for run, u in zip(noisy, speeds, strict=True)]
 
 
-def state(axis, values, seed, *, joint=True, effects=(), **more):
-    fits = identify(runs_of(axis, values, seed, effects=effects, **more), axis, joint=joint, effects=effects)
+def state(axis, values, seed, *, joint=True, effects=(), speeds=(1.0, 1.4)):
+    return identified(axis, tuple(values.items()), seed, joint, effects, speeds)
+
+
+@cache
+def identified(axis, values, seed, joint, effects, speeds):
+    """The models of a state: many comparisons have the same on one side."""
+    fits = identify(runs_of(axis, dict(values), seed, speeds, effects), axis, joint=joint, effects=effects)
     return source_of_models([f.model for f in fits], [f"m{i}" for i in range(len(fits))])
 
 
@@ -90,7 +96,7 @@ def test_a_change_of_an_effects_coefficient_is_found():
 
 
 def test_an_effect_on_one_side_only_makes_the_two_not_comparable():
-    values = YAW | {"lag": 0.3}
+    values = YAW | {"lag": 0.2}
     before = state(Axis.YAW, values, 3, effects=("servo_lag",))
     plain = identify(runs_of(Axis.YAW, values, 13, effects=("servo_lag",)), Axis.YAW, joint=True)
     found = compare_models(before, source_of_models([plain[0].model], ["m"]))

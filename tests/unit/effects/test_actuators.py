@@ -43,8 +43,8 @@ def through(name: str, log: Record, **values: float) -> FinPath:
 
 def bumpy(*, held: bool) -> Record:
     rng = np.random.default_rng(3)
-    time = np.cumsum(np.r_[7.0, rng.uniform(0.02, 0.12, 20)])
-    return record(time, rng.uniform(-0.4, 0.4, 21), held=held)
+    time = np.cumsum(np.r_[7.0, rng.uniform(0.02, 0.12, 10)])
+    return record(time, rng.uniform(-0.4, 0.4, 11), held=held)
 
 
 def fine_line(values: np.ndarray) -> tuple[float, float]:

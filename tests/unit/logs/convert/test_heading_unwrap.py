@@ -39,7 +39,7 @@ def off(found, truth):
     return difference - TURN * np.round(np.nanmedian(difference) / TURN)
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(
     log_hz=RATES_HZ,
     source_hz=st.floats(4.0, 60.0),

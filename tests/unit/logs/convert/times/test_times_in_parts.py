@@ -5,6 +5,8 @@ The flight starts 89 s before midnight: it passes a minute, an hour and a day.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from look_alikes import flight
@@ -21,6 +23,7 @@ def text(values, decimals=0):
     return [f"{v:.{decimals}f}" for v in values]
 
 
+@cache
 def parts(rate):
     """The columns of a clock of this flight, each as it may be written."""
     t = RATES[rate]["time"]
