@@ -39,7 +39,6 @@ STAGES = {
     "free_run": [(f"{MOVES}.grounds", "Grounds.fit_from_the_free_run", lambda _grounds, h: h.likelihood_fit)],
     "refit": [(f"{SEARCH}.search", "refit_from_parts", lambda *_of: False)],
     "drop": [(f"{SEARCH}.search", "drop_each", lambda *_of: False)],
-    "mistaken": [(f"{SEARCH}.search", "Search._mistaken_for", lambda *_of: set())],
 }
 """By stage: the module, the name and what stands in its place."""
 

@@ -122,27 +122,10 @@ class Search:
         return any(worst_error(h, self.floor) <= MISSING_ERROR_RATIO for h in self.tried.children(self.root))
 
     def _eliminate(self, found: ScoredModel) -> bool:
-        """Refine the set found, and fit it without each of its effects; return whether any model was fitted or became better.
-
-        An effect may be mistaken for a variant of another, as a dead time for the inertia of a servo. So each remaining set is
-        also tried with the variants of the effects that the removed one may be mistaken for, in the set or in place of the
-        removed one.
-        """
+        """Refine the set found, and fit it without each of its effects; return whether any model was fitted or became better."""
         if self.refined(found) is not found:
             return True
-        dropped, asked = drop_each(found, self.tried, self.grounds), list[VariantRequest]()
-        for gone, without in self.tried.without_each(found):
-            alike = self._mistaken_for(gone)
-            own = {e.name for e in without.effects if e.name in alike and e.variants}
-            asked += [VariantRequest(without, own)] if own else []
-            swapped = {n: self.tried.get(frozenset((*without.names, n))) for n in alike - set(found.names)}
-            asked += [VariantRequest(h, {name}) for name, h in swapped.items() if h is not None]
-        varied = try_variants(asked, self.tried, self.grounds)
-        return dropped or varied or self._refit_leading()
-
-    def _mistaken_for(self, name: str) -> set[str]:
-        """Return the effects that one of the catalogue may be mistaken for."""
-        return {n for e in self.catalogue if e.name == name for n in e.mistaken_for}
+        return drop_each(found, self.tried, self.grounds) or self._refit_leading()
 
     def _refit_leading(self) -> bool:
         """Fit the models of the table again from any subset that is likelier than they are; return whether one became better."""
