@@ -1,7 +1,7 @@
-"""Angles as a user types them, the same everywhere: `15deg`, `0.26rad`, or a bare number, which is rad; of a margin deg.
+"""Angles as a user types them: `15deg`, `0.26rad`, or a bare number, which is in rad (a phase margin in deg).
 
-A bare number that no such angle can be in rad is refused with both readings: 60 is 60 deg or 60 rad, never a guess. So is what
-cannot be meant with its unit either: a course of 400 deg.
+A bare number that is too large for an angle of its kind in rad is refused with both readings: 60 may be 60 deg or 60 rad, and the
+program does not guess. An angle with a unit that is too large for its kind, such as a course of 400 deg, is refused too.
 """
 
 from __future__ import annotations
@@ -11,24 +11,24 @@ import math
 from fieldsid.errors import UsageError
 
 FIN = math.pi / 4
-"""The largest of each that a bare number can be in rad: no fin lifts beyond 45 deg,"""
+"""Largest fin angle that a bare number may mean, rad: a fin stalls before 45 deg."""
 TILT = math.pi / 2
-"""no hull is to pitch or roll beyond the vertical,"""
+"""Largest pitch or roll angle that a bare number may mean, rad: the vertical."""
 HEADING = math.pi
-"""what is beyond half a turn is no deviation of heading but a turn,"""
+"""Largest deviation of heading that a bare number may mean, rad: more than half a turn is a deviation to the other side."""
 FIN_RATE = 2.0 * math.pi
-"""and no servo turns a fin once round in a second."""
+"""Largest fin rate that a bare number may mean, rad/s: no servo turns a fin once round in a second."""
 TURN = 2.0 * math.pi
 FASTEST_FIN = 20.0 * math.pi
-"""The fastest fin that can be meant, rad/s: the servos of models, 60 deg in 0.06 s, do a quarter of it."""
+"""Largest fin rate that is accepted at all, rad/s: four times that of a model servo, 60 deg in 0.06 s."""
 UNITS = {"deg": math.pi / 180.0, "rad": 1.0}
 
 
 def parse_angle(text: str, option: str, most: float, largest: float = math.inf, beyond: str = "") -> float:
-    """Read an angle, or an angle per second, as rad, to either side; raises UsageError.
+    """Return an angle (rad) or angular rate (rad/s) from its text; raises UsageError.
 
-    `most` is the largest that a bare number can be in rad, `largest` (rad) the largest that can be meant at all, `beyond` the
-    hint for who wants more.
+    A bare number above `most` rad is refused, and so is an angle of a size above `largest` rad. `option` names the command-line
+    option in the error, `beyond` adds a hint for a user who needs more than `largest`.
     """
     word = text.strip().lower().removesuffix("/s").strip()
     unit = next((u for u in UNITS if word.endswith(u)), None)
@@ -57,10 +57,10 @@ def parse_angle(text: str, option: str, most: float, largest: float = math.inf, 
 
 
 def parse_margin(text: str, option: str) -> float:
-    """Read a phase margin as deg: `45deg`, `0.79rad`, or a bare number, which is deg as margins are always told.
+    """Return a phase margin in deg from its text: `45deg`, `0.79rad`, or a bare number, which is in deg as usual for margins.
 
-    A bare number that can be meant in rad, other than zero, is refused with both readings, and so is what is below zero or
-    more than half a turn, which no margin is. Raises UsageError.
+    A bare number other than zero that may be meant in rad is refused with both readings, and so is a margin below zero or above
+    180 deg. Raises UsageError.
     """
     word = text.strip().lower()
     has_unit = any(word.endswith(u) for u in UNITS)

@@ -28,9 +28,10 @@ Limit = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 class Vehicle:
     """One vehicle: fin limits in rad, fin rate in rad/s, length in m, speeds in m/s; None where not stated.
 
-    `positive_rudder` is the side a positive rudder turns to, `positive_elevator` where the nose goes under a
-    positive elevator; None when not known. `signals` are the canonical names its logs hold. `fins` are those of a vehicle whose
-    rudder or elevator is made of several: the limits of the two are then what these reach, where no less is stated.
+    `positive_rudder` is the side to which a positive rudder turns the vehicle, `positive_elevator` where a positive elevator
+    moves the nose; None when not known. `signals` are the canonical names of the signals in its logs. `fins` describes a vehicle
+    whose rudder or elevator is an allocation over several fins: the limits of rudder and elevator are then the largest angles
+    that these fins can make, unless a smaller limit is stated.
     """
 
     name: str
@@ -67,15 +68,15 @@ class _Fins(StrictModel):
     unit: Annotated[str, Field(min_length=1)] = "rad"
 
     def fins(self) -> Fins:
-        """Return the fins, one limit for all taken for each."""
+        """Return the fins; a single limit holds for each of them."""
         limits = self.limits if isinstance(self.limits, list) else [self.limits] * len(self.names)
         return Fins(tuple(self.names), tuple(self.to_rudder or ()), tuple(self.to_elevator or ()), tuple(limits), self.unit)
 
     @model_validator(mode="after")
     def _are_fins(self) -> _Fins:
-        wrong = self.fins().wrong()
-        if wrong is not None:
-            raise ValueError(wrong)
+        inconsistency = self.fins().inconsistency()
+        if inconsistency is not None:
+            raise ValueError(inconsistency)
         return self
 
 
@@ -136,7 +137,7 @@ def _vehicle(fields: _Fields, place: str, source: Path | None) -> Vehicle:
 
 
 def _limits_of(fins: Fins, body: Mapping[str, Any], place: str) -> dict[str, float]:
-    """Return the limits of rudder and elevator that fins reach, where no less is stated; raises VehicleError where more is."""
+    """Return the limits of rudder and elevator not stated, as the fins reach them; raises VehicleError if more is stated."""
     limits = {}
     for key, axis in (("rudder_max_rad", "yaw"), ("elevator_max_rad", "pitch")):
         plane, stated = fins.of(axis), body[key]

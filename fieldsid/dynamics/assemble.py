@@ -72,7 +72,7 @@ def in_order(effects: Sequence[Effect]) -> list[Effect]:
 
 def combined_terms(record: Record, effects: Sequence[Effect], values: Values) -> Terms:
     """Return the product of all factors and the sum of all additions of the effects' signal-driven terms."""
-    return reduce(Terms.beside, (e.terms(values, record) for e in effects if e.terms is not None), NO_TERMS)
+    return reduce(Terms.combined_with, (e.terms(values, record) for e in effects if e.terms is not None), NO_TERMS)
 
 
 def combined_core(effects: Sequence[Effect], values: Values, scale: float) -> Core:

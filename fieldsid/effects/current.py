@@ -88,7 +88,7 @@ EFFECT = Effect(
             ),
             needs=("surge",),
             without=("current_sin", "current_cos"),
-            beside=("speed_varying",),
+            only_with=("speed_varying",),
         ),
         Variant(
             "its direction turns",

@@ -69,7 +69,7 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
         lost, let_go = (1.0 - kept) * width, values["release"] * width
         return through(path, record.steps, lambda _steps, start, end, out: held_on(start, end, width, lost, let_go, out))
     if "off_middle" in values:
-        path = path.moved(-values["off_middle"] * width)
+        path = path.shifted(-values["off_middle"] * width)
     zone = StaticMap(beyond=1.0, edge=width, blend=values.get("deadband_blend", 0.0), jump=kept * width)
     return zone.through(path, record.steps)
 

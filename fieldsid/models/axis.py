@@ -34,7 +34,7 @@ class AxisNames:
 
     @property
     def base(self) -> tuple[str, ...]:
-        """Names of the base parameters, in the order every vector of them has."""
+        """The names of the base parameters, in the order of every vector of them."""
         stiff = () if self.stiffness is None else (self.stiffness,)
         return (self.damping, *stiff, self.authority, self.trim)
 

@@ -1,8 +1,8 @@
-"""What a model keeps of an effect that is not built in, so that it can be used, or at least found, in another folder.
+"""The definition that a model keeps of an effect that is not built in, so that the model can be used in another folder.
 
-A user's effect in YAML is data: its text is kept in the model, and read back as the file was. An effect in Python is code of
-an installed package, and code is never taken out of a data file: the model keeps the package, the file and its SHA-256, and
-where no such package is installed the error says what to install.
+A user's effect in YAML is data: the model keeps the text and reads it as it would read the file. An effect in Python is code
+of an installed package, and code is never executed from a data file: the model keeps the names of the package and the file and
+the file's SHA-256, and where that package is not installed the error says what to install.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ NONE: Mapping[str, Definition] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class Definition:
-    """Where an effect lived and what it was: its file, and the YAML text with that text's SHA-256.
+    """The file that defined an effect, its YAML text and the SHA-256 of that text.
 
-    Of code there is no text: `package` says which distribution and entry point it came by, and the SHA-256 is the file's.
+    An effect in Python has no text: `package` names its distribution and entry point, and the SHA-256 is that of the file.
     """
 
     file: str
@@ -35,22 +35,22 @@ class Definition:
 
     @property
     def is_code(self) -> bool:
-        """Whether the effect is code of a package, which the model does not hold."""
+        """Whether the effect is Python code of a package, of which the model keeps no text."""
         return not self.text
 
     @property
     def place(self) -> str:
-        """Where the effect lived, in words."""
+        """Where the effect is defined, in words."""
         return f"{self.file} ({self.package})" if self.package else self.file
 
 
 def of_text(text: str, file: Path) -> Definition:
-    """Return the definition of an effect by the YAML text of a file."""
+    """Return the definition of an effect that a file defines by its YAML text."""
     return Definition(str(file.absolute()), _digest(text), text)
 
 
 def definitions_body(own: Mapping[str, Definition]) -> list[dict[str, Any]]:
-    """Return definitions by the effect's name as a model's file holds them; `read_definitions` reads them back."""
+    """Return definitions, given by the effect's name, as entries of a model's file; `read_definitions` reads them back."""
     return [
         {"name": name, "file": d.file, "sha256": d.sha256, **({"package": d.package} if d.is_code else {"text": block(d.text)})}
         for name, d in own.items()
@@ -58,9 +58,9 @@ def definitions_body(own: Mapping[str, Definition]) -> list[dict[str, Any]]:
 
 
 def read_definitions(body: Sequence[Mapping[str, Any]], path: Path) -> dict[str, Definition]:
-    """Return the definitions that a model's file holds, by the effect's name.
+    """Return the definitions of the entries of a model's file, by the effect's name.
 
-    Raises ArtifactError where a text is not the one that was written. The body has the shape that a model's file has.
+    Raises ArtifactError where the SHA-256 of a text is not the one that was written with it.
     """
     found = {}
     for entry in body:

@@ -1,8 +1,8 @@
-"""The contract of a physical effect: everything any command may ask of it, in one frozen record.
+"""The contract of a physical effect: all that a command may need to know of it, in one frozen record.
 
 Signal path: command -> ACTUATOR -> fin angle -> HYDRODYNAMICS -> motion -> SENSOR -> measurement. The equations of motion are
-those of models/hull.py. A run starts with a cross state where some steady rate before it had left it; no motion within that rate
-leaves it further from zero.
+those of models/hull.py. The initial cross state of a run is the one that a steady rate r0 before the run leads to; a rate that
+never exceeded |r0| cannot have brought it further from zero.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ MomentHook = Callable[["Motion", Values, "Record"], FloatArray]
 
 REGISTRY = "fieldsid.effects"
 BOUND_SHARE = 1e-6
-"""Share of the range of a number from a bound within which it stands on it."""
+"""A coefficient counts as on a bound where its distance to it is below this share of the range between its bounds."""
 
 
 class Stage(StrEnum):
@@ -50,11 +50,11 @@ class Stage(StrEnum):
 class Coefficient:
     """One number of an effect: unit, bounds, start value, and the grid to scan where the cost is not smooth.
 
-    `scan` gives start values tried before the descent; `step` is the half width of the central difference. `per_run` marks a
-    nuisance (a phase, an event time) that every run has of its own and that is refitted on validation runs; its bounds are
-    fractions of the run's length when `unit` is "run". `of_start` marks one that is where a hidden state begins, which the run
-    soon forgets. `rate_exponent` is the power of the hull's characteristic rate (1/s) that
-    scales the points of the grid: the coefficients of a slow hull are small.
+    `scan` lists the start values that are tried before the descent; `step` is the half width of the central difference. `per_run`
+    marks a nuisance parameter (a phase, an event time): each run has its own value, which is fitted again on validation runs; its
+    bounds are fractions of the run's length when `unit` is "run". `of_start` marks the initial value of a hidden state, whose
+    influence soon dies out. `rate_exponent` is the power of the hull's characteristic rate (1/s) by which the points of the grid
+    are multiplied: the coefficients of a slow hull are small.
     """
 
     name: Annotated[str, Key("Its name.")]
@@ -72,13 +72,13 @@ class Coefficient:
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """A variant of an effect that is not the textbook's, in a few words, with the coefficients it takes besides the effect's.
+    """Another equation for an effect than the textbook's, described in a few words (`says`), with its additional coefficients.
 
-    The effect's hooks compute the textbook's variant where the values lack these coefficients. `initial_guesses` gives start
-    values of the shared ones as an effect's does, from the residuals of the textbook's variant, in place of their scan grids.
-    `axes` and `needs` are those of the variant, where it has fewer axes than the effect or needs more signals. `without` are
-    coefficients of the effect that it does without, `beside` effects beside which alone it may show. `extra_states` are the
-    variant's, None for those of the effect.
+    The effect's hooks compute the textbook equation where the values lack these coefficients. `initial_guesses` returns start
+    values of the shared coefficients, from the residuals of the textbook variant, in place of their scan grids. `axes` are the
+    axes of the variant and `needs` the signals it requires in addition to the effect's. `without` names coefficients of the
+    effect that the variant does not have, `only_with` the effects without which the variant cannot be observed. `extra_states`
+    replaces the effect's; None leaves them.
     """
 
     says: str
@@ -87,7 +87,7 @@ class Variant:
     axes: tuple[Axis, ...] = tuple(Axis)
     needs: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
-    beside: tuple[str, ...] = ()
+    only_with: tuple[str, ...] = ()
     extra_states: tuple[str, ...] | None = None
 
 
@@ -96,8 +96,8 @@ class Terms:
     """Time-varying parts that depend on measured signals only, each a factor or an addition per sample (n,).
 
     `damping_factor` and `authority_factor` multiply a(t) and b(t); `moment` (rad/s^2) is added to m(t);
-    `damping` (1/s) is added to a(t) after the factor. `cross_factor` is g, the speed over the run's own in the cross
-    state's equation. None leaves the part as it is.
+    `damping` (1/s) is added to a(t) after the factor. `cross_factor` is g in the equation of the cross state: the speed at a
+    sample over the speed of the run. None leaves the part unchanged.
     """
 
     damping_factor: FloatArray | None = None
@@ -106,16 +106,16 @@ class Terms:
     damping: FloatArray | None = None
     cross_factor: FloatArray | None = None
 
-    def beside(self, other: Terms) -> Terms:
-        """Return the parts of two effects together: the products of the factors, the sums of the additions."""
-        return Terms(*(_joined(getattr(self, part), getattr(other, part), how) for part, how in TERM_PARTS.items()))
+    def combined_with(self, other: Terms) -> Terms:
+        """Return the terms of two effects combined: the products of the factors, the sums of the additions."""
+        return Terms(*(_combined(getattr(self, part), getattr(other, part), how) for part, how in TERM_PARTS.items()))
 
 
 TERM_PARTS = dict(zip(Terms.__dataclass_fields__, (np.multiply, np.multiply, np.add, np.add, np.multiply), strict=True))
-"""How the parts of two effects go together, each by its name."""
+"""The operation that combines a part of two effects' terms, by the name of the part."""
 
 
-def _joined(a: FloatArray | None, b: FloatArray | None, how: np.ufunc) -> FloatArray | None:
+def _combined(a: FloatArray | None, b: FloatArray | None, how: np.ufunc) -> FloatArray | None:
     if a is None or b is None:
         return a if b is None else b
     return np.asarray(how(a, b))
@@ -131,27 +131,29 @@ class Motion:
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """One physical effect. Exactly the hooks of its stage are given; a hook is a pure function.
+    """One physical effect. It has only the hooks of its stage; a hook is a pure function.
 
-    fin(path, values, record) -> FinPath                    actuator, in rising `order`
-    terms(values, record) -> Terms                          hydrodynamics known before integration
-    slope(name, values, record) -> (n,) rad/s^2             optional, where the terms are a moment and no more: its derivative by
-                                                            one of the coefficients; without it differences are taken
-    core(values, scale) -> Core                             hydrodynamics inside the core; scale = speed / reference
+    fin(path, values, record) -> FinPath                    actuator, applied in rising `order`
+    terms(values, record) -> Terms                          hydrodynamics that are known before the integration
+    slope(name, values, record) -> (n,) rad/s^2             optional, for terms that are a moment only: the derivative of that
+                                                            moment by one coefficient; default: a difference quotient
+    core(values, scale) -> Core                             hydrodynamics inside the core; scale = speed / reference speed
     moment(motion, values, record) -> (n,) rad/s^2          hydrodynamics evaluated along the last trajectory
     measure(motion, values, record) -> Motion               sensor
-    sensor_jvp(moves, motion, values, record) -> (P, 2, n)  sensor, optional: the derivative of measure, applied to P small
-                                                            moves (P, 2, n) of the motion; without it differences are taken
-    sensor_slope(name, motion, values, record) -> (2, n)    sensor, optional: that by one of the coefficients
-    `needs` lists roles a log must have: surge, thrust, roll, depth.
-    initial_guesses(records, residuals) -> start values for the shared coefficients, from residuals [(2, n)] of a fit without
-    the effect, before those of the scan grid. equivalent_solution(values, axis) -> another with the same response at one speed.
-    `variants` are other shapes, tried where the textbook's leaves something; `textbook` is the effect that one of them is of,
-    None for the textbook's own.
-    `log_prior_penalty` is log evidence the effect must bring beyond others: where another says the same in simpler words,
-    or where free event times make it fit anything.
-    `heading_span` (rad) is what the runs' headings must span together for it to be told from what goes with the heading itself.
-    `origin` says where the effect is defined, `definition` the same as a model keeps it; None where it is built in.
+    sensor_jvp(moves, motion, values, record) -> (P, 2, n)  sensor, optional: the product of the Jacobian of `measure` with P
+                                                            small changes `moves` (P, 2, n) of the motion; default: differences
+    sensor_slope(name, motion, values, record) -> (2, n)    sensor, optional: the derivative of `measure` by one coefficient
+    `needs` lists the roles that a log must have: surge, thrust, roll, depth.
+    initial_guesses(records, residuals) returns start values of the shared coefficients from the residuals [(2, n)] of a fit
+    without the effect; they are tried before those of the scan grid. equivalent_solution(values, axis) returns other values that
+    have the same response at one speed, None where there are none.
+    `variants` are other equations, tried where the textbook equation leaves a systematic residual. An effect in one of its
+    variants has the textbook effect as its `textbook`; the textbook effect itself has None.
+    `log_prior_penalty` is the log evidence that the effect must gain more than others do: because another effect explains the
+    same more simply, or because its free event times let it fit almost anything.
+    `heading_span` (rad) is the range that the headings of all runs must cover together before the effect can be distinguished
+    from a moment in proportion to the heading. `origin` says where the effect is defined, `definition` says it in the form that
+    a model keeps; None where it is built in.
     """
 
     name: Annotated[str, Key("Its name.")]
@@ -186,46 +188,46 @@ class Effect:
 
     @property
     def is_formed(self) -> bool:
-        """Whether it is in another variant than the textbook's."""
+        """Whether it has another equation than the textbook's."""
         return self.textbook is not None
 
     @property
-    def stateless(self) -> Variant | None:
-        """Its variant without the state of its textbook's, which takes that of an effect beside it; None without one."""
+    def stateless_variant(self) -> Variant | None:
+        """Its variant without a cross state, which uses the cross state of another effect of the model; None if it has none."""
         return next((v for v in self.variants if self.extra_states and v.extra_states == ()), None)
 
     @property
     def limits_rate(self) -> bool:
-        """Whether it is a damping that grows with the rate, whatever else it is in another variant."""
+        """Whether its textbook equation is a damping that grows with the rate."""
         textbook = self.textbook or self
-        return textbook.holds_rate(textbook.starts())
+        return textbook.bounds_rate(textbook.starts())
 
-    def holds_rate(self, values: Values) -> bool:
-        """Whether at these values its damping grows with the rate, and so holds a hull that is unstable at small angles."""
+    def bounds_rate(self, values: Values) -> bool:
+        """Whether its damping grows with the rate at these values, so that it bounds the rate of a hull with a22 < 0."""
         return self.core is not None and any(getattr(self.core(values, 1.0), name) > 0.0 for name in RISING)
 
     @property
     def shared(self) -> tuple[Coefficient, ...]:
-        """Coefficients that all runs have in common."""
+        """The coefficients with one value for all runs."""
         return tuple(c for c in self.coefficients if not c.per_run)
 
     @property
     def nuisance(self) -> tuple[Coefficient, ...]:
-        """Coefficients every run has of its own."""
+        """The coefficients with a separate value for each run."""
         return tuple(c for c in self.coefficients if c.per_run)
 
     @property
-    def every(self) -> tuple[Coefficient, ...]:
-        """Its coefficients, and those that forms take besides, each once."""
-        return tuple({c.name: c for c in (*self.coefficients, *(c for f in self.variants for c in f.coefficients))}.values())
+    def all_coefficients(self) -> tuple[Coefficient, ...]:
+        """The coefficients of the effect and of all its variants, each once."""
+        return tuple({c.name: c for c in (*self.coefficients, *(c for v in self.variants for c in v.coefficients))}.values())
 
     @property
     def names(self) -> set[str]:
-        """Names of the coefficients, those of the forms among them."""
-        return {c.name for c in self.every}
+        """The names of the coefficients of the effect and of all its variants."""
+        return {c.name for c in self.all_coefficients}
 
     def placed(self, outside: Outside) -> Effect:
-        """Return the effect of another package with its origin; the registry asks for it when it loads an entry point."""
+        """Return the effect with another package as its origin; the registry calls this when it loads an entry point."""
         where = Path(outside.file)
         definition = Definition(
             outside.file,
@@ -239,47 +241,50 @@ class Effect:
         return {c.name: c.start for c in self.coefficients}
 
 
-def with_variant(effect: Effect, form: Variant) -> Effect:
-    """Return an effect in one of its forms: with that form's coefficients among its own, without those it does without."""
+def with_variant(effect: Effect, variant: Variant) -> Effect:
+    """Return an effect in one of its variants: with the variant's coefficients added and those of its `without` removed."""
     return replace(
         effect,
-        coefficients=(*(c for c in effect.coefficients if c.name not in form.without), *form.coefficients),
-        needs=tuple(dict.fromkeys((*effect.needs, *form.needs))),
-        extra_states=effect.extra_states if form.extra_states is None else form.extra_states,
+        coefficients=(*(c for c in effect.coefficients if c.name not in variant.without), *variant.coefficients),
+        needs=tuple(dict.fromkeys((*effect.needs, *variant.needs))),
+        extra_states=effect.extra_states if variant.extra_states is None else variant.extra_states,
         variants=(),
         textbook=effect,
     )
 
 
 def with_one_cross_state(effects: Sequence[Effect]) -> tuple[Effect, ...]:
-    """Return effects of which one has a model's one cross state: what can do without takes that of one which cannot."""
-    owned = any(e.extra_states and e.stateless is None for e in effects)
-    return tuple(_beside_state(e) if owned else _with_own_state(e) for e in effects)
+    """Return the effects in variants that share one cross state, as a model can have only one.
+
+    Where one effect cannot do without a cross state, each effect that has a stateless variant takes that; else it keeps its own.
+    """
+    has_owner = any(e.extra_states and e.stateless_variant is None for e in effects)
+    return tuple(_without_cross_state(e) if has_owner else _with_own_cross_state(e) for e in effects)
 
 
-def _beside_state(effect: Effect) -> Effect:
-    return effect if effect.stateless is None else with_variant(effect, effect.stateless)
+def _without_cross_state(effect: Effect) -> Effect:
+    return effect if effect.stateless_variant is None else with_variant(effect, effect.stateless_variant)
 
 
-def _with_own_state(effect: Effect) -> Effect:
-    whole = effect.textbook
-    return effect if whole is None or effect.extra_states or whole.stateless is None else whole
+def _with_own_cross_state(effect: Effect) -> Effect:
+    textbook = effect.textbook
+    return effect if textbook is None or effect.extra_states or textbook.stateless_variant is None else textbook
 
 
 def variant_of(effect: Effect, known: Collection[str]) -> Variant | None:
-    """Return the form whose shared numbers are all among the known names, the largest of several; None for the textbook's."""
-    fitting = [f for f in effect.variants if all(c.name in known for c in f.coefficients if not c.per_run)]
-    return max(fitting, key=lambda f: len(f.coefficients), default=None)
+    """Return the variant with the most coefficients whose shared ones are all among the known names; None for the textbook's."""
+    matching = [v for v in effect.variants if all(c.name in known for c in v.coefficients if not c.per_run)]
+    return max(matching, key=lambda v: len(v.coefficients), default=None)
 
 
 def as_fitted(effect: Effect, values: Values) -> Effect:
-    """Return an effect in the form that a model's values belong to."""
-    form = variant_of(effect, values)
-    return effect if form is None else with_variant(effect, form)
+    """Return an effect in the variant whose coefficients a model's values hold."""
+    variant = variant_of(effect, values)
+    return effect if variant is None else with_variant(effect, variant)
 
 
 def is_on_bound(value: float, low: float, high: float) -> bool:
-    """Whether a number stands on one of its bounds."""
+    """Whether a coefficient's value lies on one of its bounds."""
     return min(value - low, high - value) <= BOUND_SHARE * (high - low)
 
 
@@ -293,32 +298,32 @@ def effect_named(name: str) -> Effect:
     return _checked(name, pick(REGISTRY, "EFFECT", name))
 
 
-def effect_held(name: str, own: Mapping[str, Definition] = NONE) -> Effect:
-    """Return an effect that a model holds: as the model's own definition has it where there is one, else the registry's.
+def effect_held(name: str, definitions: Mapping[str, Definition] = NONE) -> Effect:
+    """Return the effect of a model by its name: from the definition that the model keeps of it, else from the registry.
 
-    Raises EffectError for one that is not known here, saying where it lived if the model does.
+    Raises EffectError for an effect that is not known here; the error says where it was defined if the model does.
     """
-    definition = own.get(name)
+    definition = definitions.get(name)
     if definition is not None and not definition.is_code:
         return _checked(name, define(REGISTRY, definition.text, definition.file))
     try:
         effect = effect_named(name)
     except UsageError as error:
-        raise _not_here(name, definition) from error
+        raise _unknown_effect(name, definition) from error
     if definition is not None and (effect.definition is None or not effect.definition.is_code):
-        raise _not_here(name, definition)
+        raise _unknown_effect(name, definition)
     return effect
 
 
 def definitions_of(effects: Iterable[Effect]) -> dict[str, Definition]:
-    """Return what a model has to keep of its effects, by name: the definitions of those that are not built in."""
+    """Return the definitions that a model has to keep, by the effect's name: those of the effects that are not built in."""
     return {e.name: e.definition for e in effects if e.definition is not None}
 
 
 def shared_name(one: Effect, other: Effect) -> str | None:
-    """Return a coefficient's name that keeps two effects out of one model, None where there is none.
+    """Return a coefficient's name that two effects of one axis both use, None where there is none.
 
-    A model keeps the coefficients of all its effects in one table.
+    Such effects cannot be in one model, which keeps the coefficients of all its effects in one table.
     """
     same_axis = bool(set(one.axes) & set(other.axes))
     return min(one.names & other.names, default=None) if same_axis and one.name != other.name else None
@@ -330,8 +335,8 @@ def _checked(name: str, effect: object) -> Effect:
     return effect
 
 
-def _not_here(name: str, definition: Definition | None) -> EffectError:
-    """Return the error of a model whose effect is neither in it nor known here."""
+def _unknown_effect(name: str, definition: Definition | None) -> EffectError:
+    """Return the error for a model whose effect is neither defined in the model nor known here."""
     if definition is None:
         return EffectError(
             f"the model holds effect `{name}`, which is not known here",

@@ -1,4 +1,4 @@
-"""The fin's path over the sampling intervals, which records hold and actuator effects change."""
+"""The fin's path over the sampling intervals, which a record has and actuator effects transform."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from fieldsid.numerics.arrays import FloatArray
 
 @dataclass(frozen=True, slots=True, repr=False)
 class FinPath(Brief):
-    """Fin angle over each sampling interval, straight from `start` to `end`, both (n-1,) in rad.
+    """Fin angle over each sampling interval, linear from `start` to `end`, both (n-1,) in rad.
 
-    A path that bends or jumps inside an interval is the line of its mean and its first moment. Where the line may pass what
-    the fin itself passes, first and last, (n-1,) in rad, are where the fin is as the interval begins and ends.
+    A path that bends or jumps inside an interval is replaced by the line with the same mean and first moment. The ends of that
+    line may lie outside the path: `first` and `last`, (n-1,) in rad, are then the fin angles at the ends of the interval.
     """
 
     start: FloatArray
@@ -26,7 +26,7 @@ class FinPath(Brief):
         """Mean over each interval, (n-1,)."""
         return 0.5 * (self.start + self.end)
 
-    def moved(self, by: float) -> FinPath:
-        """Return the path of a fin that stands off by so much, in rad."""
-        ends = (None if side is None else side + by for side in (self.first, self.last))
-        return FinPath(self.start + by, self.end + by, *ends)
+    def shifted(self, offset: float) -> FinPath:
+        """Return the path with an offset in rad added to the fin angle."""
+        ends = (None if side is None else side + offset for side in (self.first, self.last))
+        return FinPath(self.start + offset, self.end + offset, *ends)

@@ -1,15 +1,15 @@
-"""The equations of motion of an identified vehicle in one plane: their one right-hand side, its slopes, what each constant moves.
+"""The equations of motion of an identified vehicle in one plane: the right-hand side and its derivatives by state and constants.
 
     y' = p
     p' = -a p - k y + m(t) - Q p|p| (|p|/0.2)^o - N F(s x/g, p) + c x
          + hs sin z + hc cos z + hs2 sin 2z + hc2 cos 2z + rs (z - sin z) + rc (cos z - 1)
-    z = y - ht (t - the middle of the run)
+    z = y - ht (t - t_middle)
     x' = -e g x - (D/g) x|x| - f g^2 p - Y g G(s x/g, p) + h d
     F(alpha, p) = 32 int_{-1/2}^{1/2} (alpha + xi p) |alpha + xi p| xi dxi        (F(0, p) = p |p|)
     G(alpha, p) = int_{-1/2}^{1/2} (alpha + xi p) |alpha + xi p| dxi              (G(alpha, 0) = alpha |alpha|)
-with y the angle, p the rate, x the cross state (sway or heave, scaled so that its moment is c x), d the fin's angle and g the
-speed over the run's own. Free runs, closed loops, settled turns, linear plants and planned flights are all of these equations:
-a hydrodynamic term is a field of `Core`, a term of `slope` and its derivative in `by_constants`.
+with y the angle, p the rate, x the cross state (sway or heave, scaled so that its moment is c x), d the fin angle, g the speed
+over the speed of the run and t_middle the middle of the run. Free runs, closed loops, settled turns, linear plants and planned
+flights all use these equations. A hydrodynamic term is a field of `Core`, a term of `slope` and its derivative in `by_constants`.
 Source: Fossen 2011, sections 6.4.3 (cross-flow drag principle) and 7.1.
 """
 
@@ -23,13 +23,18 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import inlined, inner
 
 REFERENCE_RATE_RAD_S, ZERO_RATE_RAD_S = 0.2, 1e-9
-"""rad/s: the rate at which drag of another power equals the quadratic one, and the one below which it is nil."""
+"""rad/s: the rate at which drag of another power equals the quadratic drag, and the rate below which it is taken as zero."""
 SMALLEST_SPEED_RATIO = 0.01
-"""Speed over the run's speed below which the cross state's quadratic drag grows no more: at rest the state means nothing."""
+"""Lower limit of g in D/g and s/g: a hull at rest has no sway in proportion to the cross state."""
 
 
 class Core(NamedTuple):
-    """The constants of the equations; C of them, zero where an effect is absent, in the order of the arrays (C,) of kernels."""
+    """The C constants of the equations, in the order of the kernels' arrays (C,); defaults are those of an absent effect.
+
+    In the symbols of the module: Q = quadratic, o = beyond_square, hs, hc, hs2, hc2 = heading_sin, heading_cos, heading_sin2,
+    heading_cos2, ht = heading_turn, rs, rc = righting_sin, righting_cos, c = cross_share, e = cross_damping, f = cross_rate,
+    D = cross_quadratic, h = cross_fin, N = strip_moment, Y = strip_force, s = strip_flow.
+    """
 
     quadratic: float = 0.0
     heading_sin: float = 0.0
@@ -50,14 +55,14 @@ class Core(NamedTuple):
     cross_fin: float = 0.0
 
     def plus(self, other: Core) -> Core:
-        """Return the sum of two sets of constants; the factors of FACTORS are taken from whichever sets them."""
+        """Return the sum of two sets of constants; each of FACTORS is taken from the set in which it is not one."""
         factors = {n: (b if (b := getattr(other, n)) != 1.0 else getattr(self, n)) for n in FACTORS}
         return Core._make(map(add, self, other))._replace(**factors)
 
     def steady_cross_state(self, rate: float) -> float:
-        """Return the cross state that a steady rate leads to at the run's own speed, zero where there is none.
+        """Return the cross state that a steady rate p leads to at the speed of the run, zero where there is no cross state.
 
-        The force along the hull is taken as that of a hull that drifts as fast and does not turn.
+        The cross-flow force G is taken at zero rate, G(s x, 0).
         """
         if self.cross_damping <= 0.0:
             return 0.0
@@ -73,18 +78,22 @@ CONSTANTS = Core._fields
 FACTORS = ("cross_share",)
 """The constants that are one where no effect sets them."""
 RISING = ("quadratic", "strip_moment")
-"""The constants of damping that grows with the rate: it holds a hull that is unstable at small angles."""
+"""The constants of a damping that grows with the rate and so bounds the rate of a hull with negative linear damping."""
 OF_ANGLE = (HEADING_SIN, HEADING_COS, RIGHTING_SIN, RIGHTING_COS, HEADING_SIN2, HEADING_COS2, HEADING_TURN)
-"""The constants of what goes with the angle itself: they hold for the course of a run, not for a circle or a step from any."""
+"""The constants of the terms in the angle y: they need the course of a run and mean nothing for a circle or a step from any."""
 MULTIPLIERS = (BEYOND_SQUARE, HEADING_TURN, CROSS_SHARE, STRIP_FLOW)
-"""The constants that bend no motion by themselves."""
+"""The constants that only modify a term of another constant: the motion is linear where all others are zero."""
 DRIVES = ("damping", "stiffness", "moment_start", "moment_end", "cross_factor", "fin")
-"""What is given over each interval: a, k and g held, m straight from its start to its end, d its mean; places by name."""
+"""The inputs over each interval, by their place: a, k and g constant, m linear from start to end, d as its mean."""
 DAMPING, STIFFNESS, MOMENT_START, MOMENT_END, CROSS_FACTOR, FIN = range(len(DRIVES))
 
 
 class Kinds(NamedTuple):
-    """The kinds of terms that any constant, or any parameter's derivative of one, brings in: the rest need not be computed."""
+    """The kinds of terms that are present, so that the others need not be computed.
+
+    turning: in the angle y; stripped: the cross-flow integrals F and G; raised: a drag exponent other than two; crossing: the
+    equation of the cross state; bent: any term besides a, k and m. Constants and parameters' derivatives of them both count.
+    """
 
     turning: bool
     stripped: bool
@@ -94,7 +103,11 @@ class Kinds(NamedTuple):
 
 
 class Slope(NamedTuple):
-    """p' and x' with their derivatives by y, p, x and g, and what the constants multiply."""
+    """The right-hand sides p' (`rate`) and x' (`cross`), their derivatives by y, p, x and g, and the factors of the constants.
+
+    by_... are derivatives of p', cross_by_... of x'. drag = p|p| (|p|/0.2)^o and log_rate = log(|p|/0.2); sin and cos are those
+    of z, arc = z - sin z; by_turn, moment_by_flow and force_by_flow are derivatives by ht and s; moment = F and force = g G.
+    """
 
     rate: float
     cross: float
@@ -119,7 +132,7 @@ class Slope(NamedTuple):
 
 @inner
 def named(c: FloatArray) -> Core:
-    """Return the constants (C,) by name."""
+    """Return the constants (C,) as a `Core`."""
     return Core(
         c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], c[10], c[11], c[12], c[13], c[14], c[15], c[16]
     )  # fmt: skip
@@ -127,7 +140,7 @@ def named(c: FloatArray) -> Core:
 
 @inner
 def kinds_of(c: FloatArray) -> Kinds:
-    """Return the kinds of terms of constants (C,), or of a parameter's derivatives of them."""
+    """Return the kinds of terms that constants (C,), or a parameter's derivatives of them, bring in."""
     heading = abs(c[HEADING_SIN]) + abs(c[HEADING_COS]) + abs(c[HEADING_SIN2]) + abs(c[HEADING_COS2])
     crossing = abs(c[CROSS_DAMPING]) + abs(c[CROSS_RATE]) + abs(c[CROSS_QUADRATIC]) + abs(c[CROSS_FIN]) + abs(c[STRIP_FORCE])
     bent = 0.0
@@ -145,7 +158,7 @@ def kinds_of(c: FloatArray) -> Kinds:
 
 @inner
 def either(one: Kinds, other: Kinds) -> Kinds:
-    """Return the kinds of terms that one or the other brings in."""
+    """Return the kinds of terms that are in `one` or in `other`."""
     return Kinds(
         one.turning or other.turning, one.stripped or other.stripped, one.raised or other.raised,
         one.crossing or other.crossing, one.bent or other.bent,
@@ -157,7 +170,7 @@ def slope(
     k: Core, kinds: Kinds, damping: float, stiffness: float, moment: float, fin: float, factor: float,
     y: float, p: float, x: float, clock: float,
 ) -> Slope:  # fmt: skip
-    """Return the right-hand side at angle y, rate p and cross state x, `clock` s after the middle of the run, with its slopes."""
+    """Return the right-hand side and its derivatives at angle y, rate p and cross state x, `clock` = t - t_middle in s."""
     floored = max(factor, SMALLEST_SPEED_RATIO)
     drag, log_rate, steep = p * abs(p), 0.0, 2.0 * abs(p)
     if kinds.raised:
@@ -165,15 +178,15 @@ def slope(
         steep = (2.0 + k.beyond_square) * drag / (p if abs(p) > ZERO_RATE_RAD_S else 1.0)
     rate = -damping * p - stiffness * y + moment - k.quadratic * drag + k.cross_share * x
     by_angle, by_rate, by_cross, by_factor = -stiffness, -damping - k.quadratic * steep, k.cross_share, 0.0
-    held, turn, square = k.cross_damping * factor, k.cross_rate * factor * factor, k.cross_quadratic / floored
-    cross = -(held + square * abs(x)) * x - turn * p + k.cross_fin * fin
-    cross_by_rate, cross_by_cross = -turn, -held - 2.0 * square * abs(x)
+    linear, turn, square = k.cross_damping * factor, k.cross_rate * factor * factor, k.cross_quadratic / floored
+    cross = -(linear + square * abs(x)) * x - turn * p + k.cross_fin * fin
+    cross_by_rate, cross_by_cross = -turn, -linear - 2.0 * square * abs(x)
     cross_by_factor = -k.cross_damping * x - 2.0 * factor * k.cross_rate * p + square / floored * x * abs(x)
     sine, cosine, arc, by_turn = 0.0, 1.0, 0.0, 0.0
     if kinds.turning:
-        seen = y - k.heading_turn * clock
-        sine, cosine = sin(seen), cos(seen)
-        arc, sine2, cosine2 = seen - sine, 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
+        z = y - k.heading_turn * clock
+        sine, cosine = sin(z), cos(z)
+        arc, sine2, cosine2 = z - sine, 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
         rate += k.heading_sin * sine + k.heading_cos * cosine + k.heading_sin2 * sine2 + k.heading_cos2 * cosine2
         rate += k.righting_sin * arc + k.righting_cos * (cosine - 1.0)
         tilt = k.heading_sin * cosine - k.heading_cos * sine + 2.0 * (k.heading_sin2 * cosine2 - k.heading_cos2 * sine2)
@@ -207,7 +220,7 @@ def by_constants(
     k: Core, kinds: Kinds, now: Slope, fin: float, factor: float, p: float, x: float, stage: int, of_rate: FloatArray,
     of_cross: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill column `stage` of of_rate and of_cross (C, 4) with the derivatives of p' and x' by each constant that is not nil."""
+    """Fill column `stage` of of_rate and of_cross (C, 4) with the non-zero derivatives of p' and x' by the constants."""
     of_rate[QUADRATIC, stage] = -now.drag
     of_rate[CROSS_SHARE, stage] = x
     of_cross[CROSS_DAMPING, stage] = -factor * x
@@ -227,20 +240,23 @@ def by_constants(
 
 
 @inner
-def surge_slope(u: float, kept: float, drag: float, fin_loss: float, turn_loss: float, fin: float, rate: float) -> float:
-    """Return u' of a vehicle whose thrust keeps a speed: drag a_u (1/m), what fin and turn lose over it (1, m^2)."""
-    return drag * (kept * kept - u * u * (1.0 + fin_loss * fin * fin) - turn_loss * rate * rate)
+def surge_slope(u: float, straight: float, drag: float, fin_loss: float, turn_loss: float, fin: float, rate: float) -> float:
+    """Return u' = drag (straight^2 - u^2 (1 + fin_loss delta^2) - turn_loss r^2).
+
+    The thrust is the one that holds the speed `straight` (m/s) on a straight run; drag in 1/m, turn_loss in m^2.
+    """
+    return drag * (straight * straight - u * u * (1.0 + fin_loss * fin * fin) - turn_loss * rate * rate)
 
 
 @inner
 def power(ratio: float, exponent: float) -> float:
-    """Return a power: a law's are whole but for a fitted one, and a product takes a tenth of the time."""
+    """Return ratio^exponent, the usual exponents 0, 1 and 2 by products: they take a tenth of the time of a power."""
     return 1.0 if exponent == 0.0 else ratio if exponent == 1.0 else ratio * ratio if exponent == 2.0 else ratio**exponent
 
 
 @inner
 def core_at(core: FloatArray, powers: FloatArray, ratio: float, out: FloatArray) -> None:
-    """Fill out (C,) with the constants at a speed over the one that they are of, each with its power of the speed."""
+    """Fill out (C,) with the constants at `ratio` times the speed that `core` (C,) holds at: core_j ratio^powers_j."""
     for j in range(core.shape[0]):
         out[j] = core[j] * power(ratio, powers[j]) if core[j] != 0.0 else 0.0
 
@@ -272,7 +288,7 @@ def crossforce(alpha: float, p: float) -> tuple[float, float, float]:
 
 @inlined
 def power_drag(p: float, beyond: float) -> tuple[float, float]:
-    """Return p|p| (|p|/0.2)^beyond and its logarithmic derivative by `beyond`; both are nil at rest."""
+    """Return p|p| (|p|/0.2)^beyond and its logarithmic derivative by `beyond`, log(|p|/0.2); both are zero at rest."""
     if abs(p) < ZERO_RATE_RAD_S:
         return 0.0, 0.0
     size = log(abs(p) / REFERENCE_RATE_RAD_S)

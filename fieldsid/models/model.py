@@ -29,9 +29,9 @@ KIND = "fieldsid/model"
 class Noise(Brief):
     """Noise of the measurement and of the motion.
 
-    Standard deviations: angle (rad), rate (rad/s), disturbance (rad/s^2, an AR(1) moment of correlation time
-    `disturbance_time` s), of coloured sensor noise with correlation time `coloured_time`, and `own_moment` (rad/s^2) of a
-    constant moment that each run has of its own: its trim is not quite that of the next.
+    Standard deviations of the white angle noise (rad), the white rate noise (rad/s), the disturbance (rad/s^2, an AR(1) moment
+    with the correlation time `disturbance_time`, s), the coloured sensor noise (correlation time `coloured_time`, s), and
+    `own_moment` (rad/s^2): of a constant moment that differs from run to run, because the trim does.
     """
 
     angle: Annotated[Number, Key("Standard deviation of the angle, in rad.", "angle_rad")]
@@ -48,11 +48,11 @@ class Noise(Brief):
 class Model(InControl, Displayed):
     """An identified model.
 
-    `values` holds the base parameters at the law's reference speed and the effects' shared coefficients (SI,
-    rad); `units` theirs; `covariance` (p, p) in the order of `free`, the names that were estimated. `trained`
-    says what the data reached: speed_low, speed_high, fin_max, rate_max (all in SI), and with what t-value `fin_t` they show
-    which way the fin turns, where the authority does not. `own` defines the effects that are not
-    built in, as `models.definition` has it: a model that is read back uses these, whatever the folder it is used in holds.
+    `values` holds the base parameters at the law's reference speed and the effects' shared coefficients (SI, rad), `units` their
+    units, `covariance` (p, p) their covariance in the order of `free`, the names of the estimated ones. `trained` holds the range
+    of the data: speed_low, speed_high, fin_max, rate_max (all in SI); where the authority is not significant also `fin_t`, the
+    t-value with which the data show the sign of the response to the fin. `own` holds the definitions of the effects that are not
+    built in (models/definition.py): a model that is read back uses these and not what the current folder defines.
     """
 
     axis: Axis
@@ -82,12 +82,12 @@ class Model(InControl, Displayed):
         return float(np.sqrt(max(self.covariance[i, i], 0.0)))
 
     def shown(self, name: str) -> str:
-        """Return a parameter's name as it is printed: that of several runs with the speed it belongs to."""
+        """Return a parameter's name as it is printed: with the speed it holds at, like `b2@1.4`, for a model of several runs."""
         at = self.law
         return with_speed(name, self.axis, at.reference, trim_of_fin=at.trim_of_fin) if len(self.runs) > 1 else name
 
     def at_speed(self, speed: float) -> dict[str, float]:
-        """Return the base parameters at a speed by the model's own law."""
+        """Return the base parameters at a speed (m/s) by the model's speed law."""
         names = NAMES[self.axis]
         out = self.base
         out[names.damping] *= self.law.damping_factor(speed)
@@ -145,7 +145,7 @@ def load_model(path: Path) -> Model:
 
 
 def model_of(body: Mapping[str, Any], path: Path) -> Model:
-    """Return the model of a record that `save_model` has written, found in a file; raises ArtifactError as `load_model` does."""
+    """Return the model of a record that `save_model` wrote to a file at `path`; raises ArtifactError as `load_model` does."""
     try:
         law, size = body["speed_law"], len(body["free"])
         model = Model(
@@ -184,7 +184,7 @@ def _or_nan(value: float | None) -> float:
 
 
 def _check_names(model: Model) -> None:
-    """Raise ShapeError where a parameter that a model needs, or says that it estimated, has no value."""
-    lacking = [n for n in (*NAMES[model.axis].base, *model.free) if n not in model.values]
-    if lacking:
-        raise ShapeError(f"no value of `{lacking[0]}` under `parameters`")
+    """Raise ShapeError where a base parameter, or one listed in `free`, has no value."""
+    missing = [n for n in (*NAMES[model.axis].base, *model.free) if n not in model.values]
+    if missing:
+        raise ShapeError(f"no value of `{missing[0]}` under `parameters`")

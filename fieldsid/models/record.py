@@ -1,4 +1,4 @@
-"""One run on one axis, in the form the compiled core takes: samples, weights' masks, fin path and measured helpers."""
+"""One run on one axis, in the form that the compiled core takes: samples, masks, fin path and smoothed helper signals."""
 
 from __future__ import annotations
 
@@ -19,30 +19,30 @@ from fieldsid.logs.run import STEP_LINES, Note, Run
 from fieldsid.logs.segments import no_fin
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.fin_path import FinPath
-from fieldsid.models.helpers.surge import causes_of, surge_behind
+from fieldsid.models.helpers.surge import causes_of, smoothed_surge
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.gcv_smoother import gcv_smooth
 from fieldsid.rounding import beside
 
 SPEED_LIMITS_M_S = (0.05, 50.0)
-"""Speeds between which a vehicle goes through water: below no fin steers, above is another unit."""
+"""Plausible median surge speeds: below the first no fin steers, above the second the log has another unit."""
 ROLES: Mapping[str, str] = MappingProxyType({"surge": "surge_m_s", "thrust": "thrust", "roll": "roll_rad", "depth": "depth_m"})
 THRUST_COLUMNS = ("thrust", "thrust_ratio", "propeller_rpm")
-"""What a log may know of its propeller, the nearest to a force first; a model's numbers are per unit of what its log has."""
+"""Columns that can serve as the thrust, the nearest to a force first; a model's coefficients are per unit of the column used."""
 SHORTEST_TIME_CONSTANT_S = MappingProxyType({"surge": 0.35, "depth": 0.35})
-"""What a role's smoothing passes at most, in s: a hull's inertia lets its speed and depth follow nothing faster."""
+"""Smallest time constant of the smoother by role, in s: a hull's inertia keeps its speed and depth from changing faster."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Record(Brief):
     """Samples (n,) of one run on one axis.
 
-    `fin` is the command held over each interval, or the measured fin, straight between samples (`fin_is_held` tells which);
-    `fin_line` is what it was told or did between them, where the log has that (`logs/convert/clock.py`).
-    Outputs of the motion are `angle`, `rate` and `cross`, the sway (yaw) or heave (pitch) in m/s, as measured, zero where not:
-    `angle_ok`, `rate_ok` and `cross_ok` mark samples that were, spikes left out. `signals` holds inputs without gaps and noise
-    by role (surge, thrust, roll, depth), none of which knows an output; `thrust_column` is the column that the thrust is from,
-    empty where there is none. `speed` is the median of that surge in m/s, NaN when not measured.
+    `fin` is either the fin command, a zero-order hold over each interval (`fin_is_held`), or the measured fin angle, a
+    first-order hold. `fin_line` is the course of the fin between samples, where the log has that (`logs/convert/clock.py`). The
+    outputs are `angle`, `rate` and `cross`, the sway (yaw) or heave (pitch) in m/s, as measured; `angle_ok`, `rate_ok` and
+    `cross_ok` mark the measured samples that are no spikes; an output is zero where it was not measured. `signals` holds the
+    inputs by role (surge, thrust, roll, depth), smoothed and without gaps; no output enters them. `thrust_column` is the column
+    that the thrust was read from, empty where there is none. `speed` is the median of the smoothed surge in m/s, or NaN.
     """
 
     name: str
@@ -61,28 +61,28 @@ class Record(Brief):
     speed: float
     thrust_column: str = ""
     command_lead: FloatArray | None = None
-    """How long before the sample it is first seen at each held command was given, (n,) s, within the steps about it."""
+    """Time from the moment each command was given to the sample that first shows it, (n,) s, at most one step to either side."""
     fin_line: FloatArray | None = None
-    """Start and end of the fin's line over the interval that each sample begins, (2, n) rad, NaN where it is not known."""
+    """Fin angle at the start and the end of the interval that each sample begins, (2, n) rad, NaN where it is not known."""
     refused: Mapping[str, str] = field(default_factory=dict)
-    """Why signals that the log has are not taken, by role."""
+    """Why signals that the log has are not used, by role."""
     goal: FloatArray | None = None
-    """The angle that an autopilot was told to hold, (n,) rad, where the log has it."""
+    """The autopilot's reference for the angle, (n,) rad, where the log has it."""
     steps: FloatArray = field(init=False)
     """Length of each interval, (n-1,) s."""
     longest: float = field(init=False)
-    """The longest of them, in s."""
+    """The longest interval, in s."""
     nominal_steps: FloatArray = field(init=False)
-    """The same, (n-1,) s, but for a clock's jitter: steps near the median are taken as that. For filters that are fast where
-    nothing changes and only say how noise is coloured."""
+    """Length of each interval without the jitter of the clock, (n-1,) s: the median step replaces steps near it. For the Kalman
+    filters, which are fast where the step does not change and need it only for the correlation of the noise."""
     both: FloatArray = field(init=False)
     """Angle and rate, (2, n)."""
     ok: npt.NDArray[np.bool_] = field(init=False)
-    """Where they were measured, (2, n)."""
+    """Where angle and rate were measured, (2, n)."""
     is_whole: bool = field(init=False)
-    """Whether both were measured throughout."""
+    """Whether angle and rate were measured at every sample."""
     missing_fraction: FloatArray | None = field(init=False)
-    """Share of the samples of each interval that the log has lost, (n-1,), None where it has lost none."""
+    """Share of the samples in each interval that are missing from the log, (n-1,), None where none is missing."""
     commanded: FinPath = field(init=False)
     """The fin as logged, as a path over the intervals."""
 
@@ -103,19 +103,19 @@ class Record(Brief):
         return int(self.time.size)
 
     def path_with_lead(self, early: FloatArray) -> FinPath:
-        """Return the path of the fin with its held commands given so much before their samples, (n,) s."""
+        """Return the path of the fin if each command was given `early` (n,) s before the sample that first shows it."""
         return self._path(self.fin, early)
 
     def with_fin(self, fin: FloatArray) -> Record:
-        """Return the record with another fin, (n,) rad, and all else as it is."""
+        """Return the record with another fin, (n,) rad, and nothing else changed."""
         return self._with(fin=fin, fin_line=None, commanded=self._path(fin, self.command_lead))
 
     def with_command_lead(self, early: FloatArray) -> Record:
-        """Return the record with its held commands given so much before their samples, (n,) s, and all else as it is."""
+        """Return the record whose commands were given `early` (n,) s before the samples that first show them."""
         return self._with(command_lead=early, commanded=self._path(self.fin, early))
 
     def at_speed(self, speed: float) -> Record:
-        """Return the record that counts as flown at another speed, in m/s, and all else as it is; itself at its own."""
+        """Return the record with another `speed` in m/s; the record itself where `speed` is its own or not finite."""
         return self if speed == self.speed or not np.isfinite(speed) else self._with(speed=speed)
 
     def _path(self, fin: FloatArray, early: FloatArray | None, line: FloatArray | None = None) -> FinPath:
@@ -125,19 +125,19 @@ class Record(Brief):
         if not self.fin_is_held:
             return FinPath(fin[:-1], fin[1:])
         if early is None:
-            lost = self.missing_fraction
-            return FinPath(fin[:-1], fin[:-1] if lost is None else fin[:-1] + np.diff(fin) * lost)
-        return _jumping(fin, np.clip(early[1:] / self.steps, 0.0, 1.0), np.clip(-early[:-1] / self.steps, 0.0, 1.0))
+            missing = self.missing_fraction
+            return FinPath(fin[:-1], fin[:-1] if missing is None else fin[:-1] + np.diff(fin) * missing)
+        return _stepped_path(fin, np.clip(early[1:] / self.steps, 0.0, 1.0), np.clip(-early[:-1] / self.steps, 0.0, 1.0))
 
     def _with(self, **changes: object) -> Record:
-        """Return a copy with some attributes changed and nothing derived again: a third of the time that `copy` takes."""
+        """Return a copy with some attributes changed and no derived one computed again: a third of the time of `replace`."""
         other = object.__new__(type(self))
         for name in self.__slots__:
             object.__setattr__(other, name, changes[name] if name in changes else getattr(self, name))
         return other
 
     def why_without(self, role: str) -> str:
-        """Return why there is no helper signal of a role, as the end of a sentence that says it is needed."""
+        """Return why the record has no helper signal of a role, as the last clause of a sentence on what needs it."""
         return f"and {self.refused[role]}" if role in self.refused else "which the log lacks"
 
     def __getitem__(self, role: str) -> FloatArray:
@@ -152,10 +152,10 @@ class Record(Brief):
 
 
 def _missing_fraction(steps: FloatArray, regular: npt.NDArray[np.bool_], usual: float) -> FloatArray | None:
-    """Return the share of the samples of each interval that a log of a usual step has lost, (n-1,), None where it has lost none.
+    """Return the share of the samples in each interval that are missing, (n-1,), None where none is or the step is irregular.
 
-    What was commanded meanwhile lies between: where the command goes smoothly on half way, and a jump is as likely before.
-    A log without a usual step has lost nothing that could be told.
+    `usual` is the median step, `regular` marks the steps near it. The command at the missing samples lies between the commands
+    at the interval's ends: half way on average, whether it changed smoothly or jumped at an unknown time.
     """
     if not is_usual(regular):
         return None
@@ -163,29 +163,29 @@ def _missing_fraction(steps: FloatArray, regular: npt.NDArray[np.bool_], usual: 
     return None if (count <= 1.0).all() else 1.0 - 1.0 / np.maximum(count, 1.0)
 
 
-def _jumping(fin: FloatArray, early: FloatArray, late: FloatArray) -> FinPath:
-    """Return the path of a held fin (n,) over intervals: exact mean, and straight within what it passes through.
+def _stepped_path(fin: FloatArray, early: FloatArray, late: FloatArray) -> FinPath:
+    """Return the path of a zero-order-hold command (n,) that changes inside the intervals: lines of exact mean.
 
-    In the last share `command_lead` (n-1,) of an interval the next command holds already, in its first share `late` the one
-    before holds still.
+    The next command already acts in the last share `early` (n-1,) of an interval, the command before still acts in its first
+    share `late` (n-1,). The lines stay between the smallest and the largest command of the interval.
     """
     change = np.diff(fin)
-    past = np.concatenate([[0.0], change[:-1]])
-    mean = fin[:-1] + change * early - past * late
-    half = change * np.minimum(early, 1.0 - early) + past * np.minimum(late, 1.0 - late)
-    first = np.where(late > 0.0, fin[:-1] - past, fin[:-1])
+    previous_change = np.concatenate([[0.0], change[:-1]])
+    mean = fin[:-1] + change * early - previous_change * late
+    half = change * np.minimum(early, 1.0 - early) + previous_change * np.minimum(late, 1.0 - late)
+    first = np.where(late > 0.0, fin[:-1] - previous_change, fin[:-1])
     last = np.where(early > 0.0, fin[1:], fin[:-1])
     return FinPath(mean - half, mean + half, first, last)
 
 
 def first_part(record: Record, samples: int) -> Record:
-    """Return the first samples of a record, with the speed of the whole."""
+    """Return the first samples of a record, with the `speed` of the whole record."""
     part = slice(0, samples)
     early = None if record.command_lead is None else record.command_lead[part]
     goal = None if record.goal is None else record.goal[part]
     line = None if record.fin_line is None else record.fin_line[:, part]
-    own = ("time", "fin", "angle", "rate", "cross", "angle_ok", "rate_ok", "cross_ok")
-    arrays = {name: getattr(record, name)[part] for name in own}
+    required = ("time", "fin", "angle", "rate", "cross", "angle_ok", "rate_ok", "cross_ok")
+    arrays = {name: getattr(record, name)[part] for name in required}
     return replace(
         record,
         **arrays,
@@ -199,9 +199,9 @@ def first_part(record: Record, samples: int) -> Record:
 def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
     """Return the record of a run on an axis.
 
-    fin: "auto" takes the measured fin where the log has one, "command" or "measured" insist. A run whose log hides a move of the
-    fin is cut there, see `logs/doctor/holes.py`. Raises DataError when the fin is missing, or the angle and the rate both are, or
-    those contradict each other.
+    fin: "auto" takes the measured fin where the log has one, else the command; "command" and "measured" take that column only.
+    The run is cut at a gap of the log in which the fin moved, see `logs/doctor/holes.py`. Raises DataError when the fin is
+    missing, when both angle and rate are missing, or when angle and rate contradict each other.
     """
     names = NAMES[axis]
     column = _fin_column(run, axis, fin)
@@ -225,7 +225,7 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
         angle[angle_ok] = np.unwrap(angle[angle_ok])
     angle_ok, rate_ok = _without_spikes(angle, angle_ok), _without_spikes(rate, rate_ok)
     cross_ok = _without_spikes(cross, cross_ok)
-    held = _held_fin(run.signals[column])
+    fin_angle = _without_gaps(run.signals[column])
     thrust_column = next((c for c in THRUST_COLUMNS if run.has(c)), "")
     columns = {**ROLES, "thrust": thrust_column}
     signals = {
@@ -234,13 +234,13 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
         if run.has(c) and role != "surge"
     }
     if knows_speed(run):
-        causes, fastest_s = causes_of(signals.get("thrust"), held), SHORTEST_TIME_CONSTANT_S["surge"]
-        signals["surge"] = surge_behind(run.time, run.signals[ROLES["surge"]], causes, fastest_s=fastest_s)
+        causes, fastest_s = causes_of(signals.get("thrust"), fin_angle), SHORTEST_TIME_CONSTANT_S["surge"]
+        signals["surge"] = smoothed_surge(run.time, run.signals[ROLES["surge"]], causes, fastest_s=fastest_s)
     return Record(
         name=run.name,
         axis=axis,
         time=run.time,
-        fin=held,
+        fin=fin_angle,
         fin_is_held=not measured,
         fin_is_measured=measured,
         angle=angle,
@@ -253,8 +253,8 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
         refused=MappingProxyType({"surge": why} if (why := speed_refused(run)) else {}),
         thrust_column=thrust_column,
         fin_line=np.stack([run[line] for line in STEP_LINES[column]]) if run.has(STEP_LINES[column][0]) else None,
-        goal=_held_fin(run.signals[names.goal]) if run.has(names.goal) else None,
-        # of the smoothed speed: where it swings between two levels, noise would throw the median from one to the other
+        goal=_without_gaps(run.signals[names.goal]) if run.has(names.goal) else None,
+        # of the smoothed surge: where the speed alternates between two levels, noise would decide which of them the median takes
         speed=float(np.median(signals["surge"])) if "surge" in signals else float("nan"),
     )
 
@@ -265,18 +265,18 @@ def _fin_column(run: Run, axis: Axis, fin: str = "auto") -> str:
 
 
 def fin_holes(run: Run, axis: Axis) -> tuple[Note, ...]:
-    """Return what the holes in the log of the fin that `record_of` takes mean for a fit."""
+    """Return notes on the gaps in the fin's log and what they mean for a fit, for the column that `record_of` takes."""
     column = _fin_column(run, axis)
     return hole_notes(run, column) if run.has(column) else ()
 
 
 def knows_speed(run: Run) -> bool:
-    """Whether a run's surge is that of a vehicle under way: sensors that are not fitted are logged as zero."""
+    """Whether a run has a plausible surge speed; a sensor that is not fitted is logged as zero."""
     return run.has(ROLES["surge"]) and speed_beyond(run) is None
 
 
 def speed_beyond(run: Run) -> tuple[float, float] | None:
-    """Return the median (m/s) of a run's surge and the limit (m/s) that it lies beyond; None within both, and without surge."""
+    """Return the median (m/s) of a run's surge and the limit (m/s) that it violates; None within the limits or without surge."""
     if not run.has(ROLES["surge"]):
         return None
     middle, (low, high) = float(np.nanmedian(run[ROLES["surge"]])), SPEED_LIMITS_M_S
@@ -284,7 +284,7 @@ def speed_beyond(run: Run) -> tuple[float, float] | None:
 
 
 def speed_refused(run: Run) -> str:
-    """Return why a run's surge is not taken for its speed, in words; empty where it is, and where there is none."""
+    """Return why a run's surge is not used as its speed, in words; empty where it is used or not logged."""
     beyond = speed_beyond(run)
     if beyond is None:
         return ""
@@ -302,29 +302,29 @@ def _measured(run: Run, name: str) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
 
 
 def _measured_cross(run: Run, name: str) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-    """Return the cross speed and where it was measured: a sensor that is not fitted is logged as one value throughout."""
+    """Return the cross speed and where it was measured: nowhere if it is constant, as a sensor that is not fitted is logged."""
     values, ok = _measured(run, name)
     is_fitted = bool(ok.any()) and float(np.ptp(values[ok])) > 0.0
     return (values, ok) if is_fitted else (np.zeros(len(run)), np.zeros(len(run), dtype=bool))
 
 
 def _without_spikes(values: FloatArray, ok: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Return where a signal was measured, but for a sensor's spikes: squares would follow a few of them before all else."""
+    """Return the mask `ok` without a sensor's spikes, a few of which would dominate a sum of squares."""
     out = ok.copy()
     out[np.flatnonzero(ok)[spikes_of(values[ok]).places]] = False
     return out
 
 
 def left_out(runs: Sequence[Run], axis: Axis) -> tuple[Note, ...]:
-    """Return what a fit on an axis leaves out of some runs: spikes, and what is beside a hole that hides a move of the fin."""
+    """Return notes on the data that a fit on an axis does not use: spikes, and samples at a gap that hides a move of the fin."""
     fitted = (NAMES[axis].angle, NAMES[axis].rate)
-    said = [(r.name, n) for r in runs for n in r.notes if n.code == "spikes" and n.data["signal"] in fitted]
-    spikes = (Note(n.code, f"{name}: {n.message}", {**n.data, "run": name}) for name, n in said)
+    notes = [(r.name, n) for r in runs for n in r.notes if n.code == "spikes" and n.data["signal"] in fitted]
+    spikes = (Note(n.code, f"{name}: {n.message}", {**n.data, "run": name}) for name, n in notes)
     return (*spikes, *(n for r in runs for n in fin_holes(r, axis)))
 
 
-def _held_fin(values: FloatArray) -> FloatArray:
-    """Fill gaps of a command with its last value (the fin stays where it was told to be)."""
+def _without_gaps(values: FloatArray) -> FloatArray:
+    """Return a command with the value before each gap (NaN) held over it; the first value fills a gap at the start."""
     ok = np.isfinite(values)
     index = np.maximum.accumulate(np.where(ok, np.arange(values.size), -1))
     first = int(np.argmax(ok))

@@ -309,7 +309,7 @@ def not_counted(models: Sequence[Model]) -> dict[str, tuple[str, ...]]:
 def _left_out(effect: Effect, model: Model) -> set[str]:
     if effect.stage is Stage.SENSOR:
         return set()
-    own = {c.name for c in effect.every if c.name in model.values}
+    own = {c.name for c in effect.all_coefficients if c.name in model.values}
     if effect.core is not None:
         core = effect.core({EXPONENT: model.law.damping_exponent} | dict(model.values), 1.0)
         return own if any(core[place] for place in OF_ANGLE) else set()

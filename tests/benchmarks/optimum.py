@@ -173,7 +173,7 @@ def from_truth(problem, data):
 
 def shown(problem, x, effect):
     """An effect's shared numbers at x."""
-    own = {c.name for c in effect.every}
+    own = {c.name for c in effect.all_coefficients}
     return {n: float(v) for n, v in zip(problem.layout.names, x, strict=False) if n in own}
 
 

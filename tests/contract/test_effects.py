@@ -110,7 +110,7 @@ def test_everything_a_command_may_print_is_declared(effect):
 @each_effect
 def test_coefficients_have_unit_bounds_and_a_start_between_them(effect):
     assert effect.coefficients
-    for c in effect.every:
+    for c in effect.all_coefficients:
         assert c.unit
         assert c.says
         assert c.low < c.high
@@ -242,7 +242,7 @@ def test_a_sensor_effect_returns_motion(effect):
 def test_moves_carried_through_a_sensor_are_the_slopes_of_what_it_shows(effect):
     log, rng = record(effect.axes[0]), np.random.default_rng(4)
     motion, moves = motion_of(log), rng.standard_normal((3, 2, len(log)))
-    values = {c.name: c.start + 0.1 * (c.high - c.start) for c in effect.every}
+    values = {c.name: c.start + 0.1 * (c.high - c.start) for c in effect.all_coefficients}
     for carried, move in zip(effect.sensor_jvp(moves, motion, values, log), moves, strict=True):
         ends = [effect.measure(Motion(motion.angle + s * move[0], motion.rate + s * move[1]), values, log) for s in (1e-5, -1e-5)]
         slope = np.stack([ends[0].angle - ends[1].angle, ends[0].rate - ends[1].rate]) / 2e-5
@@ -252,7 +252,7 @@ def test_moves_carried_through_a_sensor_are_the_slopes_of_what_it_shows(effect):
 @pytest.mark.parametrize("effect", [e for e in EFFECTS.values() if e.sensor_slope], ids=lambda e: e.name)
 def test_the_slope_by_a_sensors_coefficient_is_that_of_what_it_shows(effect):
     log = record(effect.axes[0])
-    motion, values = motion_of(log), {c.name: c.start + 0.1 * (c.high - c.start) for c in effect.every}
+    motion, values = motion_of(log), {c.name: c.start + 0.1 * (c.high - c.start) for c in effect.all_coefficients}
     for name in effect.names:
         ends = [effect.measure(motion, values | {name: values[name] + s}, log) for s in (1e-5, -1e-5)]
         slope = np.stack([ends[0].angle - ends[1].angle, ends[0].rate - ends[1].rate]) / 2e-5

@@ -167,6 +167,6 @@ def _page(effect: Effect) -> Page:
     )
     rows = tuple(
         (c.name, in_unit(c.unit), f"{c.low:g} .. {c.high:g}", c.says + (" (each run its own)" if c.per_run else ""))
-        for c in effect.every
+        for c in effect.all_coefficients
     )
     return Page("", blocks=(Block("", facts, left=2), Block("", rows, ("coefficient", "unit", "range", "is"), left=4)))

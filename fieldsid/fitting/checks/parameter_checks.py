@@ -69,7 +69,7 @@ def _slope(problem: Problem, solution: Solution, values: Mapping[str, float], er
             "takes that power"
         )
         return Note("slope_at_rest", says, data | {"free": free.value, "std_error": free.std_error, "power": free.power})
-    holding = [e.name.replace("_", " ") for e in problem.layout.effects if e.holds_rate(values)]
+    holding = [e.name.replace("_", " ") for e in problem.layout.effects if e.bounds_rate(values)]
     tail = f"held by {' and '.join(holding)}" if holding else "nothing in the model holds it"
     curve = ", the slope at rest of a curve fitted to turns," if limited or "rate_power" in values else ""
     return Note(

@@ -1,1 +1,1 @@
-"""What a hull does beside the motion of an axis: its surge without noise, its drift law, and drag along its length."""
+"""Helper signals and laws that are estimated from measured speeds: the smoothed surge and the drift law."""

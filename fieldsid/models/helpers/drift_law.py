@@ -1,7 +1,8 @@
-"""How a hull's measured sway or heave follows its turning and its fin, from all runs together: where a fit of it may start.
+"""The drift law: the measured sway or heave v as a lag behind rate r and fin delta, for start values of a fit.
 
-    T v' + v = x r + y delta at the reference speed; at f times that speed T falls with 1/f and y grows with f
-v in m/s, r in rad/s, delta in rad; a start, a constant and what the sensor adds are each run's own. Only measured samples count.
+    T v' + v = x r + y delta at the reference speed; at f times that speed T is divided by f and y multiplied by f
+v in m/s, r in rad/s, delta in rad. T, x and y are common to all runs; the initial state and a constant offset of the sensor are
+estimated for each run. Only measured samples count.
 Source: Fossen 2011, section 7.1 (the linear sway mode of manoeuvring).
 """
 
@@ -29,7 +30,7 @@ class DriftLaw:
 
 
 def reference_speed(records: Sequence[Record]) -> float:
-    """Return the mean speed of some runs in m/s, NaN where one is not known."""
+    """Return the mean speed of some runs in m/s, NaN if the speed of one is not known."""
     return float(np.mean([r.speed for r in records]))
 
 
@@ -41,21 +42,21 @@ def drift_law(records: Sequence[Record], reference: float) -> DriftLaw | None:
     if not seen:
         return None
     lags = np.array([TIME_CONSTANTS_S[0], *TIME_CONSTANTS_S, TIME_CONSTANTS_S[-1]])
-    left = [_fitted(seen, reference, lag)[2] for lag in TIME_CONSTANTS_S.tolist()]
-    near = int(np.argmin(left)) + 1
+    residuals = [_fit_at_lag(seen, reference, lag)[2] for lag in TIME_CONSTANTS_S.tolist()]
+    nearest = int(np.argmin(residuals)) + 1
     best = minimize_scalar(
-        lambda log_lag: _fitted(seen, reference, float(np.exp(log_lag)))[2],
-        bounds=(float(np.log(lags[near - 1])), float(np.log(lags[near + 1]))),
+        lambda log_lag: _fit_at_lag(seen, reference, float(np.exp(log_lag)))[2],
+        bounds=(float(np.log(lags[nearest - 1])), float(np.log(lags[nearest + 1]))),
         method="bounded",
     )
-    lag = float(np.exp(best.x)) if best.fun < left[near - 1] else float(lags[near])
-    per_rate, per_fin, _ = _fitted(seen, reference, lag)
+    lag = float(np.exp(best.x)) if best.fun < residuals[nearest - 1] else float(lags[nearest])
+    per_rate, per_fin, _ = _fit_at_lag(seen, reference, lag)
     return DriftLaw(lag, per_rate, per_fin)
 
 
-def _fitted(records: Sequence[Record], reference: float, lag: float) -> tuple[float, float, float]:
-    """Return x, y and the sum of squares left for one T, each run's own columns projected out of all others."""
-    columns, values = zip(*(_without_own(r, reference, lag) for r in records), strict=True)
+def _fit_at_lag(records: Sequence[Record], reference: float, lag: float) -> tuple[float, float, float]:
+    """Return x, y and the residual sum of squares of the least-squares fit for one T = `lag`."""
+    columns, values = zip(*(_projected_columns(r, reference, lag) for r in records), strict=True)
     matrix, measured = np.concatenate(columns), np.concatenate(values)
     size = np.linalg.norm(matrix, axis=0)
     scale = np.where(size > 0.0, size, 1.0)
@@ -63,20 +64,20 @@ def _fitted(records: Sequence[Record], reference: float, lag: float) -> tuple[fl
     return float(best[0]), float(best[1]), float(np.sum((measured - matrix @ best) ** 2))
 
 
-def _without_own(record: Record, reference: float, lag: float) -> tuple[FloatArray, FloatArray]:
-    """Return a run's columns of x and y (m, 2) and its measured cross speed (m,), its own start and constant projected out."""
+def _projected_columns(record: Record, reference: float, lag: float) -> tuple[FloatArray, FloatArray]:
+    """Return a run's columns of x and y (m, 2) and its measured cross speed (m,), offset and initial state projected out."""
     f = record.speed / reference if record.speed > 0.0 and reference > 0.0 else 1.0
-    time, own_lag, seen = record.time, lag / f, record.cross_ok
+    time, run_lag, seen = record.time, lag / f, record.cross_ok
     rate = (
         np.interp(time, time[record.rate_ok], record.rate[record.rate_ok])
         if record.rate_ok.any()
         else np.gradient(np.interp(time, time[record.angle_ok], record.angle[record.angle_ok]), time)
     )
     if record.fin_is_held:
-        fin = held_first_order_lag(record.fin[:-1], np.exp(-record.steps / own_lag), float(record.fin[0]))
+        fin = held_first_order_lag(record.fin[:-1], np.exp(-record.steps / run_lag), float(record.fin[0]))
     else:
-        fin = first_order_lag(record.steps, record.fin, own_lag)
-    shared = np.column_stack([first_order_lag(record.steps, rate, own_lag), f * fin, record.cross])[seen]
-    own = np.linalg.qr(np.column_stack([np.ones(time.size), np.exp(-(time - time[0]) / own_lag)])[seen])[0]
-    out = shared - own @ (own.T @ shared)
+        fin = first_order_lag(record.steps, record.fin, run_lag)
+    shared = np.column_stack([first_order_lag(record.steps, rate, run_lag), f * fin, record.cross])[seen]
+    nuisance = np.linalg.qr(np.column_stack([np.ones(time.size), np.exp(-(time - time[0]) / run_lag)])[seen])[0]
+    out = shared - nuisance @ (nuisance.T @ shared)
     return out[:, :2], out[:, 2]

@@ -1,10 +1,10 @@
-"""The measured surge without its noise: what thrust and fin have made of it, and what is left smoothed.
+"""The measured surge without its noise: the response to thrust and fin, plus a smooth remainder.
 
-    T u' + u = c thrust + d sqrt(thrust) + f delta^2,   measured: u + a + b t + the rest
-A hull gathers way behind its propeller by a time T, in s, and loses it by the fin's own drag. These are known far better than
-the speed: what follows them need not be smoothed. What it loses by turning is smoothed: the measured rate is an output of the
-motion, and its noise must not come back through an input. Steady speed goes with the root of a thrust and with a propeller's
-speed itself.
+    T u' + u = c thrust + d sqrt(thrust) + f delta^2,   measured surge = u + a + b t + smooth remainder + noise
+The surge follows the propeller with a time constant T (s), and the drag of the fin slows the hull. Thrust and fin are known far
+better than the speed, so that the response to them need not be smoothed. The loss of speed in a turn is in the remainder: the
+measured rate is an output of the motion, and its noise must not enter an input. The steady speed is proportional to the root of
+a thrust, or to the speed of a propeller.
 Source: Fossen 2011, section 6.4 (the surge mode of manoeuvring).
 """
 
@@ -21,10 +21,10 @@ from fieldsid.numerics.gcv_smoother import gcv_smooth
 TIME_CONSTANTS_S = np.geomspace(0.5, 20.0, 12)
 
 
-def surge_behind(time: FloatArray, surge: FloatArray, causes: Sequence[FloatArray], *, fastest_s: float) -> FloatArray:
-    """Return the surge (n,) m/s at times (n,) s without its noise, beside causes (n,) each.
+def smoothed_surge(time: FloatArray, surge: FloatArray, causes: Sequence[FloatArray], *, fastest_s: float) -> FloatArray:
+    """Return the surge (n,) m/s at times (n,) s without its noise.
 
-    T of the smoother is at least fastest_s s.
+    `causes`, (n,) each, drive the surge through a first-order lag. The time constant of the smoother is at least `fastest_s` s.
     """
     steps, since = np.diff(time), time - time[0]
     columns = (
@@ -35,5 +35,5 @@ def surge_behind(time: FloatArray, surge: FloatArray, causes: Sequence[FloatArra
 
 
 def causes_of(thrust: FloatArray | None, fin: FloatArray) -> list[FloatArray]:
-    """Return what may move a hull's surge, (n,) each: of its thrust in any unit and its fin angle."""
+    """Return the signals that may drive the surge, (n,) each: thrust (any unit), its signed root, and the square of the fin."""
     return [*([] if thrust is None else [thrust, np.sqrt(np.abs(thrust)) * np.sign(thrust)]), fin**2]

@@ -150,7 +150,7 @@ def growth_of(base: Base, core: Core) -> float:
 
 
 def _held(model: Model) -> bool:
-    return any(e.holds_rate(model.values) for e in effects_of(model))
+    return any(e.bounds_rate(model.values) for e in effects_of(model))
 
 
 def draws_of(model: Model, count: int, seed: int) -> tuple[Model, ...]:

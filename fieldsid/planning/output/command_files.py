@@ -66,7 +66,7 @@ def check_formats(wanted: Sequence[str]) -> None:
 def table_text(plan: Plan, leg: Leg) -> str:
     """Return a leg's commands as CSV: time, fin about trim (0 while the autopilot steers), 1 while it does; several fins each."""
     time, fin, steered = commands_of(leg, plan.envelope)
-    each = {} if plan.fins is None else dict(zip(plan.fins.names, plan.fins.told(fin).tolist(), strict=True))
+    each = {} if plan.fins is None else dict(zip(plan.fins.names, plan.fins.fin_commands(fin).tolist(), strict=True))
     head = ",".join(["time_s", NAMES[plan.axis].fin, "autopilot", *each])
     told = zip(time.tolist(), fin.tolist(), steered.tolist(), *each.values(), strict=True)
     rows = [",".join([f"{t:.6g}", f"{f:.6g}", f"{s:.0f}", *(f"{v:.6g}" for v in fins)]) for t, f, s, *fins in told]
@@ -82,7 +82,7 @@ def _leg_files(plan: Plan, leg: Leg, stem: Path, chosen: Sequence[str], *, force
         bag = stem.with_name(f"{stem.name}_bag")
         text = conditions_text(plan, leg)
         time, fin, steered = commands_of(leg, plan.envelope)
-        each = {} if plan.fins is None else dict(zip(plan.fins.names, plan.fins.told(fin), strict=True))
+        each = {} if plan.fins is None else dict(zip(plan.fins.names, plan.fins.fin_commands(fin), strict=True))
         commands = {topic: fin, **{f"/{name}_command": values for name, values in each.items()}}
         made.append(write_commands(bag, time, commands, steered, conditions=text, force=force))
     missions = [s for s in styles() if _family(s) in chosen]

@@ -136,7 +136,7 @@ def steps_of(plan: Plan, leg: Leg) -> tuple[Step, ...]:
     time, fin, steered = commands_of(leg, plan.envelope)
     fin = np.where(steered > 0, 0.0, fin)
     changed = (np.diff(fin, prepend=np.nan) != 0) | (np.diff(steered, prepend=np.nan) != 0)
-    each = np.zeros((0, int(changed.sum()))) if plan.fins is None else plan.fins.told(fin[changed])
+    each = np.zeros((0, int(changed.sum()))) if plan.fins is None else plan.fins.fin_commands(fin[changed])
     return tuple(
         Step(round(float(t), 4), round(float(f), 6), bool(s), tuple(np.round(told, 6).tolist()))
         for t, f, s, told in zip(time[changed], fin[changed], steered[changed], each.T, strict=True)

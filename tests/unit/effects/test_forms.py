@@ -186,8 +186,8 @@ def test_a_speed_over_ground_is_taken_through_the_water_where_a_heading_is_measu
     terms = current.terms(values, turned)
     for part, power in (("authority_factor", 2), ("damping_factor", 1), ("cross_factor", 1)):
         np.testing.assert_allclose(getattr(terms, part), run**power)
-    beside, shares = pick_effect("speed_varying"), {"speed_share": 0.8, "damping_share": 0.3}
-    both = current.terms(values | shares, turned).beside(beside.terms(values | shares, turned))
+    speed_varying, shares = pick_effect("speed_varying"), {"speed_share": 0.8, "damping_share": 0.3}
+    both = current.terms(values | shares, turned).combined_with(speed_varying.terms(values | shares, turned))
     water = past / (run * log.speed)  # over the run's own through the water, at which its parameters hold
     np.testing.assert_allclose(both.authority_factor, (run * water**0.8) ** 2)
     np.testing.assert_allclose(both.damping_factor, run * water**0.3)

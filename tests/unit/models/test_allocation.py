@@ -18,7 +18,7 @@ BOAT = {"names": ["port", "stbd"], "to_rudder": [-0.01, 0.01], "limits": [30, 20
 
 
 def test_an_x_tail_moves_each_fin_by_the_rudder_and_the_elevator():
-    assert_allclose(X.told(0.1, 0.05)[:, 0], [0.15, 0.05, -0.05, -0.15])
+    assert_allclose(X.fin_commands(0.1, 0.05)[:, 0], [0.15, 0.05, -0.05, -0.15])
     assert_allclose(X.of("yaw").shares, [1, 1, -1, -1])
     assert_allclose(X.of("pitch").shares, [1, -1, 1, -1])
     assert X.of("yaw").reach == pytest.approx(0.35)
@@ -27,15 +27,15 @@ def test_an_x_tail_moves_each_fin_by_the_rudder_and_the_elevator():
 def test_the_least_fins_that_make_a_command_of_rows_that_are_not_apart():
     """Worked by hand: rows (1, 0) and (1, 1) give fin 1 = rudder, fin 2 = elevator - rudder."""
     fins = Fins(("a", "b"), (1.0, 0.0), (1.0, 1.0), (1.0, 1.0))
-    assert_allclose(fins.told(0.2, 0.5)[:, 0], [0.2, 0.3])
+    assert_allclose(fins.fin_commands(0.2, 0.5)[:, 0], [0.2, 0.3])
     assert_allclose(fins.of("yaw").shares, [1.0, -1.0])
 
 
 @given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
 def test_no_fin_goes_beyond_its_limit_and_the_command_keeps_its_direction(rudder, elevator):
-    told = X.told(rudder, elevator)
-    assert (np.abs(told) <= 0.35 * (1 + 1e-12)).all()
-    back = np.array([v[0] for v in X.made(told)])
+    commands = X.fin_commands(rudder, elevator)
+    assert (np.abs(commands) <= 0.35 * (1 + 1e-12)).all()
+    back = np.array([v[0] for v in X.rudder_and_elevator(commands)])
     share = min(1.0, 0.35 / max(abs(rudder) + abs(elevator), 1e-300))
     assert_allclose(back, [rudder * share, elevator * share], atol=1e-12)
 
@@ -46,7 +46,7 @@ def test_thrusters_of_unequal_limits_reach_as_far_as_the_weaker():
     assert_allclose(fins.shares, [-50.0, 50.0])
     assert vehicle.rudder_max_rad == pytest.approx(0.4)  # 20 N at 50 N a rad
     assert vehicle.fin_max_rad("pitch") is None
-    assert_allclose(fins.told([0.4, 0.8]), [[-20.0, -20.0], [20.0, 20.0]])
+    assert_allclose(fins.fin_commands([0.4, 0.8]), [[-20.0, -20.0], [20.0, 20.0]])
 
 
 def test_a_stated_limit_below_the_fins_reach_stays():
