@@ -1,1 +1,1 @@
-"""From parameters to a simulated motion: the compiled kernels and what they are fed."""
+"""From parameters to a simulated motion: the compiled kernels and their inputs."""

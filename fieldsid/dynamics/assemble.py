@@ -1,6 +1,6 @@
-"""From parameters to the arrays the compiled core takes: the actuator before it, the sensor after it.
+"""The input arrays of the compiled core from a model's parameters, with the actuator effects before it and the sensor after it.
 
-One code path for effects present and absent: every hook of every effect is applied in its stage's order.
+Every hook of every effect is applied in the order of the stages; a model without effects takes the same path.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
 MAX_RATE_STEP_PRODUCT = 0.3
-"""Largest product of step and fastest linear rate of one RK4 piece (relative error below 3e-5 of a step)."""
+"""Largest product of the length of an RK4 step and the fastest linear rate in it (relative error below 3e-5 a step)."""
 MOMENT = (MOMENT_START, MOMENT_END)
 NO_CORE, NO_TERMS = Core(), Terms()
 MAX_MOMENT_ITERATIONS = 30
@@ -31,9 +31,9 @@ MOMENT_TOLERANCE = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Base:
-    """Base parameters at a run's own speed: damping (1/s), stiffness (1/s^2), authority (1/s^2), trim (rad/s^2).
+    """Base parameters at the speed of a run: damping (1/s), stiffness (1/s^2), authority (1/s^2), trim (rad/s^2).
 
-    `trim_of_fin`: the trim is an offset of the fin, so that a change of the authority within a run changes it too.
+    `trim_of_fin`: the trim is an offset of the fin, so that it changes with the authority within a run.
     """
 
     damping: float
@@ -45,7 +45,7 @@ class Base:
 
 @dataclass(frozen=True, slots=True)
 class KernelInputs:
-    """Arrays of the core: drive (n-1, 6), constants (C,), pieces per interval; what they came from: fin path, terms, core."""
+    """The core's inputs: drive (n-1, 6), constants (C,), RK4 steps per interval; and their sources: fin path, terms, core."""
 
     drive: FloatArray
     constants: FloatArray
@@ -56,7 +56,7 @@ class KernelInputs:
 
 
 def fin_path(record: Record, effects: Sequence[Effect], values: Values, commanded: FinPath | None = None) -> FinPath:
-    """Return the fin angle over the intervals after the actuator effects, in their order, of the log's or another command."""
+    """Return the path of the fin angle: that of the log, or of another command, after all actuator effects in their order."""
     path = record.commanded if commanded is None else commanded
     for effect in in_order(effects):
         if effect.fin is not None:
@@ -65,9 +65,9 @@ def fin_path(record: Record, effects: Sequence[Effect], values: Values, commande
 
 
 def in_order(effects: Sequence[Effect]) -> list[Effect]:
-    """Return the actuator effects in the order that the command goes through them."""
-    own = [e for e in effects if e.fin is not None]
-    return own if len(own) < 2 else sorted(own, key=attrgetter("order"))
+    """Return the actuator effects in the order in which the command passes through them."""
+    actuators = [e for e in effects if e.fin is not None]
+    return actuators if len(actuators) < 2 else sorted(actuators, key=attrgetter("order"))
 
 
 def combined_terms(record: Record, effects: Sequence[Effect], values: Values) -> Terms:
@@ -76,13 +76,13 @@ def combined_terms(record: Record, effects: Sequence[Effect], values: Values) ->
 
 
 def combined_core(effects: Sequence[Effect], values: Values, scale: float) -> Core:
-    """Return the sum of the effects' coefficients in the core; scale is the run's speed over the model's reference speed."""
-    own = [effect.core(values, scale) for effect in effects if effect.core is not None]
-    return reduce(Core.plus, own) if own else NO_CORE
+    """Return the sum of the effects' constants of the core; scale is the run's speed over the model's reference speed."""
+    cores = [effect.core(values, scale) for effect in effects if effect.core is not None]
+    return reduce(Core.plus, cores) if cores else NO_CORE
 
 
 def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Values, scale: float) -> KernelInputs:
-    """Return the core's arrays for one run; scale is the run's speed over the model's reference speed."""
+    """Return the core's inputs for one run; scale is the run's speed over the model's reference speed."""
     fin = fin_path(record, effects, values)
     terms = combined_terms(record, effects, values)
     core = combined_core(effects, values, scale)
@@ -96,13 +96,13 @@ def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Valu
 
 
 def damping_of(base: Base, terms: Terms) -> FloatArray | float:
-    """Return the damping over each interval, (n-1,), or the one it is over all."""
+    """Return the damping (1/s) over each interval, (n-1,), or one number where it is constant."""
     damping = base.damping if terms.damping_factor is None else base.damping * over_intervals(terms.damping_factor)
     return damping if terms.damping is None else damping + over_intervals(terms.damping)
 
 
 def moments_of(base: Base, fin: FinPath, terms: Terms) -> tuple[FloatArray, FloatArray]:
-    """Return the moment at both ends of each interval, (n-1,) each."""
+    """Return the moment (rad/s^2) at the start and the end of each interval, (n-1,) each."""
     start, end = (base.authority * side for side in scaled_fin(fin, terms))
     if base.trim_of_fin and terms.authority_factor is not None:
         trim = base.trim * terms.authority_factor
@@ -113,12 +113,12 @@ def moments_of(base: Base, fin: FinPath, terms: Terms) -> tuple[FloatArray, Floa
 
 
 def cross_factor_of(terms: Terms) -> FloatArray | float:
-    """Return the speed over the run's own in the cross state's equation over each interval, (n-1,), or 1."""
+    """Return g of the cross state's equation, the speed over the run's speed, over each interval, (n-1,), or 1."""
     return 1.0 if terms.cross_factor is None else over_intervals(terms.cross_factor)
 
 
 def scaled_fin(fin: FinPath, terms: Terms) -> tuple[FloatArray, FloatArray]:
-    """Return fin angle times the authority factor at both ends of each interval, (n-1,) each."""
+    """Return fin angle times authority factor at the start and the end of each interval, (n-1,) each."""
     if terms.authority_factor is None:
         return fin.start, fin.end
     return fin.start * terms.authority_factor[:-1], fin.end * terms.authority_factor[1:]
@@ -134,13 +134,13 @@ def integrate_record(record: Record, assembled: KernelInputs, start: FloatArray)
 def with_moments(
     record: Record, assembled: KernelInputs, effects: Sequence[Effect], values: Values, start: FloatArray
 ) -> KernelInputs:
-    """Return the arrays with every state-dependent moment the core does not know, iterated to convergence.
+    """Return the inputs with the state-dependent moments that the core does not compute, iterated to convergence.
 
-    Quasilinearisation: m(y, p) is replaced by its value and slopes along the last trajectory, the slopes joining
-    the held stiffness and damping; at the fixed point the slopes cancel (Bellman and Kalaba 1965).
+    Quasilinearisation: m(y, p) is linearised about the last trajectory, with its slopes added to stiffness and damping, which are
+    constant over an interval; at the fixed point the linear terms cancel (Bellman and Kalaba 1965).
     """
-    own = [e for e in effects if e.moment is not None]
-    if not own:
+    with_moment = [e for e in effects if e.moment is not None]
+    if not with_moment:
         return assembled
     path = integrate_record(record, assembled, start)
     current = assembled
@@ -148,7 +148,7 @@ def with_moments(
         if not np.isfinite(path).all():
             return current
         drive = assembled.drive.copy()
-        for effect in own:
+        for effect in with_moment:
             _add_moment(drive, effect, Motion(path[:, 0], path[:, 1]), values, record)
         current = replace(assembled, drive=drive, pieces=_pieces(record, drive[:, DAMPING], drive[:, STIFFNESS], assembled.core))
         new = integrate_record(record, current, start)
@@ -160,7 +160,7 @@ def with_moments(
 
 
 def measured(motion: Motion, record: Record, effects: Sequence[Effect], values: Values) -> Motion:
-    """Return what the sensors show of a motion."""
+    """Return the motion as the sensors measure it, after all sensor effects."""
     for effect in effects:
         if effect.measure is not None:
             motion = effect.measure(motion, values, record)
@@ -188,7 +188,7 @@ def _add_moment(drive: FloatArray, effect: Effect, motion: Motion, values: Value
 
 
 def pieces_for(step: float, *rates: float) -> int:
-    """Return the RK4 pieces of an interval of `step` s whose dynamics have these rates (1/s)."""
+    """Return the number of RK4 steps for an interval of `step` s whose dynamics have these rates (1/s)."""
     return ceil(min(max(1.0, step * max(rates) / MAX_RATE_STEP_PRODUCT), MAX_PIECES))
 
 
@@ -198,5 +198,5 @@ def _pieces(record: Record, damping: FloatArray | float, stiffness: FloatArray |
 
 
 def _largest(values: FloatArray | float) -> float:
-    """Return the largest size of values, or of one."""
+    """Return the largest absolute value of an array or a number."""
     return max(float(values.max()), -float(values.min())) if isinstance(values, np.ndarray) else abs(values)

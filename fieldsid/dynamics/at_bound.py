@@ -1,4 +1,4 @@
-"""Which coefficients of a model stand on a bound: what is estimated there is no minimum, and has no standard error."""
+"""The coefficients of a model that lie on a bound: such an estimate is no stationary point and has no standard error."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from fieldsid.models.model import Model
 
 
 def at_bound(model: Model) -> frozenset[str]:
-    """Return the names of the coefficients that a model has on a bound of theirs; of an effect not known here none are."""
+    """Return the names of the coefficients that lie on one of their bounds; none if an effect of the model is not known here."""
     try:
-        every = [c for effect in effects_of(model) for c in effect.shared]
+        coefficients = [c for effect in effects_of(model) for c in effect.shared]
     except (EffectError, ModelError):
         return frozenset()
-    return frozenset(c.name for c in every if is_on_bound(model.values[c.name], c.low, c.high))
+    return frozenset(c.name for c in coefficients if is_on_bound(model.values[c.name], c.low, c.high))

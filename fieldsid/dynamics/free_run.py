@@ -1,4 +1,4 @@
-"""Free-run simulation of a model along a record's fin: the model's own prediction, sensor effects included."""
+"""Free-run simulation of a model from the fin and the inputs of a record, with the sensor effects."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from fieldsid.models.model import Model
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
-OF_LAW = "damping_exponent"
+LAW_PARAMETER = "damping_exponent"
 """The parameter of the speed law that a model of runs at several speeds has among its values."""
 LIMITING_EFFECT = "quadratic_damping"
-"""The effect that holds a rate which the damping alone lets grow."""
+"""The effect that bounds a rate which grows under the linear damping."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,33 +35,33 @@ class Trajectory:
 
 
 def effects_of(model: Model) -> tuple[Effect, ...]:
-    """Return the effects that a model holds, in the forms it was fitted in.
+    """Return the effects of a model, in the variants that it was fitted with.
 
-    Raises EffectError for one not known here or not in this form, ModelError where the model does not give a coefficient of one.
+    Raises EffectError for an effect or a variant that is not known here, ModelError where the value of a coefficient is missing.
     """
-    held = tuple(as_fitted(effect_held(name, model.own), model.values) for name in model.effects)
-    known = {*NAMES[model.axis].base, OF_LAW, *(c.name for e in held for c in e.shared)}
-    strange = [n for n in model.values if n not in known and "@" not in n]
-    for effect in held:
-        lacking = [c.name for c in effect.shared if c.name not in model.values]
-        if strange:
-            without = f", without `{lacking[0]}`" if lacking else ""
+    effects = tuple(as_fitted(effect_held(name, model.own), model.values) for name in model.effects)
+    known = {*NAMES[model.axis].base, LAW_PARAMETER, *(c.name for e in effects for c in e.shared)}
+    unknown = [n for n in model.values if n not in known and "@" not in n]
+    for effect in effects:
+        missing = [c.name for c in effect.shared if c.name not in model.values]
+        if unknown:
+            without = f", without `{missing[0]}`" if missing else ""
             raise EffectError(
-                f"the model holds `{effect.name}` in a form that is no longer known: with `{strange[0]}`{without}",
+                f"the model holds `{effect.name}` in a form that is no longer known: with `{unknown[0]}`{without}",
                 found=", ".join(model.values),
                 hint=f"identify again: `sysid identify RUN... --axis {model.axis.value} --effects {','.join(model.effects)}`",
             )
-        if lacking:
+        if missing:
             raise ModelError(
-                f"the model holds `{effect.name}`, and no value of its `{lacking[0]}`",
+                f"the model holds `{effect.name}`, and no value of its `{missing[0]}`",
                 found=", ".join(model.values),
-                hint=f"add `{lacking[0]}` under `parameters` of its file, or identify again",
+                hint=f"add `{missing[0]}` under `parameters` of its file, or identify again",
             )
-    return held
+    return effects
 
 
 def base_at(model: Model, speed: float) -> Base:
-    """Return the model's base parameters at a speed."""
+    """Return the model's base parameters at a speed (m/s)."""
     names = NAMES[model.axis]
     v = model.at_speed(speed)
     stiffness = 0.0 if names.stiffness is None else v[names.stiffness]
@@ -69,7 +69,7 @@ def base_at(model: Model, speed: float) -> Base:
 
 
 def growing_hint(model: Model) -> str:
-    """Return what helps where a model grows without bound: the damping that holds it, where it has none."""
+    """Return the hint of the error for a motion that grows without bound: add the limiting effect where the model lacks it."""
     if LIMITING_EFFECT in model.effects:
         return "the model is unstable there: identify again, from runs that reach as far"
     effects = ",".join((*model.effects, LIMITING_EFFECT))
@@ -84,10 +84,10 @@ def simulate(
     nuisance: Mapping[str, float] = MappingProxyType({}),
     effects: tuple[Effect, ...] | None = None,
 ) -> Trajectory:
-    """Return the free run of a model along a record.
+    """Return the free run of a model from the fin and the inputs of a record.
 
-    state is the initial (angle rad, rate rad/s, cross state); by default the first measured angle and rate.
-    nuisance holds per-run coefficients (wave phase, event time); the coefficients' start values fill the rest.
+    state is the initial (angle rad, rate rad/s, cross state); by default the first measured angle and rate and zero.
+    nuisance holds the per-run coefficients (wave phase, event time); those it lacks have their start values.
     Raises DivergenceError when the motion grows without bound.
     """
     parts = effects_of(model) if effects is None else effects
@@ -100,10 +100,10 @@ def simulate(
             0.0,
         )
     start = np.array(state, dtype=np.float64)
-    counted = record.at_speed(model.law.effective(record.speed))
-    arrays = assemble(counted, parts, base_at(model, record.speed), values, model.law.scale(record.speed))
-    arrays = with_moments(record, arrays, parts, values, start)
-    out = integrate_record(record, arrays, start)
+    at_law_speed = record.at_speed(model.law.effective(record.speed))
+    inputs = assemble(at_law_speed, parts, base_at(model, record.speed), values, model.law.scale(record.speed))
+    inputs = with_moments(record, inputs, parts, values, start)
+    out = integrate_record(record, inputs, start)
     if not np.isfinite(out).all():
         at = float(record.time[np.argmin(np.isfinite(out[:, 1]))])
         raise DivergenceError(
@@ -111,9 +111,9 @@ def simulate(
             found=f"diverged at t = {at:.2f} s",
             hint=growing_hint(model),
         )
-    shown = measured(Motion(out[:, 0], out[:, 1]), record, parts, values)
-    fin = np.append(arrays.fin.start, arrays.fin.end[-1])
-    return Trajectory(record.time, shown.angle, shown.rate, out[:, 2], fin)
+    motion = measured(Motion(out[:, 0], out[:, 1]), record, parts, values)
+    fin = np.append(inputs.fin.start, inputs.fin.end[-1])
+    return Trajectory(record.time, motion.angle, motion.rate, out[:, 2], fin)
 
 
 def command_record(
@@ -126,13 +126,13 @@ def command_record(
     name: str = "command",
     measures: bool = False,
 ) -> Record:
-    """Return a record made of a held fin command alone, time (n,) s and fin (n,) rad, at a speed in m/s.
+    """Return a record of a zero-order-hold fin command without measurements, time (n,) s and fin (n,) rad, at a speed in m/s.
 
-    Helper roles that are not given are filled as on a steady straight run: surge at `speed`, the rest zero. `measures` marks both
-    sensors as measuring, zero throughout.
+    Signals that are not given are those of a steady straight run: surge at `speed`, all others zero. `measures` marks angle and
+    rate as measured; both are zero throughout.
     """
     t = np.ascontiguousarray(time, dtype=np.float64)
-    seen = np.full(t.size, measures)
+    is_measured = np.full(t.size, measures)
     steady = {role: np.zeros(t.size) for role in ("thrust", "roll", "depth")} | {"surge": np.full(t.size, speed)}
     return Record(
         name=name,
@@ -143,8 +143,8 @@ def command_record(
         fin_is_measured=False,
         angle=np.zeros(t.size),
         rate=np.zeros(t.size),
-        angle_ok=seen,
-        rate_ok=seen,
+        angle_ok=is_measured,
+        rate_ok=is_measured,
         cross=np.zeros(t.size),
         cross_ok=np.zeros(t.size, dtype=bool),
         signals=MappingProxyType(steady | dict(signals)),

@@ -1,4 +1,4 @@
-"""A vehicle's motion and its tangents: by the linear core where the motion is linear on an even clock, else by the general one.
+"""A vehicle's motion and its sensitivities: by the linear kernel for a linear motion at equal steps, else by the nonlinear one.
 
 The equations, drives and constants are those of models/hull.py.
 """
@@ -13,7 +13,7 @@ from fieldsid.numerics.arrays import FloatArray, IntArray
 def integrate_motion(
     steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, out: FloatArray
 ) -> None:
-    """Fill out (n, 3) with angle, rate and cross state; a diverged motion is NaN from there on.
+    """Fill out (n, 3) with angle, rate and cross state; from the sample at which the motion diverges on they are NaN.
 
     steps (n-1,) s, drive (n-1, 6) in the order of DRIVES, c (C,) in that of CONSTANTS (models/hull.py), start (3,).
     """
@@ -35,10 +35,10 @@ def integrate_with_sensitivities(
     out: FloatArray,
     sens: FloatArray,
 ) -> None:
-    """Fill out (n, 3) and sens (P, 2, n): derivatives of angle and rate by P parameters.
+    """Fill out (n, 3) with the motion and sens (P, 2, n) with the derivatives of angle and rate by P parameters.
 
-    A parameter's derivative of a drive is factor (P, 6) times the row of columns (C, n-1) that place (P, 6) says.
-    d_c (P, C) are those of the constants, d_start (P, 3) those of the initial state.
+    The derivative of drive l by parameter j is factor[j, l] times the row place[j, l] of columns (K, n-1); factor and place are
+    (P, 6). d_c (P, C) are the derivatives of the constants, d_start (P, 3) those of the initial state.
     """
     if not linear_sensitivities(steps, drive, c, start, pieces, columns, place, factor, d_c, d_start, out, sens):
         nonlinear_sensitivities(steps, drive, c, start, pieces, columns, place, factor, d_c, d_start, out, sens)

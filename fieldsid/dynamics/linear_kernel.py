@@ -1,8 +1,8 @@
-"""The compiled core of a linear motion: its free run and tangents, and the base model's normal equations without either.
+"""The compiled kernel of a linear motion: its free run with sensitivities, and the normal equations of the base model.
 
-    y' = p,  p' = -a p - k y + m(t),  m straight from the start of an interval to its end; the base model's is b delta + C
-With a and k constant the RK4 map of dynamics/integrate.py over an interval is a matrix: it is computed once for a step
-length, with its derivatives by a and k, and applied to every sample. Same numbers as the general core, in a third of the time.
+    y' = p,  p' = -a p - k y + m(t),  m linear over an interval; in the base model m = b delta + C
+With a and k constant the RK4 map of an interval is a matrix. It is computed once for a step length, with its derivatives by
+a and k, and applied to every sample: the numbers of the nonlinear kernel in a third of the time.
 """
 
 from __future__ import annotations
@@ -16,22 +16,25 @@ from fieldsid.numerics.jit import inner, jit
 LINEAR_PARAMETERS = ("damping", "stiffness", "authority", "trim", "angle0", "rate0")
 STEP_TOLERANCE = 1e-9
 DIVERGED_RATE_RAD_S = 1e4
-"""rad/s from which on a motion counts as one without bound."""
+"""A motion counts as diverged from this rate on."""
 FEWEST_INTERVALS = 16
-"""Intervals below which working the map out costs more than it saves."""
+"""Number of intervals below which computing the matrix takes more time than it saves."""
 
 
 @inner
 def _slope(a: float, k: float, z: FloatArray, moment: float, out: FloatArray) -> None:
-    """Fill out (6,) with the derivative of (y, p) and of its tangents by a and by k."""
+    """Fill out (6,) with the time derivatives of (y, p) and of its sensitivities to a and k."""
     out[0], out[1] = z[1], -a * z[1] - k * z[0] + moment
     out[2], out[3] = z[3], -a * z[3] - k * z[2] - z[1]
     out[4], out[5] = z[5], -a * z[5] - k * z[4] - z[0]
 
 
 @inner
-def _unit_response(a: float, k: float, h: float, pieces: int, unit: int, z: FloatArray, room: FloatArray) -> None:
-    """Fill z (6,) with what a unit of y (0), p (1), or of the moment at the start (2) or end (3) becomes over h."""
+def _unit_response(a: float, k: float, h: float, pieces: int, unit: int, z: FloatArray, work: FloatArray) -> None:
+    """Fill z (6,) with (y, p) and its sensitivities to a and k after h s, from one unit of input.
+
+    `unit` selects the input: y (0) or p (1) at the start, or the moment at the start (2) or the end (3). work (5, 6) is scratch.
+    """
     z[:] = 0.0
     if unit < 2:
         z[unit] = 1.0
@@ -42,15 +45,15 @@ def _unit_response(a: float, k: float, h: float, pieces: int, unit: int, z: Floa
             reach = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
             part = (piece + reach) / pieces
             for l in range(6):
-                room[4, l] = z[l] + (reach * s * room[stage - 1, l] if stage > 0 else 0.0)
-            _slope(a, k, room[4], m0 + (m1 - m0) * part, room[stage])
+                work[4, l] = z[l] + (reach * s * work[stage - 1, l] if stage > 0 else 0.0)
+            _slope(a, k, work[4], m0 + (m1 - m0) * part, work[stage])
         for l in range(6):
-            z[l] += s / 6.0 * (room[0, l] + 2.0 * room[1, l] + 2.0 * room[2, l] + room[3, l])
+            z[l] += s / 6.0 * (work[0, l] + 2.0 * work[1, l] + 2.0 * work[2, l] + work[3, l])
 
 
 @inner
 def _small(value: float) -> float:
-    """Return zero for what is too small to matter: numbers below the normal ones cost eightfold."""
+    """Return the value, zero where it is negligible: arithmetic with subnormal numbers takes eight times as long."""
     return 0.0 if abs(value) < 1e-150 else value
 
 
@@ -72,43 +75,43 @@ def set_all_diverged(sens: FloatArray, first: int) -> None:
 
 @inner
 def is_linear(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray) -> bool:
-    """Whether a motion is linear in (y, p) alone, and goes by even intervals."""
+    """Whether a motion is linear with y and p as its only states, at equal intervals."""
     return not kinds_of(c).bent and start[2] == 0.0 and is_even(steps, drive)
 
 
 @inner
 def is_even(steps: FloatArray, drive: FloatArray) -> bool:
-    """Whether steps (n-1,), damping and stiffness, the first two of the drives (n-1, 6), are alike over many intervals."""
+    """Whether steps (n-1,) and the damping and stiffness of drive (n-1, 6) are constant over FEWEST_INTERVALS or more."""
     if steps.shape[0] < FEWEST_INTERVALS:
         return False
     for i in range(steps.shape[0]):
-        alike = drive[i, DAMPING] == drive[0, DAMPING] and drive[i, STIFFNESS] == drive[0, STIFFNESS]
-        if not alike or abs(steps[i] - steps[0]) > STEP_TOLERANCE * steps[0]:
+        equal = drive[i, DAMPING] == drive[0, DAMPING] and drive[i, STIFFNESS] == drive[0, STIFFNESS]
+        if not equal or abs(steps[i] - steps[0]) > STEP_TOLERANCE * steps[0]:
             return False
     return True
 
 
 @inner
-def _responses(a: float, k: float, h: float, pieces: int, u: FloatArray, room: FloatArray) -> None:
-    """Fill u (4, 6) with what units of y, p, and of the moment at both ends become over h, and its tangents by a and k."""
+def _responses(a: float, k: float, h: float, pieces: int, u: FloatArray, work: FloatArray) -> None:
+    """Fill u (4, 6) with the four responses of `_unit_response`: to y, p, and the moment at the start and the end."""
     for unit in range(4):
-        _unit_response(a, k, h, pieces, unit, u[unit], room)
+        _unit_response(a, k, h, pieces, unit, u[unit], work)
 
 
 @jit
 def linear_motion(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, out: FloatArray) -> bool:
-    """Fill out (n, 3) as `integrate.integrate_motion` does where the motion is linear and even; return whether it is."""
+    """Fill out (n, 3) as `integrate.integrate_motion` does if the motion is linear at equal steps; return whether it is."""
     if not is_linear(steps, drive, c, start):
         return False
-    u, room = np.zeros((4, 6)), np.zeros((5, 6))
-    _responses(drive[0, 0], drive[0, 1], steps[0], pieces, u, room)
+    u, work = np.zeros((4, 6)), np.zeros((5, 6))
+    _responses(drive[0, 0], drive[0, 1], steps[0], pieces, u, work)
     _move(u, drive, start, out)
     return True
 
 
 @inner
 def _move(u: FloatArray, drive: FloatArray, start: FloatArray, out: FloatArray) -> int:
-    """Fill out (n, 3) by the responses of an interval; return the samples before the motion diverges."""
+    """Fill out (n, 3) by the responses u (4, 6) of an interval; return the number of samples before the motion diverges."""
     y, p = start[0], start[1]
     out[0, 0], out[0, 1], out[0, 2] = y, p, 0.0
     for i in range(drive.shape[0]):
@@ -126,9 +129,9 @@ def linear_sensitivities(
     steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, columns: FloatArray, place: IntArray,
     factor: FloatArray, d_c: FloatArray, d_start: FloatArray, out: FloatArray, sens: FloatArray,
 ) -> bool:  # fmt: skip
-    """Fill out (n, 3) and sens (P, 2, n) as `integrate.integrate_with_sensitivities` does where all is linear and even.
+    """Fill out (n, 3) and sens (P, 2, n) as `integrate.integrate_with_sensitivities` does, for a linear motion at equal steps.
 
-    Return whether it is.
+    Return whether the motion is linear, has equal steps, and no parameter moves a constant or the initial cross state.
     """
     bent = 0.0
     for j in range(d_c.shape[0]):
@@ -137,22 +140,22 @@ def linear_sensitivities(
             bent += abs(d_c[j, l])
     if bent != 0.0 or not is_linear(steps, drive, c, start):
         return False
-    u, room = np.zeros((4, 6)), np.zeros((5, 6))
-    _responses(drive[0, 0], drive[0, 1], steps[0], pieces, u, room)
-    whole = _move(u, drive, start, out)
+    u, work = np.zeros((4, 6)), np.zeros((5, 6))
+    _responses(drive[0, 0], drive[0, 1], steps[0], pieces, u, work)
+    samples = _move(u, drive, start, out)
     for j in range(place.shape[0]):
         y, p = d_start[j, 0], d_start[j, 1]
         f_a, f_k, f_0, f_1 = factor[j, 0], factor[j, 1], factor[j, 2], factor[j, 3]
         of_a, of_k, of_0, of_1 = columns[place[j, 0]], columns[place[j, 1]], columns[place[j, 2]], columns[place[j, 3]]
-        turned, pushed = f_a != 0.0 or f_k != 0.0, f_0 != 0.0 or f_1 != 0.0
+        moves_a_or_k, moves_moment = f_a != 0.0 or f_k != 0.0, f_0 != 0.0 or f_1 != 0.0
         sens[j, 0, 0], sens[j, 1, 0] = y, p
-        for i in range(whole - 1):
+        for i in range(samples - 1):
             to_y, to_p = u[0, 0] * y + u[1, 0] * p, u[0, 1] * y + u[1, 1] * p
-            if pushed:
+            if moves_moment:
                 m0, m1 = f_0 * of_0[i], f_1 * of_1[i]
                 to_y += u[2, 0] * m0 + u[3, 0] * m1
                 to_p += u[2, 1] * m0 + u[3, 1] * m1
-            if turned:
+            if moves_a_or_k:
                 a, k, at_y, at_p, m0, m1 = f_a * of_a[i], f_k * of_k[i], out[i, 0], out[i, 1], drive[i, 2], drive[i, 3]
                 to_y += a * (u[0, 2] * at_y + u[1, 2] * at_p + u[2, 2] * m0 + u[3, 2] * m1)
                 to_p += a * (u[0, 3] * at_y + u[1, 3] * at_p + u[2, 3] * m0 + u[3, 3] * m1)
@@ -160,7 +163,7 @@ def linear_sensitivities(
                 to_p += k * (u[0, 5] * at_y + u[1, 5] * at_p + u[2, 5] * m0 + u[3, 5] * m1)
             y, p = _small(to_y), _small(to_p)
             sens[j, 0, i + 1], sens[j, 1, i + 1] = y, p
-    set_all_diverged(sens, whole)
+    set_all_diverged(sens, samples)
     return True
 
 
@@ -174,15 +177,15 @@ def accumulate_normal_equations(  # noqa: C901  (one loop over the samples: a ca
     pieces: int,
     square: FloatArray,
 ) -> None:
-    """Add products of the weighted residual and its six sensitivities to square (8, 7).
+    """Add the normal equations of a run to square (8, 7): products of the weighted residual and its six sensitivities.
 
-    fin (2, n-1) holds the fin at both ends of each interval, measured (2, n) angle and rate, weight (2, n) one over
-    their noise, zero where not measured; base (6,) is in the order of PARAMETERS. Row 0 and column 0 are the residual;
-    square[7, :2] takes the unweighted sums of squares of both channels.
+    fin (2, n-1) is the fin angle at the start and end of each interval, measured (2, n) angle and rate, weight (2, n) one over
+    their noise, zero where not measured; base (6,) is in the order of LINEAR_PARAMETERS. Row 0 and column 0 are the residual;
+    square[7, :2] are the unweighted sums of squares of angle and rate.
     """
     n = steps.shape[0] + 1
     a, k, b, c, y, p = base[0], base[1], base[2], base[3], base[4], base[5]
-    u, room = np.zeros((4, 6)), np.zeros((5, 6))
+    u, work = np.zeros((4, 6)), np.zeros((5, 6))
     s = np.zeros((6, 2))
     s[4, 0] = s[5, 1] = 1.0
     row = np.zeros(7)
@@ -205,7 +208,7 @@ def accumulate_normal_equations(  # noqa: C901  (one loop over the samples: a ca
         h = steps[i]
         if abs(h - last) > STEP_TOLERANCE * h:
             last = h
-            _responses(a, k, h, pieces, u, room)
+            _responses(a, k, h, pieces, u, work)
         d0, d1 = fin[0, i], fin[1, i]
         m0, m1 = b * d0 + c, b * d1 + c
         for j in range(6):

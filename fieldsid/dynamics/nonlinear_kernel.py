@@ -1,7 +1,7 @@
-"""The compiled core of any motion: the equations of models/hull.py by RK4 over each interval, with exact tangents of that map.
+"""The compiled kernel of any motion: the equations of models/hull.py by RK4, with the exact derivatives of the discrete map.
 
-Damping, stiffness, the fin and the cross factor are held over an interval; the moment runs straight from its start to its end.
-The tangents are the derivatives of the discrete map itself, so a least-squares step has no truncation error of its own.
+Damping, stiffness, fin and cross factor are constant over an interval; the moment is linear from its start to its end. A tangent
+is the derivative of the state by one parameter: that of the RK4 map itself, so that the gradient is exact for the simulation.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from fieldsid.numerics.jit import inlined, inner, jit
 
 SMALLEST_WEIGHT = 1e-150
 MAX_PIECES = 200
-"""The most RK4 steps of an interval, and those that the motion is ahead of its tangents by: see `nonlinear_sensitivities`."""
+"""The largest number of RK4 steps in an interval, and the length of a block of steps, see `nonlinear_sensitivities`."""
 BY_ANGLE, BY_RATE, BY_CROSS, BY_FACTOR, CROSS_BY_RATE, CROSS_BY_CROSS, CROSS_BY_FACTOR, AT_ANGLE, AT_RATE, PART, STEP = range(11)
-"""What is kept of each stage of a step: the slopes, see `Slope`; angle, rate, the share of the interval that has passed; h."""
+"""Rows of the table of a step's stages: the derivatives of `Slope`; angle and rate; the elapsed share of the interval; h."""
 OF_DRIVES, OF_CONSTANTS = 3, 9
-"""Where in a step's linear map the columns of the drives and of the constants begin, after those of the state."""
+"""First columns of the drives and of the constants in a step's linear map; the first three columns are those of the state."""
 
 
 @inner
@@ -45,13 +45,13 @@ def _weight(stage: int) -> float:
 
 @inner
 def _reach(stage: int) -> float:
-    """Return the part of a step at which a stage is taken."""
+    """Return the share of a step at which a stage of the RK4 rule is evaluated."""
     return 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
 
 
 @inner
 def _total(steps: FloatArray) -> float:
-    """Return the sum of steps; a loop compiles in a fraction of what an array's method takes."""
+    """Return the sum of steps; this loop compiles in a fraction of the time of the array method."""
     total = 0.0
     for i in range(steps.shape[0]):
         total += steps[i]
@@ -62,7 +62,7 @@ def _total(steps: FloatArray) -> float:
 def over_interval(
     k: Core, kinds: Kinds, drive: FloatArray, i: int, step: float, pieces: int, late: float, state: tuple[float, float, float]
 ) -> tuple[float, float, float]:
-    """Return angle, rate and cross state after the interval of a drive's row i (n-1, 6), `late` s after the run's middle."""
+    """Return angle, rate and cross state after interval i of drive (n-1, 6), which begins `late` s after the run's middle."""
     y, p, x = state
     h, a, b, fast, fin = step / pieces, drive[i, DAMPING], drive[i, STIFFNESS], drive[i, CROSS_FACTOR], drive[i, FIN]
     first, last = drive[i, MOMENT_START], drive[i, MOMENT_END]
@@ -82,7 +82,7 @@ def over_interval(
 def nonlinear_motion(
     steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, out: FloatArray
 ) -> None:
-    """Fill out (n, 3) as `integrate.integrate_motion` does, whatever the motion and the clock."""
+    """Fill out (n, 3) as `integrate.integrate_motion` does, for any motion and any steps."""
     state = (start[0], start[1], start[2])
     out[0, 0], out[0, 1], out[0, 2] = state
     k, kinds, late = named(c), kinds_of(c), -0.5 * _total(steps)
@@ -97,7 +97,7 @@ def nonlinear_motion(
 
 @inlined
 def _keep(now: Slope, y: float, p: float, part: float, h: float, stage: int, at: int, kept: FloatArray) -> None:
-    """Fill kept (11, 4, m) with what a stage of step `at` gives to the step's linear map."""
+    """Fill kept (11, 4, m) with the values of one stage of step `at` from which its linear map is computed."""
     kept[BY_ANGLE, stage, at], kept[BY_RATE, stage, at], kept[BY_CROSS, stage, at] = now.by_angle, now.by_rate, now.by_cross
     kept[BY_FACTOR, stage, at], kept[CROSS_BY_FACTOR, stage, at] = now.by_factor, now.cross_by_factor
     kept[CROSS_BY_RATE, stage, at], kept[CROSS_BY_CROSS, stage, at] = now.cross_by_rate, now.cross_by_cross
@@ -108,17 +108,17 @@ def _keep(now: Slope, y: float, p: float, part: float, h: float, stage: int, at:
 def _map_row(
     row: int, count: int, cross_fin: float, kept: FloatArray, push: FloatArray, pull: FloatArray, maps: FloatArray
 ) -> None:
-    """Fill one row of the linear maps of `count` steps: maps (3, 9 + K, m) of the state and the drives.
+    """Fill one row of the linear maps of `count` steps: maps (3, 9 + K, m), the columns of the state and the drives.
 
     A tangent obeys s' = A_l s + b u_l at stage l of the step, so that s -> s + sum_l W_l (A_l s + b u_l) with
     W_4 = h/6, W_3 = h/3 + h W_4 A_4, W_2 = h/3 + h/2 W_3 A_3, W_1 = h/6 + h/2 W_2 A_2: the same for every parameter.
-    push and pull (4, m) are what each stage's p' and x' weigh.
+    push and pull (4, m) receive the weights of p' and x' at each stage.
     """
     in_y, in_p, in_x = 1.0 * (row == 0), 1.0 * (row == 1), 1.0 * (row == 2)
-    for at in range(count):  # in arrays of known shape, with no branch: the processor does four steps at once
+    for at in range(count):  # arrays of known shape and no branch, so that the compiler vectorises over four steps
         of_y, of_p, of_x = in_y, in_p, in_x
         v_y, v_p, v_x, reach = 0.0, 0.0, 0.0, 0.0
-        whole, end, turned, stiffened, of_cross, by_factor = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        total, end, turned, stiffened, of_cross, by_factor = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for back in range(4):
             l = 3 - back
             h = kept[STEP, l, at]
@@ -127,13 +127,13 @@ def _map_row(
             v_y, v_p = w_p * kept[BY_ANGLE, l, at], w_y + w_p * kept[BY_RATE, l, at] + w_x * kept[CROSS_BY_RATE, l, at]
             v_x = w_p * kept[BY_CROSS, l, at] + w_x * kept[CROSS_BY_CROSS, l, at]
             of_y, of_p, of_x = of_y + v_y, of_p + v_p, of_x + v_x
-            whole, end, of_cross = whole + w_p, end + w_p * kept[PART, l, at], of_cross + w_x
+            total, end, of_cross = total + w_p, end + w_p * kept[PART, l, at], of_cross + w_x
             turned, stiffened = turned - w_p * kept[AT_RATE, l, at], stiffened - w_p * kept[AT_ANGLE, l, at]
             by_factor += w_p * kept[BY_FACTOR, l, at] + w_x * kept[CROSS_BY_FACTOR, l, at]
             push[l, at], pull[l, at] = w_p, w_x
             reach = _reach(l) * h
         maps[row, 0, at], maps[row, 1, at], maps[row, 2, at] = of_y, of_p, of_x
-        maps[row, OF_DRIVES + MOMENT_START, at], maps[row, OF_DRIVES + MOMENT_END, at] = whole - end, end
+        maps[row, OF_DRIVES + MOMENT_START, at], maps[row, OF_DRIVES + MOMENT_END, at] = total - end, end
         maps[row, OF_DRIVES + DAMPING, at], maps[row, OF_DRIVES + STIFFNESS, at] = turned, stiffened
         maps[row, OF_DRIVES + FIN, at], maps[row, OF_DRIVES + CROSS_FACTOR, at] = cross_fin * of_cross, by_factor
 
@@ -142,7 +142,7 @@ def _map_row(
 def _map_constants(
     row: int, count: int, of_rate: FloatArray, of_cross: FloatArray, push: FloatArray, pull: FloatArray, maps: FloatArray
 ) -> None:
-    """Fill in the same row what a step makes of the state per unit of each of the K constants, with slopes (K, 4, m)."""
+    """Fill the columns of the K constants in the same row; of_rate, of_cross (K, 4, m): derivatives of p', x' by them."""
     for l in range(of_rate.shape[0]):
         for at in range(count):
             total = 0.0
@@ -153,7 +153,7 @@ def _map_constants(
 
 @inner
 def _moved_constants(d_c: FloatArray) -> IntArray:
-    """Return the places of the constants that any parameter moves; d_c (P, C)."""
+    """Return the places of the constants that depend on any parameter; d_c (P, C) are their derivatives."""
     places, count = np.zeros(d_c.shape[1], dtype=np.intp), 0
     for l in range(d_c.shape[1]):
         size = 0.0
@@ -167,7 +167,7 @@ def _moved_constants(d_c: FloatArray) -> IntArray:
 
 @inner
 def _all_kinds(c: FloatArray, start: FloatArray, d_c: FloatArray, d_start: FloatArray) -> tuple[Kinds, bool]:
-    """Return the kinds of terms that the constants or a parameter bring in, and whether there is a cross state."""
+    """Return the kinds of terms that the constants, or their derivatives, bring in, and whether there is a cross state."""
     kinds = kinds_of(c)
     crossing = start[2] != 0.0
     for j in range(d_c.shape[0]):
@@ -181,12 +181,12 @@ def _force(
     size: int, count: int, maps: FloatArray, given: FloatArray, place: IntArray, factor: FloatArray, d_c: FloatArray,
     moved: IntArray, force: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill force (3, m) with what `count` steps add to the `size` numbers of a parameter's tangent."""
+    """Fill force (3, m) with the direct contribution of a parameter to its tangent, of `size` components, in `count` steps."""
     for row in range(size):
         for at in range(count):
             force[row, at] = 0.0
         for l in range(moved.shape[0]):
-            by = d_c[moved[l]]  # out of the loop: for all that the compiler knows it is of the force's array
+            by = d_c[moved[l]]  # out of the loop: the compiler cannot know that d_c and force do not overlap
             if by != 0.0:
                 for at in range(count):
                     force[row, at] += by * maps[row, OF_CONSTANTS + l, at]
@@ -199,7 +199,7 @@ def _force(
 
 @inlined
 def _carry(pieces: int, count: int, maps: FloatArray, force: FloatArray, s: FloatArray, sens: FloatArray, first: int) -> None:
-    """Carry a parameter's tangent s (3,) over `count` intervals by the maps of their steps, into sens (2, n) after `first`."""
+    """Advance a parameter's tangent s (3,) over `count` intervals by the steps' maps; fill sens (2, n) after sample `first`."""
     y, p, x = s[0], s[1], s[2]
     for i in range(count):
         for piece in range(pieces):
@@ -210,7 +210,7 @@ def _carry(pieces: int, count: int, maps: FloatArray, force: FloatArray, s: Floa
                 (maps[2, 0, at] * y + maps[2, 1, at] * p) + (maps[2, 2, at] * x + force[2, at]),
             )
         sens[0, first + i + 1], sens[1, first + i + 1] = y, p
-    # a start's influence dies out; below the normal numbers it would only cost time, eightfold
+    # the influence of the initial state dies out; arithmetic with subnormal numbers would take eight times as long
     s[0] = y if abs(y) > SMALLEST_WEIGHT else 0.0
     s[1] = p if abs(p) > SMALLEST_WEIGHT else 0.0
     s[2] = x if abs(x) > SMALLEST_WEIGHT else 0.0
@@ -221,10 +221,11 @@ def nonlinear_sensitivities(
     steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, columns: FloatArray, place: IntArray,
     factor: FloatArray, d_c: FloatArray, d_start: FloatArray, out: FloatArray, sens: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill out (n, 3) and sens (P, 2, n) as `integrate.integrate_with_sensitivities` does, whatever the motion and the clock.
+    """Fill out (n, 3) and sens (P, 2, n) as `integrate.integrate_with_sensitivities` does, for any motion and any steps.
 
-    All parameters go through one linear map a step, see `_map_row`. The motion goes ahead by a block of steps, whose maps are
-    worked out four abreast; then each parameter goes through the block, and writes along its own memory.
+    One linear map a step, see `_map_row`, serves the tangents of all parameters. The motion is computed for a block of steps, the
+    maps of the block are computed by vector instructions, then each parameter's tangent is advanced through the whole block, so
+    that its results are written to consecutive memory.
     """
     s, moved, m = d_start.copy(), _moved_constants(d_c), MAX_PIECES
     count, size, more = s.shape[0], d_c.shape[1], moved.shape[0]

@@ -1,4 +1,4 @@
-"""The equations of motion (models/hull.py) of many vehicles at rest: their derivative on a straight run, their root in a turn."""
+"""Equilibria of the equations of motion (models/hull.py) of many vehicles: derivatives on a straight run, the rate in a turn."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import inner, jit
 
 STRAIGHT = ("damping", "stiffness", "cross_damping", "moment_of_rate", "moment_of_fin")
-"""What a linear plant is made of besides what the base model gives: the last two are what rate and fin add to the moment of the
-cross state, 1/s^2 for each second and 1/s^3."""
+"""The quantities that effects add to the linear plant of the base model. The last two are the derivatives of c x' (c x is the
+moment of the cross state) by rate, with a minus, in 1/s^2, and by fin, in 1/s^3."""
 
 
 MAX_RATE_RAD_S = 20.0
-"""rad/s; a rate that would be above is no steady turn but an unstable model."""
+"""rad/s; where the equilibrium rate would be above, the model is unstable and has no steady turn."""
 MAX_ITERATIONS, DIGITS = 200, 1e-14
-"""Newton's method has one root between its bounds, and halves them where it leaves them."""
+"""Limits of Newton's method: iterations, and the relative step at which it ends. It bisects where a step leaves the bracket."""
 
 
 @jit
 def straight_slopes(cores: FloatArray) -> FloatArray:
-    """Return the columns of STRAIGHT (5, d) that the constants (d, C) of vehicles make, at rest on a straight run."""
+    """Return the quantities of STRAIGHT, (5, d), for vehicles with the constants cores (d, C) on a straight run."""
     out = np.zeros((5, cores.shape[0]))
     for i in range(cores.shape[0]):
         now = slope(named(cores[i]), kinds_of(cores[i]), 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
@@ -32,7 +32,7 @@ def straight_slopes(cores: FloatArray) -> FloatArray:
 
 @inner
 def _settled(k: Core, kinds: Kinds, damping: float, moment: float, fin: float, rate: float, x: float) -> tuple[float, Slope]:
-    """Return the cross state that a steady rate leads to, from a near one, with the right-hand side there; x' falls with x."""
+    """Return the equilibrium cross state at a steady rate, and the right-hand side there; x is the start of Newton's method."""
     now = slope(k, kinds, damping, 0.0, moment, fin, 1.0, 0.0, rate, x, 0.0)
     for _ in range(MAX_ITERATIONS):
         if now.cross_by_cross == 0.0:
@@ -47,7 +47,7 @@ def _settled(k: Core, kinds: Kinds, damping: float, moment: float, fin: float, r
 
 @inner
 def between(at: float, places: FloatArray, values: FloatArray) -> float:
-    """Return the value at a place between rising ones, held beyond them; zero without any."""
+    """Return the linear interpolation at `at` of values (r,) at rising places (r,), constant beyond them; zero if r = 0."""
     if places.size == 0:
         return 0.0
     above = min(max(int(np.searchsorted(places, at)), 1), places.size - 1)
@@ -60,10 +60,10 @@ def settled_rates(
     cores: FloatArray, damping: FloatArray, moment: FloatArray, fin: FloatArray, side: float, rates: FloatArray,
     moments: FloatArray, out: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill out (m,) with the steady rate toward `side` of m vehicles, the root of their equations, NaN where there is none.
+    """Fill out (m,) with the steady rate of m vehicles in a turn toward `side` (+1 or -1), NaN where there is none.
 
-    cores (m, C), damping, moment and fin (m,); moments (n, r) rad/s^2 at rates (r,) come on top, the first of them for the
-    first vehicle and again for the one that follows the last of them, none where they are empty.
+    cores (m, C), damping, moment and fin (m,). The moments (n, r) rad/s^2 at the rates (r,) are added to p': row i modulo n is
+    that of vehicle i; r may be zero.
     """
     for i in range(out.size):
         k, kinds, x = named(cores[i]), kinds_of(cores[i]), 0.0
@@ -72,7 +72,7 @@ def settled_rates(
         for count in range(MAX_ITERATIONS):
             x, now = _settled(k, kinds, damping[i], moment[i], fin[i], side * rate, x)
             surplus = side * (now.rate + between(side * rate, rates, moments[i % moments.shape[0]]))
-            if count == 0:  # at the upper bound, where a turn that settles has none left
+            if count == 0:  # at the upper bound, where the surplus moment of a turn that settles is negative
                 if not surplus < 0.0:
                     break
                 rate = 0.0
