@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from fieldsid.effects._user_file import travelled
+from fieldsid.effects._user_file import effect_of_definition
 from fieldsid.errors import EffectError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import REGISTRY, Effect, effect_named, shared_name
@@ -12,7 +12,7 @@ from fieldsid.registry import add, forget, members
 
 
 def all_effects(axis: Axis | None = None) -> dict[str, Effect]:
-    """Return every known effect by name, or those of one axis: built in, plug-ins (entry points), the user's own."""
+    """Return the known effects of an axis, or of both, by name: built in, of plug-ins (entry points), and the user's own."""
     return {n: e for n, e in members(REGISTRY, "EFFECT").items() if axis is None or axis in e.axes}
 
 
@@ -25,15 +25,15 @@ def pick_effect(name: str) -> Effect:
 
 
 def define(text: str, file: str) -> Effect:
-    """Return the effect that a model's own definition gives, see `models.definition`; raises EffectError."""
-    return travelled(text, file)
+    """Return the effect of a definition that a model keeps, see models/definition.py; raises EffectError."""
+    return effect_of_definition(text, file)
 
 
 def add_effects(effects: Iterable[Effect]) -> None:
-    """Make a user's own effects known by name for the rest of the process.
+    """Register a user's own effects by name for the rest of the process.
 
-    Adding the same file again replaces it. Raises EffectError where the name is taken by another effect, or
-    a coefficient's name on the same axis: a model keeps all coefficients in one table.
+    Adding the same file again replaces its effect. Raises EffectError where another effect has the same name, or an effect of the
+    same axis has a coefficient of the same name: a model keeps all coefficients in one table.
     """
     for effect in effects:
         refuse_clash(effect, all_effects().values())
@@ -41,12 +41,12 @@ def add_effects(effects: Iterable[Effect]) -> None:
 
 
 def forget_effects() -> None:
-    """Forget the user's own effects, so that only the built-in ones and the plug-ins are known."""
+    """Remove the user's own effects from the registry; the built-in ones and those of plug-ins stay."""
     forget(REGISTRY)
 
 
 def refuse_clash(effect: Effect, others: Iterable[Effect]) -> None:
-    """Raise EffectError where an effect has the name of another one, or a coefficient's name that keeps them out of one model."""
+    """Raise EffectError where another effect has the same name, or one of the same axis a coefficient of the same name."""
     for other in others:
         if other.name == effect.name and other.origin != effect.origin:
             raise EffectError(
@@ -62,15 +62,18 @@ def refuse_clash(effect: Effect, others: Iterable[Effect]) -> None:
             )
 
 
-def apart_from(effects: Iterable[Effect], held: Sequence[Effect]) -> tuple[list[Effect], dict[str, str]]:
-    """Return effects that can be in one model, those that it holds for their namesakes, and why each other one cannot."""
-    own, kept, clashes = {e.name: e for e in held}, list(held), {}
+def apart_from(effects: Iterable[Effect], of_model: Sequence[Effect]) -> tuple[list[Effect], dict[str, str]]:
+    """Return the effects that can be together in one model, in their order, and by name why each of the others cannot.
+
+    An effect of the model replaces the one of the same name.
+    """
+    names, compatible, clashes = {e.name for e in of_model}, list(of_model), {}
     order = list(effects)
     for effect in order:
-        taken = next(((other.name, name) for other in kept if (name := shared_name(effect, other))), None)
+        taken = next(((other.name, name) for other in compatible if (name := shared_name(effect, other))), None)
         if taken:
             clashes[effect.name] = f"`{effect.name}` has a coefficient `{taken[1]}`, as effect `{taken[0]}` has"
-        elif effect.name not in own:
-            kept.append(effect)
+        elif effect.name not in names:
+            compatible.append(effect)
     places = {e.name: i for i, e in enumerate(order)}
-    return sorted(kept, key=lambda e: places.get(e.name, len(places))), clashes
+    return sorted(compatible, key=lambda e: places.get(e.name, len(places))), clashes

@@ -1,17 +1,18 @@
 """The hidden cross state that sway and heave share: x' = -cross_damping f x - cross_rate f^2 r, f = (speed/reference)^p.
 
-A run starts from x = -(cross_rate / cross_damping) f r0, where a steady rate r0 before it had led to: each run's own
-number (`rate_before` in fitting/problem/parameters.py). No motion within that rate leaves x further from zero.
-In its other forms it has a power of the speed of its own, and drag that grows with the square of the cross speed,
+A run starts from x = -(cross_rate / cross_damping) f r0, the equilibrium at a steady rate r0 before the run; r0 is estimated for
+each run (`rate_before` in fitting/problem/parameters.py). A rate that never exceeded |r0| cannot have brought x further from
+zero. In one variant p is a coefficient (cross_exponent) and not the exponent of the damping. In another the drag is quadratic in
+the cross speed as well,
     x' = -cross_damping f x - (cross_quadratic / f) x|x| - cross_rate f^2 r + cross_fin f^3 delta
-With x = -a21 v, a21 ~ f: the drag D v|v| becomes D/|a21| x|x|. Then the fin's own lift no longer drops out of the
-transfer function. Or the drag is that of the cross flow v + l r at every place l along the hull of length L: x/f is v/L itself
-in rad/s (times 1 1/s), and with F and G of models/hull.py, uniform strips,
+With x = -a21 v, a21 ~ f, the drag D v|v| becomes D/|a21| x|x|, and the side force of the fin no longer drops out of the transfer
+function. In a third the drag is that of the cross flow v + l r at every place l along the hull of length L: x/f is v/L in rad/s
+(times 1 1/s), and with F and G of models/hull.py, for uniform strips,
     p' += strip_munk x - strip_drag F(v/L, p),   (v/L)' = ... - 32 strip_drag strip_inertia G(v/L, p)
-    strip_drag = rho Cd T L^4 / (64 I),   strip_inertia = I/(m L^2),   I and m with their added parts.
-The drift to the other side, with cross_rate, cross_fin and strip_munk the other way, is the same motion.
-Of a slender hull the drag is about 0.3 Cd L/T and the share of inertia 0.03 to 0.06. Where v is measured, its drift law gives
-start values; the motion never takes the measurement itself.
+    strip_drag = rho Cd T L^4 / (64 I),   strip_inertia = I/(m L^2),   I and m including added inertia and mass.
+Changing the signs of x, cross_rate, cross_fin and strip_munk together leaves the motion as it is.
+For a slender hull strip_drag is about 0.3 Cd L/T and strip_inertia 0.03 to 0.06. Where v is measured, its drift law gives start
+values; the measured v is an output and never an input of the motion.
 Source: Prestero 2001, table of coefficients (the cross flow Yvv is most of a torpedo's sway drag); Fossen 2011, sections 6.4.3
 and 7.1.
 """
@@ -28,9 +29,9 @@ from fieldsid.numerics.arrays import FloatArray
 
 
 def coefficients(cross: str, builds_up: str) -> tuple[Coefficient, ...]:
-    """Return the two numbers of a cross state, `cross` its name and builds_up what drives it and where to, in words.
+    """Return the coefficients cross_damping and cross_rate; `cross` names the speed, builds_up says in words what drives it.
 
-    A state slower than ten seconds cannot be distinguished from a drift in runs of a minute.
+    The lower bound of cross_damping is 0.1 1/s: a slower state cannot be distinguished from a drift in runs of a minute.
     """
     return (
         Coefficient(
@@ -67,11 +68,11 @@ STRIP_INERTIA = Coefficient("strip_inertia", "1", 0.0, 1.0 / 12.0, 0.04, step=1e
 STRIP_MUNK = Coefficient("strip_munk", "1/s", -50.0, 50.0, 0.0, step=1e-3, says="moment per drift speed over length")
 MUNK_POWER = Coefficient("munk_exponent", "1", -1.0, 6.0, 2.0, step=1e-3, says="power of the speed its moment goes with")
 RATE_OVER_DAMPING = 0.2
-"""Start of cross_rate over the square of a measured cross_damping: as the scan's over the square of the hull's own rate."""
+"""Start value of cross_rate over the square of a measured cross_damping, as large as the scan's over the hull's rate squared."""
 
 
 def measured_starts(records: Sequence[Record], _residuals: Sequence[FloatArray]) -> list[dict[str, float]]:
-    """Return the damping that the measured cross speed shows, the moment to either side; none where none is measured."""
+    """Return start values: the damping of the measured drift law, with a moment of either sign; none if v is not measured."""
     law = drift_law(records, reference_speed(records))
     if law is None:
         return []
@@ -80,9 +81,9 @@ def measured_starts(records: Sequence[Record], _residuals: Sequence[FloatArray])
 
 
 def _strip_starts(records: Sequence[Record], residuals: Sequence[FloatArray]) -> list[dict[str, float]]:
-    """Return starts of a hull that the cross flow holds: half of speed over length is what turns its path into drift."""
-    rest = {"strip_inertia": STRIP_INERTIA.start, "strip_munk": 0.0, "cross_fin": 0.0, "cross_damping": 0.2}
-    return [rest | {"cross_rate": rate, "strip_drag": drag} for rate in (0.2, 0.6, 1.5) for drag in (2.0, 6.0)]
+    """Return start values for a hull with cross-flow drag; cross_rate is of the order of half the speed over the length."""
+    common = {"strip_inertia": STRIP_INERTIA.start, "strip_munk": 0.0, "cross_fin": 0.0, "cross_damping": 0.2}
+    return [common | {"cross_rate": rate, "strip_drag": drag} for rate in (0.2, 0.6, 1.5) for drag in (2.0, 6.0)]
 
 
 FORMS = (
@@ -101,7 +102,7 @@ FORMS = (
 
 
 def core(values: Values, scale: float) -> Core:
-    """Return the core's coefficients at `scale` times the reference speed; p is the damping's where it has none of its own."""
+    """Return the core's constants at `scale` times the reference speed; without cross_exponent p is the damping's exponent."""
     lift = scale ** values.get("cross_exponent", values.get("damping_exponent", 1.0))
     coupling = scale ** values["munk_exponent"] if "munk_exponent" in values else lift**2
     state = Core(

@@ -1,7 +1,7 @@
-"""A user's moment as an expression over the signals: parsed to a tree that may hold arithmetic only, never executed as code.
+"""A user's moment as an expression of the signals: parsed to a tree of arithmetic only, never executed as code.
 
-Python's own grammar is read (`ast`), and every node that is not a number, a known name, + - * / ** or a listed function
-is refused with its place. Evaluation walks the tree over arrays.
+The text is parsed by Python's grammar (`ast`). Every node that is not a number, a known name, + - * / ** or a listed function
+is refused, and the error shows its place. Evaluation walks the tree over arrays.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Expression:
 
 
 def parse(text: str, known: Collection[str]) -> Expression:
-    """Return the expression in the names of `known`; raises EffectError showing the place."""
+    """Return the parsed expression, whose names must be in `known`; raises EffectError showing the place of the fault."""
     text = text.strip()
     if not text or len(text) > LONGEST:
         raise EffectError(
@@ -67,13 +67,13 @@ def parse(text: str, known: Collection[str]) -> Expression:
 
 
 def _check(text: str, node: ast.expr, known: Collection[str], names: set[str]) -> None:
-    """Refuse whatever is not arithmetic, and collect the names that are used."""
+    """Raise EffectError for a node that is not arithmetic, and add the names that are used to `names`."""
     if isinstance(node, ast.Constant):
         _check_number(text, node)
     elif isinstance(node, ast.Name):
         if node.id not in known:
-            bare = node.id in FUNCTIONS
-            what = f"`{node.id}` is a function and needs (...)" if bare else f"there is no signal or coefficient `{node.id}`"
+            is_call = node.id in FUNCTIONS
+            what = f"`{node.id}` is a function and needs (...)" if is_call else f"there is no signal or coefficient `{node.id}`"
             raise _at(text, node.col_offset, what, near(node.id, tuple(known)))
         names.add(node.id)
     elif isinstance(node, ast.BinOp):

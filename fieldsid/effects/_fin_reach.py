@@ -1,7 +1,7 @@
-"""Start values of angles that are edges of the fin: shares of the largest angle that was commanded.
+"""Start values of a fin angle at which a static map has a corner: shares of the largest angle that was commanded.
 
-An edge is seen only where the fin has been beyond it, and a vehicle that trims with 3 degrees has other edges than one that
-steers with 30.
+A corner shows only in data where the fin was beyond it, and a vehicle that steers with 3 degrees has it at other angles than
+one that steers with 30.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from fieldsid.numerics.arrays import FloatArray
 
 
 def shares_of_reach(coefficient: Coefficient, shares: Sequence[float]) -> Callable[..., list[dict[str, float]]]:
-    """Return the hook that suggests a coefficient (rad) at these shares of the largest angle, within its bounds."""
+    """Return the hook `initial_guesses` of a coefficient (rad): these shares of the largest fin angle, within its bounds."""
 
     def initial_guesses(records: Sequence[Record], _residuals: Sequence[FloatArray]) -> list[dict[str, float]]:
         reach = max(float(np.abs(r.fin).max()) for r in records)

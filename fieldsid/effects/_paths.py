@@ -1,9 +1,10 @@
-"""Paths through the fin's gear, interval by interval: straight lines for the hull, the pieces behind them for the gear.
+"""Paths of the fin through a chain of actuator effects: one line an interval for the hull, straight pieces for the next effect.
 
-The area under the path moves the hull, so a line has the path's exact mean and, as slope, its first moment; where the path
-bends or jumps the line's ends pass it. The next part of the gear must not see that: a play would remember angles that never
-were, a stall answer to them. It sees the path rebuilt from its ends, mean and moment: held, straight and held again, which
-a delayed, a limited, a freed fin is exactly between two held commands, or straight, bent and straight, as a lagged one nearly.
+The hull responds to the area under the path. A line therefore has the path's exact mean and first moment; where the path bends
+or jumps, the ends of the line lie outside the path. The next actuator effect must not see these ends: a play would remember
+angles that the fin never had, and a stall would respond to them. For it the path is rebuilt from its ends, mean and first
+moment as constant, linear, constant, which is exact for a delay, a rate limit or a play between two zero-order-hold commands,
+or as two lines with a corner, which approximates a lag.
 """
 
 from __future__ import annotations
@@ -17,17 +18,17 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import inner, jit
 
 Part = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], object]
-"""(steps, start, end, out): fills out (k, 4) with a line's start and end, and where the fin itself begins and ends."""
+"""An actuator effect (steps, start, end, out): fills out (k, 4) with start and end of the lines, first and last fin angle."""
 STRAIGHT_RAD = 1e-6
-"""Below this change over an interval a map is taken as straight; the mean is then wrong by less than 1e-7 rad."""
+"""Change of the angle over an interval below which a map is linearised; the mean is then wrong by less than 1e-7 rad."""
 PASSED_RAD = 5e-5
-"""By how much a line may pass the fin's own ends and still be taken for its path: it moves a play or a kink's edge by that."""
+"""By how much a line's ends may lie outside the fin's path and the line still serve as the path: the error of a play's edge."""
 BRIEF = 1e-6
-"""Share of an interval below which a piece of it is none."""
+"""Share of an interval below which a piece is left out."""
 
 
 def through(path: FinPath, steps: FloatArray, part: Part) -> FinPath:
-    """Return a path seen through a part of the gear, which is given straight pieces of it with their lengths in s."""
+    """Return the path behind an actuator effect, which is applied to straight pieces of the path with their lengths in s."""
     lines = _table(steps.size)
     if path.first is None or path.last is None:
         part(steps, path.start, path.end, lines)
@@ -42,7 +43,7 @@ def through(path: FinPath, steps: FloatArray, part: Part) -> FinPath:
 
 
 def _table(rows: int) -> FloatArray:
-    """Return room for a table (rows, 4), each of its columns in one piece: what reads one later need not copy it."""
+    """Return an empty array (rows, 4) with contiguous columns, so that a column can be read without a copy."""
     return np.empty((rows, 4), order="F")
 
 
@@ -52,10 +53,11 @@ def split(
 ) -> int:  # fmt: skip
     """Fill out with length, start, end and interval of the pieces of a path, at most three an interval; return their number.
 
-    In shares of the interval and of the change from `first` to `last`: held at 0 up to c - w/2, straight to 1 at c + w/2 and
-    held has the mean 1 - c and the moment c (1 - c) / 2 - w^2 / 24 about the middle. Where that w does not fit beside c,
-    straight to s + e at the share s and on to 1, e = 1 - 2 c, has the moment (1 + e (2 s - 1)) / 12. A path that comes back,
-    for which there is no such c, is left as its line, and so is one that next to keeps to it.
+    Units: the interval, and the change from `first` to `last`. A path that is 0 until c - w/2, rises linearly to 1 at c + w/2 and
+    stays has the mean 1 - c and the first moment c (1 - c) / 2 - w^2 / 24 about the middle. Where the w of a given moment exceeds
+    2 min(c, 1 - c), two lines from 0 to s + e at the share s and on to 1, with e = 1 - 2 c, have the moment (1 + e (2 s - 1)) /
+    12. A path that turns back has no such c: its line serves as the path, as it does where its ends agree with `first` and
+    `last`.
     """
     k = 0
     for i in range(steps.shape[0]):
@@ -93,7 +95,7 @@ def split(
 
 @jit
 def join(count: int, pieces: FloatArray, lines: FloatArray, out: FloatArray) -> None:
-    """Fill out (n-1, 4) with the line of each interval, and where the fin begins and ends, from those of the pieces (k, 4)."""
+    """Fill out (n-1, 4) with the line of each interval and its first and last fin angle, from the lines of the pieces (k, 4)."""
     k = 0
     while k < count:
         i = int(pieces[k, 3])
@@ -113,9 +115,9 @@ def join(count: int, pieces: FloatArray, lines: FloatArray, out: FloatArray) -> 
 
 @inner
 def line_of_two_pieces(bend: float, first: float, middle: float, last: float) -> tuple[float, float]:
-    """Return start and end of the line for a path first -> middle -> last that bends at the share `bend` in 0..1.
+    """Return start and end of the line for a path first -> middle -> last with a corner at the share `bend` in 0..1.
 
-    The bend is a triangle of height e over the chord; its projection adds e (1 - bend) and e bend to the ends.
+    The path is the chord and a triangle of height e; the projection of the triangle adds e (1 - bend) and e bend to the ends.
     """
     excess = middle - (first + (last - first) * bend)
     return first + excess * (1.0 - bend), last + excess * bend

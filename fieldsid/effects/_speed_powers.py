@@ -1,4 +1,4 @@
-"""Damping, authority and cross state at another speed than the one that a run's parameters hold at."""
+"""Factors of damping, authority and cross state at a speed other than the one at which a run's parameters hold."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from fieldsid.models.effect import Terms, Values
 from fieldsid.numerics.arrays import FloatArray
 
 MIN_SPEED_RATIO = 0.05
-"""Share of the run's speed below which a hull that stops or backs is held, since the law has no meaning there."""
+"""Lower limit of the speed over the run's speed: the power law has no meaning for a hull that stops or backs."""
 
 
 def speed_powers(values: Values, ratio: FloatArray, run: float = 1.0) -> Terms:
-    """Return the factors (n,) of a speed that is `ratio` (n,) of the run's, as `speed_varying` has it, constant without that.
+    """Return the factors (n,) at `ratio` (n,) times the run's speed by the exponents of `speed_varying`, zero if it is absent.
 
-    `run` is what the run's own speed is over the one that its parameters are for: the factors of both are multiplied.
+    `run` is the run's speed over the speed at which its parameters hold; it multiplies the factors.
     """
     log = np.log(np.maximum(ratio, MIN_SPEED_RATIO))  # one logarithm for all powers: half of their time
     factor = run * np.exp(values.get("speed_share", 0.0) * log)

@@ -1,9 +1,9 @@
-"""A fin angle seen through a static map with corners, and the path behind it, compiled.
+"""A static map of the fin angle with corners, and the fin's path behind it, compiled.
 
     delta = proportional d + beyond B(d) + jump sign(d) [|d| > edge] + one_sided |d| + square d^2
     B(d) = sign(d) (c(|d| - edge) - c(-edge)),   c(x) = (x + sqrt(x^2 + blend^2)) / 2,  max(x, 0) without a blend
-B is the part of an angle beyond +/-edge, its corners rounded over `blend`, zero at zero. A dead zone, a stall and an uneven fin
-are all of this. The mean over a piece of the path is that of the map's integral, exact across the corners.
+B is the part of an angle beyond +/-edge, with corners rounded over `blend`, and zero at zero. A dead zone, a stall and a fin with
+unequal sides are such maps. The mean over a piece of the path comes from the integral of the map: it is exact across the corners.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Numbers = tuple[float, float, float, float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class StaticMap:
-    """The numbers of a static map: edge, blend, jump in rad, square in 1/rad, shares of the angle the others."""
+    """The numbers of a static map: edge, blend and jump in rad, square in 1/rad, all others without unit."""
 
     proportional: float = 0.0
     beyond: float = 0.0
@@ -34,7 +34,7 @@ class StaticMap:
     square: float = 0.0
 
     def through(self, path: FinPath, steps: FloatArray) -> FinPath:
-        """Return a path seen through the map; arrays (n-1,) rad and s."""
+        """Return the path behind the map; steps (n-1,) s."""
         numbers: Numbers = (
             float(self.proportional), float(self.beyond), float(self.edge), float(self.blend), float(self.jump),
             float(self.one_sided), float(self.square),
@@ -48,20 +48,20 @@ class StaticMap:
 
 @inner
 def root_of(x: float, blend: float) -> float:
-    """Return the root in the corner max(x, 0) = (x + root) / 2, rounded over about `blend` to either side."""
+    """Return the root in the corner c(x) = (x + root) / 2, which is rounded over about `blend` to either side."""
     return abs(x) if blend == 0.0 else math.hypot(x, blend)
 
 
 @inner
 def corner_area(x: float, root: float, blend: float) -> float:
-    """Return an antiderivative of the corner."""
+    """Return an antiderivative of the corner c at x, with its root there."""
     rounded = 0.0 if blend == 0.0 else blend * blend * math.asinh(x / blend)
     return 0.25 * (x * x + x * root + rounded)
 
 
 @inner
 def value(d: float, root: float, numbers: Numbers, rest: float) -> float:
-    """Return the angle that the map makes of one, rad, with the corner's root there; `rest` is the corner at an angle of zero."""
+    """Return the map at the angle d, rad; `root` is the corner's root at |d| - edge, `rest` the corner at an angle of zero."""
     proportional, beyond, edge, _, jump, one_sided, square = numbers
     size, side = abs(d), 0.0 if d == 0.0 else math.copysign(1.0, d)
     far = beyond * (0.5 * (size - edge + root) - rest) + (jump if size > edge else 0.0)
@@ -70,19 +70,19 @@ def value(d: float, root: float, numbers: Numbers, rest: float) -> float:
 
 @inner
 def value_at(d: float, numbers: Numbers, rest: float) -> float:
-    """Return the angle that the map makes of one, rad."""
+    """Return the map at the angle d, rad; `rest` is the corner at an angle of zero."""
     return value(d, root_of(abs(d) - numbers[2], numbers[3]), numbers, rest)
 
 
 @inner
 def value_and_area(d: float, numbers: Numbers, rest: float, rest_area: float) -> tuple[float, float]:
-    """Return the same, and the integral of the map from zero, rad^2; `rest_area` is that of the corner at an angle of zero."""
+    """Return the map at the angle d and its integral from zero, rad^2; `rest_area` is the corner's antiderivative at zero."""
     proportional, beyond, edge, blend, jump, one_sided, square = numbers
     size = abs(d)
     root = root_of(size - edge, blend)
     far = corner_area(size - edge, root, blend) - rest_area - rest * size
-    whole = 0.5 * d * (proportional * d + one_sided * size) + square * d * d * d / 3.0
-    return value(d, root, numbers, rest), whole + beyond * far + jump * max(size - edge, 0.0)
+    smooth = 0.5 * d * (proportional * d + one_sided * size) + square * d * d * d / 3.0
+    return value(d, root, numbers, rest), smooth + beyond * far + jump * max(size - edge, 0.0)
 
 
 @inner
@@ -95,7 +95,7 @@ def at_rest(numbers: Numbers) -> tuple[float, float]:
 
 @jit
 def fill_values(angles: FloatArray, numbers: Numbers, out: FloatArray) -> None:
-    """Fill out (n,) with what the map makes of angles (n,) rad."""
+    """Fill out (n,) with the map at angles (n,) rad."""
     rest, _ = at_rest(numbers)
     for i in range(angles.shape[0]):
         out[i] = value_at(angles[i], numbers, rest)
@@ -103,10 +103,10 @@ def fill_values(angles: FloatArray, numbers: Numbers, out: FloatArray) -> None:
 
 @jit
 def fill_lines(start: FloatArray, end: FloatArray, numbers: Numbers, out: FloatArray) -> None:
-    """Fill out (n, 4) with the line's start and end, and where the fin begins and ends, of straight pieces (n,) rad.
+    """Fill out (n, 4) with start and end of the lines and the first and last fin angle, for straight pieces (n,) in rad.
 
-    A piece mostly begins where the one before ends, and a held one has one value: the square root and the logarithm of each
-    angle are worked out once.
+    A piece mostly begins where the previous one ends, and a constant one has one value, so that the square root and the
+    logarithm of each angle are computed once.
     """
     rest, rest_area = at_rest(numbers)
     last_angle, last, last_area = math.nan, 0.0, 0.0

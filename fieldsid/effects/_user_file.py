@@ -1,9 +1,9 @@
-"""The user's own effects: a YAML file with a name, a moment as an expression and its coefficients becomes an Effect.
+"""The user's own effects: an Effect from a YAML file with a name, an expression for the moment, and its coefficients.
 
     name: tether_drag
     moment: "-k * r * abs(r)"
     coefficients: {k: {unit: 1/rad, low: 0, high: 20, start: 0.1}}
-The moment (rad/s^2) adds to the rate equation along the simulated motion. A plain file of data: nothing in it is executed.
+The moment (rad/s^2) is added to p', evaluated along the simulated motion. The file is data: nothing in it is executed.
 """
 
 from __future__ import annotations
@@ -37,33 +37,33 @@ SIGNAL_OF: Mapping[str, str] = MappingProxyType(
         "depth": "depth", "z": "depth", "thrust": "thrust", "t": "time",
     }
 )  # fmt: skip
-"""What each name in an expression stands for; `t` counts from the run's first sample."""
+"""The signal of each name in an expression; `t` counts from the run's first sample."""
 
 ONE_AXIS: Mapping[str, Axis] = MappingProxyType({"r": Axis.YAW, "psi": Axis.YAW, "q": Axis.PITCH, "theta": Axis.PITCH})
 CROSS_SPEED: Mapping[str, str] = MappingProxyType(
     {"v": "sway_coupling", "w": "heave_coupling", "cross": "sway_coupling` or `heave_coupling"}
 )
-"""Names of the hull's own cross speed, and the effect that has it as a state: measured it is an output, and drives no moment."""
+"""Names of the cross speed, and the effect that has it as a state: the measured cross speed is an output and no input."""
 ROLES = ("surge", "roll", "depth", "thrust")
 KEYS = ("name", "says", "axes", "moment", "coefficients", "telltale", "excited_by", "mistaken_for", "source")
 COEFFICIENT_KEYS = ("unit", "low", "high", "start", "scan", "step", "per_run", "says")
 LONGEST_NAME, LONGEST_COEFFICIENT = 40, 60
 SUFFIXES = (".yaml", ".yml")
 RESERVED = ("none",)
-"""Names no effect can have: `sysid plan --separate none` is the model as it is."""
+"""Names that no effect can have: `sysid plan --separate none` means the model without an additional effect."""
 MAX_MOMENT_RAD_S2 = 1e4
-"""Moment in rad/s^2 beyond which the motion is growing without bound; a vehicle has some 10."""
+"""Moment above which the motion is diverging; moments of vehicles are about 10 rad/s^2 at most."""
 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """The hook of a user's effect: the expression along a motion."""
+    """The hook `moment` of a user's effect, which evaluates the expression along a motion."""
 
     effect: str
     expression: Expression
 
     def __call__(self, motion: Motion, values: Values, record: Record) -> FloatArray:
-        """Return the moment (n,) rad/s^2; raises EffectError with time and value where it is not a bounded number."""
+        """Return the moment (n,) rad/s^2; raises EffectError with time and value where it is NaN or above MAX_MOMENT_RAD_S2."""
         table = {n: _signal(SIGNAL_OF[n], motion, record) if n in SIGNAL_OF else values[n] for n in self.expression.names}
         moment = self.expression.at(table, record.time)
         bad = ~(np.abs(moment) <= MAX_MOMENT_RAD_S2)
@@ -80,9 +80,9 @@ class Moment:
 
 
 def user_effect_files(folder: Path) -> list[Path]:
-    """Return the YAML files of a folder in order, and the Python ones unless they are a package's; raises EffectError.
+    """Return the YAML files of a folder in order, and the Python files unless the folder is a package; raises EffectError.
 
-    There are none where there is no folder. Python is not read: `load_user_effect` says how it takes part.
+    The list is empty if there is no such folder. Python is not executed: `load_user_effect` raises an error that says what to do.
     """
     if not folder.is_dir():
         return []
@@ -111,7 +111,7 @@ def load_user_effect(path: Path) -> Effect:
 
 
 def effect_of_text(text: str, path: Path, *, origin: str) -> Effect:
-    """Return the effect that a YAML text defines, which knows its own definition; raises EffectError naming the file."""
+    """Return the effect that a YAML text defines, with that text as its `definition`; raises EffectError naming the file."""
     try:
         return replace(effect_of(yaml_mapping(text, path), origin=origin), definition=of_text(text, path))
     except ArtifactError as error:
@@ -121,22 +121,22 @@ def effect_of_text(text: str, path: Path, *, origin: str) -> Effect:
 
 
 @lru_cache(maxsize=32)
-def travelled(text: str, file: str) -> Effect:
-    """Return the effect of a model's own definition: the text, and the file it was in; raises EffectError."""
+def effect_of_definition(text: str, file: str) -> Effect:
+    """Return the effect of a definition that a model keeps: its YAML text, and the file that had it; raises EffectError."""
     return effect_of_text(text, Path(file), origin=f"{file}, as the model holds it")
 
 
-def names_asked(path: Path) -> set[str]:
-    """Return the names by which a user may ask for the effect of a file that cannot be used: the file's, and the one in it."""
+def possible_names(path: Path) -> set[str]:
+    """Return the names under which a user may look for the effect of an unusable file: that of the file, and the one in it."""
     try:
-        said = re.search(r"^name:[ \t]*['\"]?([A-Za-z]\w*)", read_text(path), re.MULTILINE)
+        name = re.search(r"^name:[ \t]*['\"]?([A-Za-z]\w*)", read_text(path), re.MULTILINE)
     except ArtifactError:
-        said = None
-    return {path.stem} | ({said[1]} if said else set())
+        name = None
+    return {path.stem} | ({name[1]} if name else set())
 
 
 def effect_of(spec: Mapping[str, Any], *, origin: str) -> Effect:
-    """Return the effect of a mapping as in the module's example; raises EffectError."""
+    """Return the effect of a mapping with the keys of the module's example; raises EffectError."""
     _known_keys("an effect", spec, KEYS, required=("name", "moment", "coefficients"))
     name = checked_name(spec["name"])
     coefficients = _coefficients(spec["coefficients"])
@@ -167,38 +167,38 @@ def effect_of(spec: Mapping[str, Any], *, origin: str) -> Effect:
 
 
 def _signal(kind: str, motion: Motion, record: Record) -> FloatArray:
-    plain = {"angle": motion.angle, "rate": motion.rate, "fin": record.fin}
+    simulated = {"angle": motion.angle, "rate": motion.rate, "fin": record.fin}
     if kind == "time":
         return np.asarray(record.time - record.time[0])
-    return plain[kind] if kind in plain else record[kind]
+    return simulated[kind] if kind in simulated else record[kind]
 
 
-def _axes(given: object, expression: Expression) -> tuple[Axis, ...]:
-    """Return the axes that were named, or those the expression's names leave."""
-    bound = {ONE_AXIS[n] for n in expression.names if n in ONE_AXIS}
-    if len(bound) > 1:
+def _axes(stated: object, expression: Expression) -> tuple[Axis, ...]:
+    """Return the axes under the key `axes`, or without it those whose signals the expression uses; raises EffectError."""
+    used = {ONE_AXIS[n] for n in expression.names if n in ONE_AXIS}
+    if len(used) > 1:
         raise EffectError("the expression mixes yaw and pitch signals", found=expression.text, hint="use `angle`, `rate`")
-    left = tuple(bound) or (Axis.YAW, Axis.PITCH)
-    words = [given] if isinstance(given, str) else given
+    possible = tuple(used) or (Axis.YAW, Axis.PITCH)
+    words = [stated] if isinstance(stated, str) else stated
     if words is None:
-        return left
+        return possible
     if not isinstance(words, list) or not words or any(w not in tuple(Axis) for w in words):
-        raise EffectError("`axes` must list yaw, pitch or both", found=repr(given), hint="write `axes: [yaw]`")
+        raise EffectError("`axes` must list yaw, pitch or both", found=repr(stated), hint="write `axes: [yaw]`")
     axes = tuple(a for a in Axis if a in words)
-    if not set(axes) <= set(left):
-        what = f"the expression has {left[0].value} signals only, `axes` says {', '.join(axes)}"
+    if not set(axes) <= set(possible):
+        what = f"the expression has {possible[0].value} signals only, `axes` says {', '.join(axes)}"
         raise EffectError(what, found=expression.text, hint="use `angle` and `rate`")
     return axes
 
 
-def _coefficients(given: object) -> tuple[Coefficient, ...]:
-    if not isinstance(given, Mapping) or not given:
+def _coefficients(table: object) -> tuple[Coefficient, ...]:
+    if not isinstance(table, Mapping) or not table:
         raise EffectError(
             "`coefficients` must map each name to unit, low, high and start",
-            found=repr(given)[:60],
+            found=repr(table)[:60],
             hint="write `coefficients: {k: {unit: 1/s^2, low: -5, high: 5, start: 0.1}}`",
         )
-    return tuple(_coefficient(_name("coefficient", n, LONGEST_COEFFICIENT), body) for n, body in given.items())
+    return tuple(_coefficient(_name("coefficient", n, LONGEST_COEFFICIENT), body) for n, body in table.items())
 
 
 def _coefficient(name: str, body: object) -> Coefficient:
@@ -235,7 +235,7 @@ def _number(name: str, key: str, value: object) -> float:
 
 
 def checked_name(value: object, taken: Collection[str] = ()) -> str:
-    """Return an effect's name; raises EffectError for one that no effect can have, with one that is not taken."""
+    """Return an effect's name; raises EffectError for a name that is not allowed, with a hint that is not in `taken`."""
     name = _name("effect", value, LONGEST_NAME, taken)
     if name in RESERVED:
         what = f"`{name}` cannot be the name of an effect: it is what `sysid plan --separate` calls the plain model"
@@ -257,18 +257,18 @@ def _name(what: str, value: object, longest: int, taken: Collection[str] = ()) -
 
 
 def name_like(value: object, taken: Collection[str]) -> str:
-    """Return a name that is allowed, free and like the one that was given."""
-    like = re.sub(r"\W+", "_", str(value), flags=re.ASCII).strip("_0123456789").lower()
-    like = like[: LONGEST_NAME - len("_99")].rstrip("_") or "tether_drag"
-    names = (like if i == 0 else f"{like}_{i}" for i in count())
+    """Return an allowed name that is close to `value` and not in `taken`."""
+    stem = re.sub(r"\W+", "_", str(value), flags=re.ASCII).strip("_0123456789").lower()
+    stem = stem[: LONGEST_NAME - len("_99")].rstrip("_") or "tether_drag"
+    names = (stem if i == 0 else f"{stem}_{i}" for i in count())
     return next(n for n in names if not keyword.iskeyword(n) and n not in RESERVED and n not in taken)
 
 
 def _words(spec: Mapping[str, Any], key: str, default: tuple[str, ...]) -> tuple[str, ...]:
-    given = spec.get(key, list(default))
-    words = [given] if isinstance(given, str) else given
+    value = spec.get(key, list(default))
+    words = [value] if isinstance(value, str) else value
     if not isinstance(words, list) or any(not isinstance(w, str) for w in words):
-        raise EffectError(f"`{key}` must be a list of names", found=repr(given)[:60], hint=f"write `{key}: [zigzag]`")
+        raise EffectError(f"`{key}` must be a list of names", found=repr(value)[:60], hint=f"write `{key}: [zigzag]`")
     return tuple(words)
 
 

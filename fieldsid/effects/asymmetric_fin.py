@@ -1,7 +1,7 @@
 """The fin works better to one side: delta = command (1 + asymmetry) for command > 0, command (1 - asymmetry) below.
 
-A bent stock, a damaged blade or a neighbour's wake does this; the sign says which side is the stronger. In its other
-form the two sides part gradually: lift_bend command^2 is added.
+A bent stock, a damaged blade or the wake of another body does this; a positive asymmetry makes the positive side the stronger.
+In its variant the difference grows gradually with the angle: lift_bend command^2 is added.
 Source: Bertram 2012, Practical Ship Hydrodynamics, chapter 6.
 """
 
@@ -15,7 +15,7 @@ from fieldsid.models.record import Record
 
 
 def fin(path: FinPath, values: Values, record: Record) -> FinPath:
-    """Return the path with the two sides scaled apart, (n-1,) rad."""
+    """Return the path with different gains on the two sides, (n-1,) rad."""
     more, bend = values["asymmetry"], values.get("lift_bend", 0.0)
     if more == 0.0 and bend == 0.0:
         return path

@@ -1,8 +1,8 @@
 """Play in the linkage: the fin stays until the command has crossed the gap, then follows half a gap behind (play operator).
 
     delta <- min(max(delta, command - gap/2), command + gap/2),   gap >= 0 in rad
-A trimmed fin hangs at one end of the play before the run, or anywhere in it: where it starts is each run's own number, in
-halves of the gap off its middle. Source: Nordin and Gutman 2002, Controlling mechanical systems with backlash.
+Before the run the fin may rest anywhere in the play: its start, in half gaps from the middle of the play, is a coefficient that
+is estimated for each run. Source: Nordin and Gutman 2002, Controlling mechanical systems with backlash.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fieldsid.numerics.jit import jit
 
 @jit
 def played(start: FloatArray, end: FloatArray, gap: float, begins: float, out: FloatArray) -> None:
-    """Fill out (n-1, 4) with line and ends of the path behind a play of width `gap`, from where in it the fin begins (-1..1)."""
+    """Fill out (n-1, 4) with lines and ends of the path behind a play of width `gap`, from `begins` (-1..1) in the play on."""
     half = 0.5 * gap
     fin = start[0] + begins * half
     for i in range(start.shape[0]):
@@ -27,7 +27,7 @@ def played(start: FloatArray, end: FloatArray, gap: float, begins: float, out: F
         last = min(max(first, end[i] - half), end[i] + half)
         bend = 0.0
         if last != first:
-            # The share of the interval before the moving command takes the fin along.
+            # The share of the interval after which the command has crossed the gap and moves the fin.
             touches = first + half if end[i] > start[i] else first - half
             bend = min(max((touches - start[i]) / (end[i] - start[i]), 0.0), 1.0)
         out[i, 0], out[i, 1] = line_of_two_pieces(bend, first, first, last)

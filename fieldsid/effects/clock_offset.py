@@ -1,8 +1,8 @@
 """The sensors' clock is off against the command's: measured(t) = motion(t - offset), offset of either sign in s.
 
-Positive: the sensors are logged late. The motion is straight between samples and held beyond the ends of the run.
-Unlike a delay it shifts whatever moves the hull, not only the fin's part, and it can be negative. In its other form the
-clock runs fast or slow as well: the offset changes by clock_drift a second, about the middle of the run.
+Positive: the sensors are logged late. The motion is interpolated linearly between samples and constant beyond the ends of the
+run. Unlike a delay it shifts the response to all inputs, not only to the fin, and it can be negative. In its variant the clock
+runs fast or slow as well: the offset changes by clock_drift s a second and is `offset` in the middle of the run.
 Source: Ljung 1999, System Identification, chapter 14 (preprocessing of data).
 """
 
@@ -30,7 +30,7 @@ def measure(motion: Motion, values: Values, record: Record) -> Motion:
 
 
 def sensor_jvp(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
-    """Return small moves of the motion (P, 2, n) as they are logged, `offset` seconds later."""
+    """Return small changes of the motion (P, 2, n) as they are logged, `offset` seconds later."""
     return _late(moves, values, record)
 
 
@@ -43,7 +43,7 @@ def _late(series: FloatArray, values: Values, record: Record) -> FloatArray:
 
 @jit
 def interpolate(time: FloatArray, then: FloatArray, series: FloatArray, out: FloatArray) -> None:
-    """Fill out (P, 2, n) with series (P, 2, n) at other times (n,), both rising, held before the first and after the last."""
+    """Fill out (P, 2, n) with series (P, 2, n) at the times `then` (n,), rising like `time` (n,); constant beyond both ends."""
     n, before = time.shape[0], 0
     for i in range(n):
         at = min(max(then[i], time[0]), time[n - 1])

@@ -16,7 +16,7 @@ from fieldsid.numerics.arrays import FloatArray
 
 
 def measure(motion: Motion, values: Values, record: Record) -> Motion:
-    """Return the motion as the compass shows it; angle (n,) rad, rate as it is."""
+    """Return the motion as the compass shows it: a changed angle (n,) rad, the same rate."""
     sin, cos = np.sin(motion.angle), np.cos(motion.angle)
     shown = motion.angle + values["deviation_sin"] * sin + values["deviation_cos"] * cos
     if "deviation_sin2" in values:
@@ -25,7 +25,7 @@ def measure(motion: Motion, values: Values, record: Record) -> Motion:
 
 
 def sensor_jvp(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
-    """Return small moves of the motion (P, 2, n) as the compass shows them."""
+    """Return small changes of the motion (P, 2, n) as the compass shows them."""
     sin, cos = np.sin(motion.angle), np.cos(motion.angle)
     slope = 1.0 + values["deviation_sin"] * cos - values["deviation_cos"] * sin
     if "deviation_sin2" in values:
@@ -36,7 +36,7 @@ def sensor_jvp(moves: FloatArray, motion: Motion, values: Values, record: Record
 
 
 def sensor_slope(name: str, motion: Motion, values: Values, record: Record) -> FloatArray:
-    """Return the derivative (2, n) of what the compass shows by a coefficient."""
+    """Return the derivative (2, n) of the measured motion by a coefficient."""
     slope, times = np.zeros((2, motion.angle.size)), 2.0 if name.endswith("2") else 1.0
     (np.sin if name.startswith("deviation_sin") else np.cos)(times * motion.angle, out=slope[0])
     return slope

@@ -2,10 +2,11 @@
 
     p' += -crossflow F(y, p),   F(a, p) = 32 int_{-1/2}^{1/2} (a + x p) |a + x p| x dx
     y' = -flow_damping f y - flow_rate f p + flow_fin f^2 delta,   f = speed / reference speed
-so that F(0, p) = p |p|: without drift it is quadratic damping. y is the cross flow over the length of the hull, in rad/s;
-crossflow >= 0 in 1/rad. The drift to the other side, with flow_rate and flow_fin the other way, is the same motion. It is
-`sway_coupling` with its drag along the hull, but for the Munk moment and for what the drag takes from the drift. Beside that
-effect, or `heave_coupling`, there is one cross state, the moment x of the other: y = flow_share x, of either sign the same.
+so that F(0, p) = p |p|: without drift it is quadratic damping. y is the cross speed over the length of the hull, in rad/s;
+crossflow >= 0 in 1/rad. Changing the signs of y, flow_rate and flow_fin together leaves the motion as it is. Compared with the
+variant of `sway_coupling` that sums the drag along the hull, it has no Munk moment and no drag in the equation of the drift.
+Together with `sway_coupling` or `heave_coupling` there is only one cross state, the moment x of that effect, and y = flow_share
+x; flow_share of either sign gives the same motion.
 Source: Fossen 2011, section 6.4.3 (cross-flow drag principle), uniform section drag.
 """
 
@@ -21,7 +22,7 @@ from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
 LENGTHS_M = (0.8, 2.0, 5.0)
-"""Lengths of a hull that a measured cross speed is tried over."""
+"""Hull lengths by which a measured cross speed is divided for start values."""
 DRAG = Coefficient("crossflow", "1/rad", 0.0, 500.0, 0.1, scan=(1.0,), says="damping per rad/s of rate without drift")
 FLOW = (
     Coefficient(
@@ -40,7 +41,7 @@ SHARE = Coefficient(
 
 
 def core(values: Values, scale: float) -> Core:
-    """Return the core's coefficients; speed has a part in the drift alone, whose state is f y in 1/s."""
+    """Return the core's constants; only the drift depends on the speed; its state is f y."""
     if "flow_share" in values:
         return Core(strip_moment=values["crossflow"], strip_flow=values["flow_share"] / scale)
     return Core(
@@ -54,7 +55,7 @@ def core(values: Values, scale: float) -> Core:
 
 
 def measured_starts(records: Sequence[Record], _residuals: Sequence[FloatArray]) -> list[dict[str, float]]:
-    """Return the drift law that the measured cross speed shows, over some lengths of a hull; none where none is measured."""
+    """Return start values from the measured drift law, one for each of LENGTHS_M; none if no cross speed is measured."""
     law = drift_law(records, reference_speed(records))
     if law is None:
         return []
@@ -76,7 +77,7 @@ EFFECT = Effect(
     mistaken_for=("quadratic_damping", "sway_coupling", "heave_coupling", "stall", "speed_varying"),
     source="Fossen 2011, section 6.4.3",
     extra_states=("cross flow",),
-    log_prior_penalty=6.0,  # drag of the rate and a sway of its own say most of it in simpler words
+    log_prior_penalty=6.0,  # quadratic damping and a sway coupling explain most of it more simply
     core=core,
     initial_guesses=measured_starts,
     variants=(

@@ -1,12 +1,11 @@
-"""A current across the course turns the hull by heading: r' += current_sin sin(psi) + current_cos cos(psi), rad/s^2.
+"""A current has a yaw moment that depends on the heading: r' += current_sin sin(psi) + current_cos cos(psi), rad/s^2.
 
-In a frame that drifts with the water the hull still has its log's heading; what is left is the moment of the flow
-across it, once per turn of the compass. In its other forms it goes twice as well, as the moment of a flow square across
-a long hull does, its direction turns by current_turn rad/s and is the stated one in the middle of a run, or the moment goes
-with a power of the run's speed: lift of the flow across the hull is in proportion to both. Or it is in the log and not on the
-hull: a speed over ground (DVL with bottom lock, GPS) is the speed through the water, which the fin and the damping go with, and
-the current along the heading, current_north cos(psi) + current_east sin(psi); a run's parameters then hold at its speed
-through the water, and what `speed_varying` says of the speed is said of that through the water.
+The moment of the flow across the hull has the period of one turn of the compass. Variants: it has a part of twice that frequency,
+as the moment of a flow across a long hull has; its direction turns by current_turn rad/s and is the stated one in the middle of a
+run; it is proportional to a power (current_power) of the run's speed, as lift of the flow across the hull is. In one more variant
+the current acts on the log and not on the hull: the logged speed is over ground (DVL with bottom lock, GPS) and is the sum of the
+speed through the water, on which fin and damping depend, and the current along the heading, current_north cos(psi) +
+current_east sin(psi). A run's parameters then hold at its speed through the water, and so do the exponents of `speed_varying`.
 Source: Fossen 2011, sections 8.3 (ocean current forces and moments) and 6.4 (lift against u^2).
 """
 
@@ -21,12 +20,12 @@ from fieldsid.models.hull import Core
 from fieldsid.models.record import Record
 
 HEADING_SPAN_RAD = 0.5 * np.pi
-"""Headings that show it: within a quarter of the compass its sine is a straight line to 3 % of its own size (rms over +-45 deg),
-a moment in proportion to the heading, as what a hull's slow sway leaves in a zig-zag is."""
+"""Range of headings that is needed: within +-45 deg the sine is linear to 3 % (rms), and a slow sway that is missing from the
+model also leaves a residual moment in proportion to the heading in a zig-zag."""
 
 
 def core(values: Values, scale: float) -> Core:
-    """Return the core's coefficients; scale is the run's speed over the reference speed."""
+    """Return the core's constants; scale is the run's speed over the reference speed."""
     if "current_north" in values:
         return Core()
     lift = scale ** values["current_power"] if "current_power" in values else 1.0
@@ -40,14 +39,14 @@ def core(values: Values, scale: float) -> Core:
 
 
 def terms(values: Values, record: Record) -> Terms:
-    """Return the factors (n,) of a logged speed that is over ground; none where no heading is measured, as in a plan."""
+    """Return the factors (n,) of the speed through the water if the log has it over ground; none without a measured heading."""
     seen = record.angle_ok
     if "current_north" not in values or not seen.any():
         return Terms()
     heading = record.angle if seen.all() else np.interp(record.time, record.time[seen], record.angle[seen])
     surge, along = record["surge"], values["current_north"] * np.cos(heading) + values["current_east"] * np.sin(heading)
-    run = max(float(np.median(surge - along)) / record.speed, MIN_SPEED_RATIO)  # as the run's speed is that of its log
-    # `speed_varying` takes the logged speed over the run's: what is left is the one through the water over both
+    run = max(float(np.median(surge - along)) / record.speed, MIN_SPEED_RATIO)  # record.speed is the median over ground
+    # `speed_varying` applies the logged speed over the run's: these factors add the ratio of the speed through the water to it
     return speed_powers(values, (surge - along) / (run * np.maximum(surge, MIN_SPEED_RATIO * record.speed)), run)
 
 

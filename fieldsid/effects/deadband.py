@@ -1,8 +1,8 @@
 """Small fin angles do nothing: delta = 0 inside +/-width, command - width sign(command) outside (width >= 0, rad).
 
-Subtractive, so the fin moves off smoothly at the edge. In its other forms the edge is rounded over deadband_blend, or the
-fin jumps at it by the share deadband_jump of the width, and may hold on until |command| < release * width; or the zone
-lies about off_middle * width.
+The width is subtracted, so that the fin angle is continuous at the edge. Variants: the edge is rounded over deadband_blend; the
+fin jumps at the edge by deadband_jump * width, and may stay deflected until |command| < release * width; the middle of the zone
+is at off_middle * width.
 Source: Tao and Kokotovic 1996, Adaptive Control of Systems
 with Actuator and Sensor Nonlinearities.
 """
@@ -22,15 +22,15 @@ from fieldsid.numerics.jit import jit
 
 @jit
 def _share(here: float, there: float, edge: float) -> float:
-    """Return the share of the way from one size to another at which an edge is met, 0..1."""
+    """Return the share, 0..1, of a linear change from `here` to `there` at which it reaches an edge."""
     return min(max((edge - here) / (there - here), 0.0), 1.0) if there != here else 0.0
 
 
 @jit
-def held_on(start: FloatArray, end: FloatArray, width: float, lost: float, let_go: float, out: FloatArray) -> None:
-    """Fill out (n-1, 4) with line and ends of the path of a fin that takes off at `width` and stops at `let_go`.
+def with_release(start: FloatArray, end: FloatArray, width: float, lost: float, let_go: float, out: FloatArray) -> None:
+    """Fill out (n-1, 4) with lines and ends of the path of a fin that leaves zero at `width` and returns to it at `let_go`.
 
-    Once it moves it stands `lost` short of the command. Lengths in rad, let_go <= width.
+    Away from zero the fin is `lost` smaller than the command. Angles in rad, let_go <= width.
     """
     moves = abs(start[0]) > width
     for i in range(start.shape[0]):
@@ -62,15 +62,15 @@ def held_on(start: FloatArray, end: FloatArray, width: float, lost: float, let_g
 
 def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     """Return the path with the dead zone of half width `width` taken out, (n-1,) rad."""
-    width, kept = values["width"], values.get("deadband_jump", 0.0)
+    width, jump_share = values["width"], values.get("deadband_jump", 0.0)
     if width <= 0.0:
         return path
     if "release" in values:
-        lost, let_go = (1.0 - kept) * width, values["release"] * width
-        return through(path, record.steps, lambda _steps, start, end, out: held_on(start, end, width, lost, let_go, out))
+        lost, let_go = (1.0 - jump_share) * width, values["release"] * width
+        return through(path, record.steps, lambda _steps, start, end, out: with_release(start, end, width, lost, let_go, out))
     if "off_middle" in values:
         path = path.shifted(-values["off_middle"] * width)
-    zone = StaticMap(beyond=1.0, edge=width, blend=values.get("deadband_blend", 0.0), jump=kept * width)
+    zone = StaticMap(beyond=1.0, edge=width, blend=values.get("deadband_blend", 0.0), jump=jump_share * width)
     return zone.through(path, record.steps)
 
 

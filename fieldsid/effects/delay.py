@@ -1,7 +1,7 @@
 """Dead time between the command and the fin: delta(t) = command(t - delay), delay >= 0 in s.
 
-Before the record starts the command is taken to have held its first value. A delay of the other sign is a clock
-that is off (`clock_offset`) or feedback, never a delay. Source: Ljung 1999, chapter 4.
+Before the record starts the command is assumed to have had its first value. An apparent delay below zero is an offset of a
+clock (`clock_offset`) or comes from feedback. Source: Ljung 1999, chapter 4.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fieldsid.numerics.jit import jit
 
 @jit
 def delayed(time: FloatArray, start: FloatArray, end: FloatArray, delay: float, out: FloatArray) -> None:
-    """Fill out (n-1, 4) with line and ends of the delayed path: exact area and first moment, piece by piece."""
+    """Fill out (n-1, 4) with lines and ends of the delayed path, of exact mean and first moment; time (n,) s, delay in s."""
     n = start.shape[0]
     source = 0
     for i in range(n):

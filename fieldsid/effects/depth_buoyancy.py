@@ -1,7 +1,7 @@
 """Buoyancy and its centre shift with depth: q' += depth_moment z, z in m positive down, depth_moment in 1/(m s^2).
 
-A hull that compresses, foam that soaks and a free surface nearby do this; the trim Cb is then that at zero depth. In its other
-form a part goes with the square of the depth.
+A hull that compresses, foam that soaks or a free surface nearby causes it; the trim Cb is then that at zero depth. In its variant
+a part of the moment is proportional to the square of the depth.
 Source: Fossen 2011, section 4.1 (restoring moment), with a buoyancy linear in depth.
 """
 
@@ -13,7 +13,7 @@ from fieldsid.models.record import Record
 
 
 def terms(values: Values, record: Record) -> Terms:
-    """Return the moment that goes with depth, (n,) rad/s^2."""
+    """Return the moment of the depth, (n,) rad/s^2."""
     depth = record["depth"]
     return Terms(moment=values["depth_moment"] * depth + values.get("depth_square", 0.0) * depth * depth)
 

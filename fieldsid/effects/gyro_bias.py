@@ -1,8 +1,8 @@
 """The rate gyro has an offset: rate_measured = rate + bias, rad/s; the angle is right.
 
-In its other form it wanders off as the gyro warms up: rate_measured = rate + bias + bias_drift t, t in minutes from the first
-sample. It shows only where the angle is measured as well as the rate, or where the trim is known. Source: Fossen 2011, chapter 11
-(strapdown sensors); Groves 2013, chapter 4.
+In its variant the offset drifts as the gyro warms up: rate_measured = rate + bias + bias_drift t, t in minutes from the first
+sample. The bias can be estimated only where the angle is measured as well as the rate, or where the trim is known. Source: Fossen
+2011, chapter 11 (strapdown sensors); Groves 2013, chapter 4.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ MINUTE_S = 60.0
 
 
 def measure(motion: Motion, values: Values, record: Record) -> Motion:
-    """Return the motion as the gyro shows it; angle as it is, rate (n,) rad/s."""
+    """Return the motion as the gyro shows it: the same angle, a changed rate (n,) rad/s."""
     if "bias_drift" not in values:
         return Motion(motion.angle, motion.rate + values["bias"])
     minutes = (record.time - record.time[0]) / MINUTE_S
@@ -24,7 +24,7 @@ def measure(motion: Motion, values: Values, record: Record) -> Motion:
 
 
 def sensor_jvp(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
-    """Return small moves of the motion (P, 2, n) as the gyro shows them: an offset leaves them."""
+    """Return small changes of the motion (P, 2, n) as the gyro shows them: an offset does not change them."""
     return moves
 
 

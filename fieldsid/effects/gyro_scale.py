@@ -1,6 +1,6 @@
 """The rate gyro has a wrong scale: rate_measured = (1 + scale_error) rate; the angle is right.
 
-In its other forms the error grows with the rate, rate_measured = (1 + scale_error + scale_cubic rate^2) rate, or differs
+In its variants the error grows with the rate, rate_measured = (1 + scale_error + scale_cubic rate^2) rate, or differs
 from side to side, rate_measured = (1 + scale_error) rate + scale_side |rate|.
 Source: Groves 2013, Principles of GNSS, Inertial and Multisensor Integrated Navigation Systems, chapter 4 (scale factor
 error, nonlinearity and asymmetry).
@@ -17,13 +17,13 @@ from fieldsid.numerics.arrays import FloatArray
 
 
 def measure(motion: Motion, values: Values, record: Record) -> Motion:
-    """Return the motion as the gyro shows it; angle as it is, rate (n,) rad/s."""
-    bent, side = values.get("scale_cubic", 0.0) * motion.rate**2, values.get("scale_side", 0.0) * np.abs(motion.rate)
-    return Motion(motion.angle, motion.rate * (1.0 + values["scale_error"] + bent) + side)
+    """Return the motion as the gyro shows it: the same angle, a changed rate (n,) rad/s."""
+    cubic, side = values.get("scale_cubic", 0.0) * motion.rate**2, values.get("scale_side", 0.0) * np.abs(motion.rate)
+    return Motion(motion.angle, motion.rate * (1.0 + values["scale_error"] + cubic) + side)
 
 
 def sensor_jvp(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
-    """Return small moves of the motion (P, 2, n) as the gyro shows them."""
+    """Return small changes of the motion (P, 2, n) as the gyro shows them."""
     slope = 1.0 + values["scale_error"] + 3.0 * values.get("scale_cubic", 0.0) * motion.rate**2
     slope += values.get("scale_side", 0.0) * np.sign(motion.rate)
     return np.asarray(moves * np.stack([np.ones(slope.size), slope]))

@@ -1,9 +1,9 @@
 """Heave takes part in pitch through the Munk moment: an extra state x, the pitch moment of the heave speed (rad/s^2).
 
     q' += x,   x' = -cross_damping f x - cross_rate f^2 q,   f = (speed / reference speed)^p
-From w' = -c11 w - c12 q + d1 delta and q' = -c21 w + ..., all of it lift, so c11, c12, c21 ~ u and d1 ~ u^2.
-The fin's own lift d1 cannot be seen in pitch: it is taken up by the other numbers (effects/sway_coupling.py).
-Needs no heave sensor. Source: Prestero 2001, chapter 6 (vertical plane); the paper's full form.
+It follows from w' = -c11 w - c12 q + d1 delta and q' = -c21 w + ..., where all terms are lift, so that c11, c12, c21 ~ u and
+d1 ~ u^2. The heave force d1 of the fin is not identifiable from pitch: the other coefficients absorb it
+(effects/sway_coupling.py). No heave sensor is needed. Source: Prestero 2001, chapter 6 (vertical plane); the paper's full form.
 """
 
 from __future__ import annotations

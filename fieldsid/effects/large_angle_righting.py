@@ -1,4 +1,4 @@
-"""The righting moment at large pitch: the stiffness follows sin(theta), and the trim has a part that goes with cos(theta).
+"""The righting moment at large pitch: the stiffness follows sin(theta), and a part of the trim follows cos(theta).
 
     q' += righting_sin (theta - sin theta) + righting_cos (cos theta - 1)
 righting_sin in 1/s^2 (the part of c23 that is weight times metacentric height, positive when stable), righting_cos in
@@ -13,7 +13,7 @@ from fieldsid.models.hull import Core
 
 
 def core(values: Values, scale: float) -> Core:
-    """Return the core's coefficients; hydrostatics know no speed."""
+    """Return the core's constants; hydrostatics do not depend on the speed."""
     return Core(righting_sin=values["righting_sin"], righting_cos=values["righting_cos"])
 
 

@@ -1,10 +1,10 @@
 """The propeller turns the hull: moment = prop_moment thrust, in rad/s^2 per unit of the logged thrust.
 
-Swirl over the fins, or a thrust line that misses the centre of gravity, does this; the trim is then that at zero
-thrust. Positive turns toward positive angle. In its other forms it has a part with the square of the thrust; in yaw it may
-build up behind it with a first-order lag, as swirl and inflow do, or be trimmed away by the rudder: the trim then has a part
-that goes with the square of the run's speed beside one that stays, counted from 1 m/s, so that with either the two make up
-both. In pitch `speed_moment` says both. Source: Carlton 2018, Marine Propellers and Propulsion, chapter 6.
+Swirl over the fins, or a thrust line that misses the centre of gravity, causes it; the trim is then that at zero thrust. A
+positive moment turns toward positive angle. In one variant a part is proportional to the square of the thrust. In yaw the moment
+may follow the thrust with a first-order lag, as swirl and inflow do, or the rudder may be trimmed against it: the trim moment
+then has a part prop_trimmed (u^2 - 1) in addition to the constant one, u the run's speed in m/s; the constant one is thus the
+trim at 1 m/s. In pitch `speed_moment` has such a part. Source: Carlton 2018, Marine Propellers and Propulsion, chapter 6.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from fieldsid.models.record import Record
 from fieldsid.numerics.first_order_lag import first_order_lag
 
 FASTEST_S = 1e-6
-"""A lag below this changes nothing."""
+"""A lag below this has no effect on the samples."""
 
 
 def terms(values: Values, record: Record) -> Terms:

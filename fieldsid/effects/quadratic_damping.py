@@ -1,7 +1,8 @@
 """Drag of the turning hull grows with the square of the rate: p' += -quadratic p |p|, quadratic >= 0 in 1/rad.
 
-The same at every speed, as drag by the hull's own turning has no u in it. Source: Fossen 2011, section 6.4 (N_|r|r).
-In its other form the power is free: -quadratic p |p| (|p| / 0.2 rad/s)^(rate_power - 2), so that `quadratic` keeps its unit.
+It does not depend on the speed u, because the flow of this drag comes from the rotation. Source: Fossen 2011, section 6.4
+(N_|r|r). In its variant the power is a coefficient: -quadratic p |p| (|p| / 0.2 rad/s)^(rate_power - 2), so that `quadratic`
+keeps its unit.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ POWER = Coefficient(
 
 
 def core(values: Values, scale: float) -> Core:
-    """Return the core's coefficients; speed has no part in them."""
+    """Return the core's constants; they do not depend on the speed."""
     return Core(quadratic=values["quadratic"], beyond_square=values.get("rate_power", SQUARE) - SQUARE)
 
 

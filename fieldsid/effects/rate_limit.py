@@ -1,7 +1,7 @@
 """The fin turns no faster than its motor: |d delta/dt| <= max_rate (rad/s).
 
-The fin runs toward the command at max_rate until it meets it and then follows it as far as it can; it starts on the
-command. In its other form it runs to the negative side at falling_share max_rate.
+The fin moves toward the command at max_rate until it reaches it, and then follows it as fast as the limit allows; it starts at
+the command. In its variant the limit to the negative side is falling_share max_rate.
 Source: Van Amerongen 1982 (the steering machine).
 """
 
@@ -18,7 +18,7 @@ from fieldsid.numerics.jit import jit
 
 @jit
 def rate_limited(steps: FloatArray, start: FloatArray, end: FloatArray, up: float, down: float, out: FloatArray) -> None:
-    """Fill out (n-1, 4) with line and ends of the path of a fin that turns at `up` and `down` rad/s at most."""
+    """Fill out (n-1, 4) with lines and ends of the path of a fin that rises at `up` and falls at `down` rad/s at most."""
     fin = start[0]
     for i in range(start.shape[0]):
         h = steps[i]

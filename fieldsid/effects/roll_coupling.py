@@ -1,7 +1,7 @@
 """A rolled hull yaws: r' += roll_moment phi, roll angle phi in rad (positive starboard down), roll_moment in 1/s^2.
 
-When the hull is rolled, the elevators, and the weight away from the buoyancy, act in the yaw plane too. In its other forms the
-roll rate adds a moment roll_rate_moment phi', or the moment bends with the angle, roll_cubic phi^3.
+When the hull is rolled, the elevators and the offset of weight from buoyancy have a component in the yaw plane. In its variants
+the roll rate adds a moment roll_rate_moment phi', or the cube of the roll angle a moment roll_cubic phi^3.
 Source: Fossen 2011, section 7.5 (6-DOF underwater vehicle, coupled terms linearised in phi).
 """
 
@@ -21,7 +21,7 @@ def terms(values: Values, record: Record) -> Terms:
     if "roll_rate_moment" in values:
         moment = moment + values["roll_rate_moment"] * np.gradient(roll, record.time)
     if "roll_cubic" in values:
-        moment = moment + values["roll_cubic"] * (roll * roll * roll)  # a power costs ten times the products
+        moment = moment + values["roll_cubic"] * (roll * roll * roll)  # a power takes ten times as long as the products
     return Terms(moment=moment)
 
 

@@ -1,9 +1,9 @@
 """The fin follows its command as a first-order lag: lag d(delta)/dt = command - delta, lag >= 0 in s.
 
-The response to a straight-line command is exact, and so is its mean over the interval; the servo starts at rest on
-the command. In its form of second order the servo has inertia: inertia_share lag^2 d2(delta)/dt2 is added on the left, which
-is damped by 1 / (2 sqrt(inertia_share)). In another it follows
-with lag_ratio times the lag while it falls. Source: Van Amerongen 1982 (the steering machine, linear part).
+The response to a command that is linear over the interval is exact, and so is its mean; the servo starts at rest at the command.
+In one variant the servo has inertia: inertia_share lag^2 d2(delta)/dt2 is added on the left, a second-order lag with the damping
+ratio 1 / (2 sqrt(inertia_share)). In another the lag is lag_ratio times as long while the fin angle falls.
+Source: Van Amerongen 1982 (the steering machine, linear part).
 """
 
 from __future__ import annotations
@@ -19,19 +19,20 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 
 FASTEST_S = 1e-6
-"""A lag below this moves nothing that can be measured; the command is returned as it is."""
+"""A lag below this has no measurable effect; the command is returned unchanged."""
 EQUAL_STEP_SHARE = 1e-12
-"""Steps that differ by less, of themselves, decay alike: the exponential of the last one is taken."""
+"""Relative difference of step / lag below which the exponential of the last step is used again."""
 
 
 @jit
 def lagged(steps: FloatArray, start: FloatArray, end: FloatArray, rising: float, falling: float, out: FloatArray) -> None:
-    """Fill out (n-1, 4) with line and ends of the lagged path: fin = line - lag slope + c exp(-t / lag).
+    """Fill out (n-1, 4) with lines and ends of the lagged path: fin = command - lag slope + c exp(-t / lag).
 
-    The lag is that of the side the fin moves to at the start of an interval; a held command lets it turn nowhere else.
+    The lag is `rising` or `falling` by the direction in which the fin moves at the start of an interval; under a zero-order-hold
+    command the direction cannot change within the interval.
     """
     fin = start[0]
-    x, gone, bend = 0.0, 0.0, 0.0
+    x, decayed, bend = 0.0, 0.0, 0.0
     for i in range(start.shape[0]):
         h = steps[i]
         lag = rising if start[i] >= fin else falling
@@ -39,15 +40,15 @@ def lagged(steps: FloatArray, start: FloatArray, end: FloatArray, rising: float,
         c = fin - start[i] + slope * lag
         if abs(h / lag - x) > EQUAL_STEP_SHARE * x:
             x = h / lag
-            gone = -np.expm1(-x)
+            decayed = -np.expm1(-x)
             if x < 1e-2:
                 # First moment of the exponential about the middle, as a series: the closed form cancels.
                 bend = -x * (1.0 - 0.5 * x + 0.15 * x * x)
             else:
-                bend = 12.0 / (x * x) * (1.0 - (1.0 - gone) * (1.0 + x) - 0.5 * x * gone)
-        mean = start[i] + slope * (0.5 * h - lag) + c * gone / x
+                bend = 12.0 / (x * x) * (1.0 - (1.0 - decayed) * (1.0 + x) - 0.5 * x * decayed)
+        mean = start[i] + slope * (0.5 * h - lag) + c * decayed / x
         half = 0.5 * (slope * h + c * bend)
-        last = start[i] + slope * (h - lag) + c * (1.0 - gone)
+        last = start[i] + slope * (h - lag) + c * (1.0 - decayed)
         out[i, 0], out[i, 1], out[i, 2], out[i, 3] = mean - half, mean + half, fin, last
         fin = last
 
@@ -56,8 +57,8 @@ def lagged(steps: FloatArray, start: FloatArray, end: FloatArray, rising: float,
 def swung(steps: FloatArray, start: FloatArray, end: FloatArray, lag: float, inertia: float, out: FloatArray) -> None:
     """Fill out (n-1, 4) as `lagged` does for inertia delta'' + lag delta' + delta = command, inertia in s^2.
 
-    e, the fin less the line it follows, has no command: its integrals follow from its own equation, its end from the
-    exponential of that.
+    e, the fin angle less the steady response to the linear command, obeys the homogeneous equation: its value at the end of an
+    interval is that of the matrix exponential, and its integrals follow from the equation.
     """
     fin, speed = start[0], 0.0
     decay = -0.5 * lag / inertia
@@ -86,7 +87,7 @@ def swung(steps: FloatArray, start: FloatArray, end: FloatArray, lag: float, ine
 
 
 def fin(path: FinPath, values: Values, record: Record) -> FinPath:
-    """Return the path of a fin behind a servo of first order, or of second order where its inertia is given, (n-1,) rad."""
+    """Return the path of the fin behind a servo of first order, or of second order with `inertia_share`, (n-1,) rad."""
     lag = float(values["lag"])
     if lag <= FASTEST_S:
         return path
@@ -98,12 +99,12 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
 
 
 def equivalent_solution(values: Values, axis: Axis) -> dict[str, float] | None:
-    """Return the start with the servo's slow pole and the hull's fast one exchanged: in yaw the same response at one speed.
+    """Return the values with the slow pole of the servo and the fast pole of the hull exchanged; None where that is impossible.
 
-    With inertia the servo's two time constants T1 >= T2 have the sum `lag` and the product inertia_share lag^2; they are real
-    where inertia_share is 1/4 at most. A hull that drifts has two poles, of s^2 + (a22 + c) s + a22 c + c_r with the cross
-    state's damping c and rate c_r, and keeps its zero -c: the slow pole stays, the fast one is exchanged; complex ones are not.
-    A hull that the cross flow along it holds has no poles of its own.
+    In yaw both have the same response at one speed. With inertia the servo's two time constants T1 >= T2 have the sum `lag` and
+    the product inertia_share lag^2; they are real where inertia_share is at most 1/4. A hull with a cross state has the poles of
+    s^2 + (a22 + c) s + a22 c + c_r, with c = cross_damping and c_r = cross_rate, and the zero -c: its fast pole is exchanged if
+    both are real, its slow pole and its zero stay. The drag of the cross flow (strip_drag) is nonlinear and has no poles.
     """
     names, lag = NAMES[axis], values["lag"]
     apart = 1.0 - 4.0 * values.get("inertia_share", 0.0)
@@ -111,22 +112,25 @@ def equivalent_solution(values: Values, axis: Axis) -> dict[str, float] | None:
     if axis is not Axis.YAW or poles is None or lag <= FASTEST_S or apart < 0.0:
         return None
     slow, fast = (0.5 * lag * (1.0 + sign * np.sqrt(apart)) for sign in (1.0, -1.0))
-    pole, kept = poles
-    moved = 1.0 / pole + fast
+    pole, slow_pole = poles
+    new_lag = 1.0 / pole + fast
     exchanged = {
         names.damping: 1.0 / slow,
-        "lag": moved,
+        "lag": new_lag,
         names.authority: values[names.authority] / (slow * pole),
     }
-    if kept is not None:
+    if slow_pole is not None:
         zero = values["cross_damping"]
-        exchanged[names.damping] += kept - zero
-        exchanged["cross_rate"] = kept / slow - exchanged[names.damping] * zero
-    return exchanged | {"inertia_share": fast / pole / moved**2} if "inertia_share" in values else exchanged
+        exchanged[names.damping] += slow_pole - zero
+        exchanged["cross_rate"] = slow_pole / slow - exchanged[names.damping] * zero
+    return exchanged | {"inertia_share": fast / pole / new_lag**2} if "inertia_share" in values else exchanged
 
 
 def _hull_poles(damping: float, values: Values) -> tuple[float, float | None] | None:
-    """Return a hull's fast pole and, where it drifts, its slow one, in 1/s; None where they are complex or the fast one grows."""
+    """Return the fast pole of the hull and, with a cross state, the slow one, as decay rates in 1/s.
+
+    None where they are complex or the fast one is unstable.
+    """
     if "cross_damping" not in values:
         return (damping, None) if damping > 0.0 else None
     if "strip_drag" in values:

@@ -1,7 +1,7 @@
 """A trim moment that grows with speed: q' += speed_moment u^2, u the smoothed surge in m/s, speed_moment in 1/m^2.
 
-Lift of a hull that is not symmetric top to bottom; the trim Cb is then that at zero speed. In its
-other form it goes with another power of the speed, speed_moment u^speed_power, as where the flow separates.
+It is the lift of a hull that is not symmetric top to bottom; the trim Cb is then that at zero speed. In its variant the moment is
+speed_moment u^speed_power, as where the flow separates.
 Source: Prestero 2001, chapter 4 (body lift moment M_uw u w and fin moment, both ~ u^2).
 """
 
@@ -15,7 +15,7 @@ from fieldsid.models.record import Record
 
 
 def terms(values: Values, record: Record) -> Terms:
-    """Return the moment that goes with speed squared, (n,) rad/s^2."""
+    """Return the moment of the speed, (n,) rad/s^2."""
     if "speed_power" in values:
         return Terms(moment=values["speed_moment"] * np.maximum(record["surge"], 0.0) ** values["speed_power"])
     return Terms(moment=values["speed_moment"] * record["surge"] ** 2)

@@ -1,8 +1,8 @@
 """Speed changes within the run: authority goes as f^2, damping and cross state as f, f = (u/u_run)^speed_share.
 
-u is the smoothed surge, u_run its median over the run, where the run's parameters hold; 1 is lift theory (fin
-force ~ u^2, linear damping ~ u), 0 no dependence. In its other form the damping goes with a power of its own: that of potential
-damping and skin friction does not grow with the speed. Source: Fossen 2011, section 6.4; the paper's b2(u^2) law.
+u is the smoothed surge and u_run its median over the run, at which the run's parameters hold. speed_share = 1 is lift theory (fin
+force ~ u^2, linear damping ~ u), 0 no dependence. In its variant the damping has an exponent of its own (damping_share):
+potential damping and skin friction do not grow with the speed. Source: Fossen 2011, section 6.4; the paper's b2(u^2) law.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Lift falls off at large fin angles: beyond stall_angle the effective angle grows with slope_after only.
 
     delta = sign(d) (stall_angle + slope_after (|d| - stall_angle))   for |d| > stall_angle, else d
-slope_after = 1 is no stall, 0 a lift that stays, negative one that drops. In its smooth form the corner is rounded over
-stall_blend to either side; or the lift drops by the share stall_drop at the angle. Source: Whicker and Fehlner 1958, DTMB
-report 933 (lift of low-aspect-ratio control surfaces).
+slope_after = 1 is no stall, 0 a constant lift beyond the angle, a negative one a falling lift. In its variants the corner is
+rounded over stall_blend to either side, or the lift drops by the share stall_drop at the angle. Source: Whicker and Fehlner 1958,
+DTMB report 933 (lift of low-aspect-ratio control surfaces).
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Something changes for good during the run, such as a lost fin: from the event on authority (1 - loss), moment + moment_step.
 
     b(t) = b (1 - loss H(t)),   moment = moment_step H(t),   H from 0 to 1 at event_time over one sample
-event_time is a share of the run's length and every run has its own. Source: Blanke et al. 2016, Diagnosis and
-Fault-Tolerant Control, chapter 2 (abrupt actuator fault).
+event_time is a share of the run's length, estimated for each run. In its variant H rises over `ramp` seconds. Source: Blanke et
+al. 2016, Diagnosis and Fault-Tolerant Control, chapter 2 (abrupt actuator fault).
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
 GRID = tuple(round(0.05 * i, 2) for i in range(21))
-"""Shares of a run; at the first of them it had all happened before, at the last nothing has happened in it."""
+"""Event times that are tried, as shares of a run: at 0 the change happened before the run, at 1 after it."""
 
 
 def happened(share: float, record: Record, ramp: float = 0.0) -> FloatArray:
-    """Return H (n,): 0 before the event, 1 once `ramp` s have gone by, one sample longer so that it has a derivative."""
+    """Return H (n,): 0 before the event, 1 after it; it rises over `ramp` s plus one sample, so that it has a derivative."""
     length = float(record.time[-1] - record.time[0])
     event = record.time[0] + share * length
     sample = length / max(record.time.size - 1, 1)

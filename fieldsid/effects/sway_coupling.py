@@ -1,9 +1,10 @@
 """Sway takes part in yaw through the Munk moment: an extra state x, the yaw moment of the sway speed (rad/s^2).
 
     r' += x,   x' = -cross_damping f x - cross_rate f^2 r,   f = (speed / reference speed)^p
-From v' = -a11 v - a12 r + b1 delta and r' = -a21 v - a22 r + b2 delta, all of it lift, so a11, a12, a21 ~ u and b1 ~ u^2.
-The fin's own side force b1 cannot be seen in yaw: with z = -a21 v + (a21 b1 / b2) r it drops out and leaves the same
-transfer function, a zero at -cross_damping and two poles. So x is that combination; needs no sway sensor.
+It follows from v' = -a11 v - a12 r + b1 delta and r' = -a21 v - a22 r + b2 delta, where all terms are lift, so that
+a11, a12, a21 ~ u and b1 ~ u^2. The side force b1 of the fin is not identifiable from yaw: in terms of
+x = -a21 v + (a21 b1 / b2) r it drops out, and the transfer function keeps its form, a zero at -cross_damping and two poles.
+No sway sensor is needed.
 Source: Fossen 2011, section 7.2 (second-order Nomoto: K, T1, T2, T3 are the same four numbers); the paper's full form.
 """
 

@@ -1,9 +1,9 @@
 """The trim moment drifts: moment = drift (t - t_first) / 60, drift in rad/s^2 per minute, t_first the run's first sample.
 
-Flooding, a shifting battery or a cooling servo causes it; the trim parameter is that of the run's start. Positive
-drift turns toward positive angle. In its other forms it levels off: drift (1 - exp(-levelling t)) / levelling, or gathers
-pace where levelling is negative; or it goes with a power of the speed, drift u^drift_power: what wanders is then the fin, whose
-moment goes with u^2, and not a weight.
+Flooding, a shifting battery or a cooling servo causes it; the trim parameter is that at the start of the run. A positive drift
+turns toward positive angle. In one variant it levels off, drift (1 - exp(-levelling t)) / levelling, or accelerates where
+levelling is negative. In the other it is proportional to a power of the speed, drift u^drift_power: a fin whose zero drifts has a
+moment in proportion to u^2, a weight that shifts has not.
 Source: Fossen 2011, sections 4.1 (restoring moment of a moving centre of gravity) and 6.4 (lift against u^2).
 """
 
@@ -17,7 +17,7 @@ from fieldsid.models.record import Record
 
 MINUTE_S = 60.0
 MIN_LEVELLING_RATE_1_S = 1e-6
-"""Rate of levelling off in 1/s, of either sign, below which a drift is steady."""
+"""Absolute value of `levelling` in 1/s below which the drift is computed as linear."""
 
 
 def terms(values: Values, record: Record) -> Terms:

@@ -1,8 +1,8 @@
 """A regular wave shakes the hull: moment = amplitude sin(2 pi (t - t_first) / period + phase).
 
-period (s) and amplitude (rad/s^2, >= 0) are those of the sea state, phase (rad) is each run's own. In its other forms a
-second component of another period joins it, with an amplitude and phase of each run's own, or the frequency shifts
-evenly over a run, f(t) = (1 + sweep (t - t_middle)) / period, as it does where speed or course change.
+period (s) and amplitude (rad/s^2, >= 0) are common to all runs, phase (rad) is estimated for each run. In one variant there is a
+second component of another period, whose amplitude and phase are estimated for each run. In the other the frequency changes
+linearly over a run, f(t) = (1 + sweep (t - t_middle)) / period, as it does where speed or course change.
 Source: Fossen 2011, section 8.2 (first-order wave moment, one or more components; frequency of encounter).
 """
 
@@ -18,7 +18,7 @@ from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values, Va
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
-SHORTEST_S, LONGEST_S, TRIED, KEPT = 1.0, 30.0, 60, 2
+SHORTEST_S, LONGEST_S, TRIED, PEAKS = 1.0, 30.0, 60, 2
 
 
 def terms(values: Values, record: Record) -> Terms:
@@ -33,7 +33,7 @@ def terms(values: Values, record: Record) -> Terms:
 
 
 def slope(name: str, values: Values, record: Record) -> FloatArray:
-    """Return the derivative of the wave's moment by one of its numbers, (n,)."""
+    """Return the derivative of the wave's moment by one of its coefficients, (n,)."""
     since, turns = record.time - record.time[0], 2.0 * math.pi
     if name.startswith("second_"):
         angle = turns * since / values["second_period"]
@@ -44,27 +44,27 @@ def slope(name: str, values: Values, record: Record) -> FloatArray:
                 return np.asarray(np.cos(angle))
         swing = values["second_sin"] * np.cos(angle) - values["second_cos"] * np.sin(angle)
         return np.asarray(-swing * angle / values["second_period"])
-    bent = 0.5 * since * (since - since[-1])
-    shifted = turns * (since + values.get("sweep", 0.0) * bent) / values["period"]
+    by_sweep = 0.5 * since * (since - since[-1])
+    shifted = turns * (since + values.get("sweep", 0.0) * by_sweep) / values["period"]
     if name == "amplitude":
         return np.asarray(np.sin(shifted + values["phase"]))
     by_angle = values["amplitude"] * np.cos(shifted + values["phase"])
-    of_angle = {"phase": 1.0, "period": -shifted / values["period"], "sweep": turns * bent / values["period"]}
+    of_angle = {"phase": 1.0, "period": -shifted / values["period"], "sweep": turns * by_sweep / values["period"]}
     return np.asarray(by_angle * of_angle[name])
 
 
 def initial_guesses(records: Sequence[Record], residuals: Sequence[FloatArray]) -> list[dict[str, float]]:
-    """Return the wave of each period that stands out of what is left."""
-    return [{"period": period, "amplitude": 0.02} for period in swings(records, residuals)]
+    """Return a wave at each period at which the residuals have a spectral peak."""
+    return [{"period": period, "amplitude": 0.02} for period in spectral_peaks(records, residuals)]
 
 
 def suggest_second(records: Sequence[Record], residuals: Sequence[FloatArray]) -> list[dict[str, float]]:
-    """Return the second component of each period that stands out of what the first has left."""
-    return [{"second_period": period} for period in swings(records, residuals)]
+    """Return a second component at each period at which the residuals of the first have a spectral peak."""
+    return [{"second_period": period} for period in spectral_peaks(records, residuals)]
 
 
-def swings(records: Sequence[Record], residuals: Sequence[FloatArray]) -> list[float]:
-    """Return the periods at which the rate residual of all runs together swings most (Lomb-Scargle by projection)."""
+def spectral_peaks(records: Sequence[Record], residuals: Sequence[FloatArray]) -> list[float]:
+    """Return the periods (s) of the highest peaks in the summed periodogram of all runs' rate residuals (Lomb-Scargle)."""
     periods = np.geomspace(SHORTEST_S, LONGEST_S, TRIED)
     power = np.zeros(periods.size)
     for record, residual in zip(records, residuals, strict=True):
@@ -74,7 +74,7 @@ def swings(records: Sequence[Record], residuals: Sequence[FloatArray]) -> list[f
         e = e - e.mean()
         power += (np.sin(turn) @ e) ** 2 / e.size + (np.cos(turn) @ e) ** 2 / e.size
     peaks = [i for i in range(periods.size) if power[i] == power[max(0, i - 3) : i + 4].max()]
-    best = sorted(peaks, key=lambda i: -power[i])[:KEPT]
+    best = sorted(peaks, key=lambda i: -power[i])[:PEAKS]
     return [float(periods[i]) for i in best]
 
 
