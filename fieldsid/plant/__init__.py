@@ -1,1 +1,1 @@
-"""The vehicle as turns and gain schedules need it: parameters at a speed, and the yaw plant."""
+"""The plant for turns and gain schedules: parameters at a speed, and the yaw plant."""

@@ -1,4 +1,4 @@
-"""Where parameters at a speed come from: identified models, a table of points, or fitted laws; with draws of their errors."""
+"""The source of parameters at a speed: identified models, a table of points, or fitted laws; with draws from their errors."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from fieldsid.plant.points import (
     Point,
     check_authority,
     distinct_speeds,
-    meant_speeds,
-    of_known_sign,
+    intended_speeds,
+    places_of_one_sign,
     points_of,
 )
 from fieldsid.plant.table import read_table
@@ -39,16 +39,17 @@ from fieldsid.rounding import nine_digits
 
 MAX_PROPOSALS = 40
 LEAST_SHARE = 0.05
-"""A draw keeps the sign of damping and authority, and this share of the estimate: no plant turns the other way."""
+"""Damping and authority of a draw have the sign of the estimate, and at least this share of its size."""
 TABLE_SUFFIXES = (".csv", ".txt", ".tsv")
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class ParameterSource(Brief):
-    """Points of one axis at rising speeds; the models they came from (none for a table); laws where two speeds allow them.
+    """Points of one axis in order of speed, the models that they came from (none for a table), and laws if there are two speeds.
 
-    A fit file carries its models, and its laws are those of the file. `left_out` are models that have the
-    authority with another sign than the rest at a speed where its sign is not known; their `paths` follow the models' own.
+    A fit file contains its models, and its laws are those of the file. `own_laws` names the parameters whose law the user gave.
+    `runs_flown` is the range of speeds in the runs. `left_out` names models whose authority has another sign than the others' at
+    a speed where it is not significant; their `paths` come after those of the models.
     """
 
     axis: Axis
@@ -69,8 +70,8 @@ class ParameterSource(Brief):
 
     @property
     def knots(self) -> list[float]:
-        """Speeds (m/s) at which something is said where none is asked for: a table's, or those that runs were to be flown at."""
-        return meant_speeds(self.speeds) if self.models else list(dict.fromkeys(self.speeds.tolist()))
+        """The speeds (m/s) that results are for by default: those of a table, or the intended speeds of the models' runs."""
+        return intended_speeds(self.speeds) if self.models else list(dict.fromkeys(self.speeds.tolist()))
 
     @property
     def largest_fin(self) -> float:
@@ -79,19 +80,19 @@ class ParameterSource(Brief):
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """What is said of models that are left out."""
+        """A note on the models that are left out, if there are any."""
         if not self.left_out:
             return ()
         words = f"the sign of its {NAMES[self.axis].authority} is not known at a speed, and another than the fin's: left out"
         return (Note("model_left_out", f"{', '.join(self.left_out)}: {words}", {"models": list(self.left_out)}),)
 
     def fitted(self, *, weighted: bool = True) -> Laws:
-        """Return the laws of the points, with what is said of models that are left out; raises DataError as `fit_laws` does."""
-        found = fit_laws(self.axis, self.points, weighted=weighted)
-        return replace(found, notes=(*found.notes, *self.notes))
+        """Return the laws of the points, with the note on models that are left out; raises DataError as `fit_laws` does."""
+        laws = fit_laws(self.axis, self.points, weighted=weighted)
+        return replace(laws, notes=(*laws.notes, *self.notes))
 
     def supports(self, speed: float) -> bool:
-        """Whether a speed lies within those the data were taken at."""
+        """Whether a speed (m/s) lies within the range of the data."""
         low, high = float(self.speeds[0]), float(self.speeds[-1])
         for model in self.models:
             low = min(low, model.trained.get("speed_low", low))
@@ -100,8 +101,8 @@ class ParameterSource(Brief):
             low, high = min(low, self.runs_flown[0]), max(high, self.runs_flown[1])
         return low * (1 - EQUAL_SPEED_SHARE) <= speed <= high * (1 + EQUAL_SPEED_SHARE)
 
-    def models_flown_by(self, runs: Sequence[Run]) -> ParameterSource:
-        """Return the source knowing the speeds its runs really had: the entry speed of a turn is above a run's median."""
+    def with_speeds_of(self, runs: Sequence[Run]) -> ParameterSource:
+        """Return the source with the range of speeds of its runs: the entry speed of a turn is above the median of its run."""
         surges = [r["surge_m_s"] for r in runs if knows_speed(r)]
         if not surges:
             return self
@@ -109,7 +110,10 @@ class ParameterSource(Brief):
         return replace(self, runs_flown=(float(spans[:, 0].min()), float(spans[:, 1].max())))
 
     def near(self, speed: float) -> list[tuple[int, float]]:
-        """Return the models next to a speed with weights that sum to one, linear in log speed, alike for models of one speed."""
+        """Return the indices of the models next to a speed with their weights, which are linear in log speed and sum to one.
+
+        Models of the same speed have equal weights.
+        """
         known = np.array([nine_digits(m.law.reference) for m in self.models])
         if known.size == 1 or not np.isfinite(known).all():
             return [(0, 1.0)]
@@ -123,48 +127,49 @@ class ParameterSource(Brief):
         ]
 
     def base_at(self, speed: float) -> dict[str, float]:
-        """Return the base parameters at a speed: the point's own where one is there and no law of the user's overrides it.
+        """Return the base parameters at a speed: of a law that the user gave, else of a point at that speed, else of the laws.
 
-        Else the laws', or the single point's scaled as lift: damping with u, authority and a fin's offset with u^2.
+        Without laws the single point is scaled as lift: damping ~ u, authority and the trim moment of a fin offset ~ u^2.
         """
-        here = self._point_at(speed)
+        point = self._point_at(speed)
         if self.laws is None:
-            return self._scaled(here or self.points[0], speed)
+            return self._scaled(point or self.points[0], speed)
         laws = self.laws.at(speed)
-        own = {} if here is None else self._scaled(here, speed)
-        return {**laws, **own, **{n: laws[n] for n in self.own_laws}}
+        of_point = {} if point is None else self._scaled(point, speed)
+        return {**laws, **of_point, **{n: laws[n] for n in self.own_laws}}
 
     def require(self, speeds: Sequence[float]) -> None:
-        """Raise DataError where damping or authority is not known at one of some speeds (m/s): there is no plant without them."""
+        """Raise DataError where damping or authority is not known, or the authority is zero, at one of the speeds (m/s)."""
         names = NAMES[self.axis]
         for speed in speeds:
             known = self.base_at(speed)
-            lacking = [n for n in (names.damping, names.authority) if n not in known]
-            if not lacking and known[names.authority] == 0.0:
+            missing = [n for n in (names.damping, names.authority) if n not in known]
+            if not missing and known[names.authority] == 0.0:
                 raise DataError(
                     f"`{names.authority}` is zero at {speed:.3g} m/s",
                     found="a fin that turns nothing",
                     hint="mend it, or leave it out",
                 )
-            if lacking:
+            if missing:
                 raise DataError(
-                    f"`{lacking[0]}` is not known at {speed:.3g} m/s",
+                    f"`{missing[0]}` is not known at {speed:.3g} m/s",
                     found=", ".join(f"{n} = {v:.4g}" for n, v in known.items()),
-                    hint=f"give `{lacking[0]}` at that speed, or at two others to draw a law through",
+                    hint=f"give `{missing[0]}` at that speed, or at two others to draw a law through",
                 )
 
     def base_std_at(self, speed: float) -> dict[str, float]:
-        """Return standard errors of the base parameters at a speed: the point's own, else the law's with the points' scatter."""
-        here = self._point_at(speed)
-        own = {} if here is None else dict(here.std_errors)
+        """Return standard errors of the base parameters at a speed: of a point there, else prediction errors of the laws."""
+        point = self._point_at(speed)
+        of_point = {} if point is None else dict(point.std_errors)
         if self.laws is None:
-            return own or dict(self.points[0].std_errors)
-        return {**{n: _spread(law, speed) for n, law in self.laws.by_name.items()}, **own}
+            return of_point or dict(self.points[0].std_errors)
+        return {**{n: _prediction_error(law, speed) for n, law in self.laws.by_name.items()}, **of_point}
 
     def centred_at(self, speed: float) -> dict[str, float]:
-        """Return the base parameters at a speed that laws say and models do not: the user's own laws, everywhere.
+        """Return the base parameters at a speed that come from laws and replace those of the models.
 
-        Beyond the speeds of the points a fit file's laws say how they go on from the last of them.
+        These are the parameters of the user's laws. Beyond the speeds of the points also those of a fit file: the value at the
+        last point plus the change of the law from there.
         """
         if self.laws is None:
             return {}
@@ -173,11 +178,11 @@ class ParameterSource(Brief):
         edge = float(np.clip(speed, self.speeds[0], self.speeds[-1]))
         if not self.is_fit_file or abs(edge - speed) <= EQUAL_SPEED_SHARE * speed:
             return own
-        last, there = self.base_at(edge), self.laws.at(edge)
-        return {n: last[n] + at[n] - there[n] for n in at} | own
+        last, law_at_edge = self.base_at(edge), self.laws.at(edge)
+        return {n: last[n] + at[n] - law_at_edge[n] for n in at} | own
 
     def _point_at(self, speed: float) -> Point | None:
-        """Return the point whose speed counts as the same, None where there is none."""
+        """Return the point at a speed to within EQUAL_SPEED_SHARE, None where there is none."""
         nearest = min(self.points, key=lambda p: abs(nine_digits(p.speed) - nine_digits(speed)))
         return nearest if abs(nearest.speed - speed) <= EQUAL_SPEED_SHARE * speed else None
 
@@ -193,18 +198,18 @@ class ParameterSource(Brief):
         return out
 
     def base_draws(self, speed: float, count: int, rng: np.random.Generator) -> dict[str, FloatArray]:
-        """Return draws (count,) of the base parameters at a speed, the first the estimate."""
+        """Return draws (count,) of the base parameters at a speed; the first is the estimate."""
         return self._base_drawn(speed, count, rng)[0]
 
     def share_rejected(self, speed: float, count: int, seed: int) -> float:
-        """Return the share of the draws at a speed that are rejected as outside what is physical, of the model where most are."""
+        """Return the share of the draws at a speed that are rejected as unphysical, the largest over the models."""
         if not self.models:
             return self._base_drawn(speed, count, np.random.default_rng(seed))[1]
         near = [(self.models[i], np.random.default_rng(seed + i)) for i, _ in self.near(speed)]
         return max(_drawn_inside(model, count, rng)[1] for model, rng in near)
 
     def _base_drawn(self, speed: float, count: int, rng: np.random.Generator) -> tuple[dict[str, FloatArray], float]:
-        """Return the draws and the share that was rejected for a damping or an authority of the other sign, and drawn anew."""
+        """Return the draws, and the share that was rejected for the sign of damping or authority and drawn again."""
         values, spread, names = self.base_at(speed), self.base_std_at(speed), NAMES[self.axis]
         centre = np.array([values.get(n, 0.0) for n in names.base])
         signed = [names.base.index(n) for n in (names.damping, names.authority)]
@@ -216,30 +221,30 @@ class ParameterSource(Brief):
             drawn = centre[:, None] + width[:, None] * z
             least = LEAST_SHARE * np.abs(centre[signed])
             outside = np.any(drawn[signed] * np.sign(centre[signed])[:, None] < least[:, None], axis=0)
-            again = int(outside.sum())
-            rejected += again
-            if again == 0:
+            repeated = int(outside.sum())
+            rejected += repeated
+            if repeated == 0:
                 break
-            z[:, outside] = rng.standard_normal((len(names.base), again))
+            z[:, outside] = rng.standard_normal((len(names.base), repeated))
         else:
             z[:, outside] = 0.0
         return {n: centre[i] + width[i] * z[i] for i, n in enumerate(names.base)}, rejected / (count + rejected)
 
 
-def _spread(law: ParameterLaw, speed: float) -> float:
-    """Return the error of a law at a speed: its own, and that of one more point (its stated error, or the others' scatter)."""
+def _prediction_error(law: ParameterLaw, speed: float) -> float:
+    """Return the prediction error of a law at a speed: its standard error and that of a new point, stated or by scatter."""
     line = law.line
-    width = float(np.nan_to_num(line.std(speed)[0]))
+    law_error = float(np.nan_to_num(line.std(speed)[0]))
     if law.std_errors is not None:
-        return float(np.hypot(width, np.interp(speed, law.speeds, law.std_errors)))
+        return float(np.hypot(law_error, np.interp(speed, law.speeds, law.std_errors)))
     scatter = line.rms * np.sqrt(law.values.size / line.dof) if line.dof > 0 else 0.0
-    return float(np.hypot(width, scatter))
+    return float(np.hypot(law_error, scatter))
 
 
 def load_parameter_source(paths: Sequence[Path], *, laws: Sequence[str] = ()) -> ParameterSource:
-    """Return the source that files give: one table, one fit file, or models; `laws` are the user's own, `NAME=c0[,c1]`.
+    """Return the source of the parameters in files: one table, one fit file, or models; `laws` are the user's, `NAME=c0[,c1]`.
 
-    Raises UsageError for a mix of kinds, DataError and ArtifactError as the files deserve.
+    Raises UsageError for a mix of kinds, DataError or ArtifactError for a file that cannot be used.
     """
     if not paths:
         raise UsageError("nothing to work on", found="no file", hint="give model files, a fit file, or a table with speed_m_s")
@@ -267,49 +272,49 @@ def load_parameter_source(paths: Sequence[Path], *, laws: Sequence[str] = ()) ->
 def source_of_models(
     models: Sequence[Model], names: Sequence[str], *, laws: Sequence[str] = (), paths: Sequence[Path] = ()
 ) -> ParameterSource:
-    """Return the source of models with a name each, by speed and name, in whatever order they are given.
+    """Return the source of models with their names; the models are sorted by speed and name.
 
     Raises UsageError and DataError as `load_parameter_source` does.
     """
     if not models:
         raise UsageError("nothing to work on", found="no model", hint="give models, or the files of models")
-    # each model's draws come of its own seed, its place: a shell that lists files otherwise changes no gain
+    # the place of a model is the seed of its draws: the order in which a shell lists the files must not change a gain
     order = sorted(range(len(models)), key=lambda i: (nine_digits(models[i].law.reference), names[i]))
     models, names = [models[i] for i in order], [names[i] for i in order]
     paths = [paths[i] for i in order] if len(paths) == len(order) else paths
     axis, points = points_of(models, names)
-    kept = of_known_sign(axis, models, points)
-    dropped = [i for i in range(len(models)) if i not in kept]
-    taken = [p for i in kept for p in points[i]]
-    ordered = [paths[i] for i in (*kept, *dropped)] if len(paths) == len(models) else paths
-    source = _with_laws(axis, taken, tuple(models[i] for i in kept), tuple(names[i] for i in kept), ordered, laws)
+    used = places_of_one_sign(axis, models, points)
+    dropped = [i for i in range(len(models)) if i not in used]
+    used_points = [p for i in used for p in points[i]]
+    ordered = [paths[i] for i in (*used, *dropped)] if len(paths) == len(models) else paths
+    source = _with_laws(axis, used_points, tuple(models[i] for i in used), tuple(names[i] for i in used), ordered, laws)
     return replace(source, left_out=tuple(names[i] for i in dropped))
 
 
 def source_of_laws(
     found: Laws, carried: Sequence[tuple[str, Model]] = (), *, laws: Sequence[str] = (), paths: Sequence[Path] = ()
 ) -> ParameterSource:
-    """Return the source of fitted laws and the models they carry, the user's own laws in place of theirs; raises UsageError."""
+    """Return the source of fitted laws and their models, with the user's `laws` in place of those fitted; raises UsageError."""
     for text in laws:
         found = with_own_law(found, text)
     own = tuple(t.partition("=")[0] for t in laws)
     names, models = [n for n, _ in carried], [m for _, m in carried]
-    kept = of_known_sign(found.axis, models, points_of(models, names)[1]) if carried else []
+    used = places_of_one_sign(found.axis, models, points_of(models, names)[1]) if carried else []
     return ParameterSource(
-        found.axis, found.points, tuple(models[i] for i in kept), tuple(names[i] for i in kept), found, tuple(paths), own,
-        is_fit_file=True, left_out=tuple(n for i, n in enumerate(names) if i not in kept),
+        found.axis, found.points, tuple(models[i] for i in used), tuple(names[i] for i in used), found, tuple(paths), own,
+        is_fit_file=True, left_out=tuple(n for i, n in enumerate(names) if i not in used),
     )  # fmt: skip
 
 
 def draw_values(model: Model, count: int, rng: np.random.Generator) -> tuple[list[dict[str, float]], FloatArray]:
     """Return draws of a model's values from its covariance, the first the estimate, and of its damping exponent (count,).
 
-    A draw outside the bounds that the effects declare, or with a damping or an authority of the other sign, is rejected as a
-    whole: no value is moved to its bound. Where `MAX_PROPOSALS` times as many leave fewer than `count`, these come again.
+    A draw outside the bounds of the effects, or with another sign of damping or authority, is rejected: no value is moved to a
+    bound. Where `MAX_PROPOSALS` times as many proposals give fewer than `count` draws, the draws are repeated.
     """
-    taken, _ = _drawn_inside(model, count - 1, rng)
-    own = dict(model.values)
-    draws = [own, *(own | dict(zip(model.free, map(float, row), strict=True)) for row in taken)]
+    rows, _ = _drawn_inside(model, count - 1, rng)
+    estimate = dict(model.values)
+    draws = [estimate, *(estimate | dict(zip(model.free, map(float, row), strict=True)) for row in rows)]
     if EXPONENT in model.free:
         return draws, np.array([d[EXPONENT] for d in draws])
     exponent = np.full(count, model.law.damping_exponent)
@@ -320,7 +325,7 @@ def draw_values(model: Model, count: int, rng: np.random.Generator) -> tuple[lis
 
 
 def _drawn_inside(model: Model, count: int, rng: np.random.Generator) -> tuple[FloatArray, float]:
-    """Return draws (count, p) of a model's free values inside the bounds, and the share of the proposals that was rejected."""
+    """Return draws (count, p) of a model's free values within their bounds, and the share of proposals that was rejected."""
     covariance = np.nan_to_num(np.asarray(model.covariance))
     size = len(model.free)
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T)) if size else (np.zeros(0), np.zeros((0, 0)))
@@ -328,17 +333,17 @@ def _drawn_inside(model: Model, count: int, rng: np.random.Generator) -> tuple[F
     estimate = np.array([model.values[n] for n in model.free])
     bounds = _bounds(model)
     low, high = np.array([bounds.get(n, (-np.inf, np.inf)) for n in model.free]).reshape(size, 2).T
-    kept, proposed = np.empty((0, size)), 0
+    accepted, proposed = np.empty((0, size)), 0
     for _ in range(MAX_PROPOSALS):
         drawn = estimate + rng.standard_normal((count + 1, size)) @ root.T
         proposed += drawn.shape[0]
-        kept = np.concatenate([kept, drawn[np.all((drawn >= low) & (drawn <= high), axis=1)]])
-        if kept.shape[0] >= count:
+        accepted = np.concatenate([accepted, drawn[np.all((drawn >= low) & (drawn <= high), axis=1)]])
+        if accepted.shape[0] >= count:
             break
-    rejected = 1.0 - kept.shape[0] / proposed
-    if kept.shape[0] == 0:
-        kept = estimate[None, :]
-    return kept[np.arange(count) % kept.shape[0]], rejected
+    rejected = 1.0 - accepted.shape[0] / proposed
+    if accepted.shape[0] == 0:
+        accepted = estimate[None, :]
+    return accepted[np.arange(count) % accepted.shape[0]], rejected
 
 
 def _bounds(model: Model) -> dict[str, tuple[float, float]]:
@@ -355,7 +360,7 @@ def _is_fit(body: Mapping[str, Any]) -> bool:
 
 
 class NamedLog(NamedTuple):
-    """A log that a model names as what it was made from: its path then, where it is now, and the mapping it was read with."""
+    """A log that a model was fitted to: its path in the model's file, its present path, and the mapping it was read with."""
 
     named: str
     now: Path | None
@@ -363,7 +368,7 @@ class NamedLog(NamedTuple):
 
 
 def logs_of(paths: Sequence[Path]) -> tuple[NamedLog, ...]:
-    """Return the logs that model files, or a fit file's models, name as what they were made from."""
+    """Return the logs that the models in files, or in a fit file, were fitted to."""
     bodies = [(p, read_yaml(p)) for p in paths]
     records = [(p, r) for p, b in bodies for r in ([m["record"] for m in b["models"]] if _is_fit(b) else [b])]
     named = (NamedLog(str(i["path"]), where_now(i, p), mapping_in(r, p)) for p, r in records for i in r.get("inputs") or ())

@@ -1,4 +1,4 @@
-"""What the laws are drawn through: parameters at speeds, taken from identified models of one axis (a table: `table.py`)."""
+"""The points that laws are fitted to: parameters at speeds, from identified models of one axis (from a table: `table.py`)."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.records.keys import Key, Number
 
 EQUAL_SPEED_SHARE = 0.03
-"""Speeds closer than this fraction count as one: log-to-log spread of a held thrust setting."""
+"""Speeds that differ by less than this share count as one: the spread from log to log at one thrust setting."""
 SIGN_STD_ERRORS = 3.0
-"""Within so many of zero the sign of an authority is not known; `identify` calls it unclear then."""
+"""Standard errors from zero below which the sign of an authority is not known; `identify` calls it unclear."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -35,7 +35,7 @@ class Point(Brief):
 def points_of(models: Sequence[Model], names: Sequence[str]) -> tuple[Axis, tuple[tuple[Point, ...], ...]]:
     """Return the points of each identified model; a joint model gives one point per speed group.
 
-    Raises DataError when the models are of two axes, or one of them knows no speed.
+    Raises DataError when the models are of two axes, or the speed of one of them is not known.
     """
     axes = {m.axis for m in models}
     if len(axes) != 1:
@@ -44,41 +44,41 @@ def points_of(models: Sequence[Model], names: Sequence[str]) -> tuple[Axis, tupl
     return models[0].axis, tuple(tuple(_model_points(m, n)) for m, n in zip(models, names, strict=True))
 
 
-def of_known_sign(axis: Axis, models: Sequence[Model], points: Sequence[Sequence[Point]]) -> list[int]:
-    """Return the places of the models to take by the points of each: all, or those whose authority turns as the known ones do.
+def places_of_one_sign(axis: Axis, models: Sequence[Model], points: Sequence[Sequence[Point]]) -> list[int]:
+    """Return the places of the models, given with their points, whose authority has the sign of the significant ones.
 
-    An authority that cannot be told from zero at a speed does not say which way the fin turns. Where none can be told, the runs
-    of all say it, if they do (`fin_t`). Where those that can be told disagree, or nothing tells, all stay, to be refused.
+    Where no authority is significant, the t-values `fin_t` of all models' runs decide together. Where the significant ones
+    disagree, or the sign remains unknown, all models are returned, and `check_authority` refuses them if they disagree.
     """
     name = NAMES[axis].authority
-    everywhere = [p for of_model in points for p in of_model if name in p.values]
+    all_points = [p for of_model in points for p in of_model if name in p.values]
     known = {
-        float(np.sign(p.values[name])) for p in everywhere if abs(p.values[name]) >= SIGN_STD_ERRORS * p.std_errors.get(name, 0.0)
+        float(np.sign(p.values[name])) for p in all_points if abs(p.values[name]) >= SIGN_STD_ERRORS * p.std_errors.get(name, 0.0)
     } or _sign_of_runs(models)
     if len(known) != 1:
         return list(range(len(points)))
     (sign,) = known
-    kept = [i for i, of_model in enumerate(points) if all(sign * p.values.get(name, sign) > 0.0 for p in of_model)]
-    return kept or list(range(len(points)))
+    agreeing = [i for i, of_model in enumerate(points) if all(sign * p.values.get(name, sign) > 0.0 for p in of_model)]
+    return agreeing or list(range(len(points)))
 
 
 def _sign_of_runs(models: Sequence[Model]) -> set[float]:
-    """Return the sign of the authority that the runs of all models tell together, nothing where they do not."""
-    told = [t for m in models if np.isfinite(t := m.trained.get("fin_t", float("nan")))]
-    together = float(np.sum(told) / np.sqrt(len(told))) if told else 0.0
-    return {float(np.sign(together))} if abs(together) >= SIGN_STD_ERRORS else set()
+    """Return the sign of the authority by the combined t-value of all models' runs, empty where it is not significant."""
+    t_values = [t for m in models if np.isfinite(t := m.trained.get("fin_t", float("nan")))]
+    combined = float(np.sum(t_values) / np.sqrt(len(t_values))) if t_values else 0.0
+    return {float(np.sign(combined))} if abs(combined) >= SIGN_STD_ERRORS else set()
 
 
 def distinct_speeds(speeds: FloatArray) -> int:
-    """Count speeds that differ by more than the spread of one thrust setting."""
+    """Return the number of speeds that differ by more than EQUAL_SPEED_SHARE."""
     ordered = np.sort(speeds)
     return int(1 + np.sum(np.diff(ordered) > EQUAL_SPEED_SHARE * ordered[:-1])) if ordered.size else 0
 
 
-def meant_speeds(speeds: FloatArray) -> list[float]:
-    """Return the speeds that were asked for when these (n,) m/s were flown, rising: those of one thrust setting as one.
+def intended_speeds(speeds: FloatArray) -> list[float]:
+    """Return the intended speeds of runs with mean speeds (n,) m/s, rising: one for each thrust setting.
 
-    Each is the mean of its flown ones, to as few digits as leave it well within their spread.
+    Each is the mean over the runs of one setting, rounded to the fewest digits within half of EQUAL_SPEED_SHARE.
     """
     groups = list[list[float]]()
     for speed in np.sort(speeds).tolist():
@@ -97,11 +97,11 @@ def _rounded(speed: float) -> float:
 def check_authority(axis: Axis, points: Sequence[Point]) -> float:
     """Return the common sign of the authority; raises DataError when the points disagree or have none."""
     name = NAMES[axis].authority
-    given = [(p.name, p.values[name]) for p in points if name in p.values]
-    signs = {float(np.sign(v)) for _, v in given}
+    known = [(p.name, p.values[name]) for p in points if name in p.values]
+    signs = {float(np.sign(v)) for _, v in known}
     if signs in ({1.0}, {-1.0}):
         return signs.pop()
-    if not given:
+    if not known:
         raise DataError(
             f"no point gives `{name}`",
             found=", ".join(sorted({k for p in points for k in p.values})),
@@ -109,7 +109,7 @@ def check_authority(axis: Axis, points: Sequence[Point]) -> float:
         )
     raise DataError(
         f"the sign of {name} is not the same at every speed",
-        found=", ".join(f"{n}: {name} = {v:.4g}" for n, v in given),
+        found=", ".join(f"{n}: {name} = {v:.4g}" for n, v in known),
         hint="give the fin one sign on import (`sign: -1` in mapping.yaml), or leave the odd run out",
     )
 
@@ -134,7 +134,7 @@ def _model_points(model: Model, name: str) -> list[Point]:
 
 
 def _error_at(model: Model, name: str, value: float, speed: float) -> float:
-    """Return the error of a base parameter at a speed: the speed group's own, else that at the reference, scaled."""
+    """Return the standard error of a base parameter at a speed: that of the speed group, else the one at u0, scaled."""
     group = model.info.get("law_parameters", {}).get(f"{name}@{speed:.3g}", {})
     if group.get("std_error") is not None:
         return float(group["std_error"])

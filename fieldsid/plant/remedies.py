@@ -1,4 +1,4 @@
-"""What helps where a turn or a straight run cannot be had: worked out from the models and what they were made from."""
+"""Hints for the errors of a turn or a straight run that is impossible, worked out from the models and their logs."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from fieldsid.records.check import LARGEST_FIN_RAD
 from fieldsid.records.named_inputs import inputs_of
 
 
-def wider_fin(option: str, needed: float, source: ParameterSource) -> str:
-    """Return the hint for a fin limit below `needed` rad: that of the models' runs where it does, else what it takes.
+def fin_limit_hint(option: str, needed: float, source: ParameterSource) -> str:
+    """Return the hint for a fin limit below `needed` rad: the models' largest fin angle if it suffices, else the needed one.
 
-    An offset beyond what any fin lifts at is no trim: then it is what was identified that wants looking at.
+    A fin offset beyond any stall angle is no trim: the hint is then to check the identified parameters.
     """
     flown = ceil(1e4 * source.largest_fin) / 1e4
     if source.largest_fin > needed:
@@ -35,8 +35,8 @@ def wider_fin(option: str, needed: float, source: ParameterSource) -> str:
     )
 
 
-def refuse_no_fin(what: str, given: float) -> None:
-    """Raise UsageError for an angle in rad that no fin can have."""
+def refuse_fin_limit(what: str, given: float) -> None:
+    """Raise UsageError for a fin limit in rad that is not above zero or exceeds LARGEST_FIN_RAD."""
     if not 0.0 < given <= LARGEST_FIN_RAD:
         raise UsageError(
             f"{what} lies above 0 and at most at 90 deg",
@@ -45,8 +45,8 @@ def refuse_no_fin(what: str, given: float) -> None:
         )
 
 
-def damping_that_holds(source: ParameterSource, speed: float, effects: Collection[str] = ()) -> str:
-    """Return the hint for a yaw rate that nothing holds at a speed in m/s."""
+def limiting_damping_hint(source: ParameterSource, speed: float, effects: Collection[str] = ()) -> str:
+    """Return the hint for a model whose yaw rate has no bound at a speed in m/s: add a damping that grows with the rate."""
     if LIMITING_EFFECT in effects:
         return "fly a maneuver with longer turns, and identify again"
     if not (source.models and source.paths) or source.is_fit_file:  # no file of a model to extend

@@ -1,4 +1,4 @@
-"""Points from a table of parameters against speed, as the paper prints them."""
+"""Points from a table of parameters over speed, as the paper prints them."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ SPEED = "speed_m_s"
 
 
 def read_table(path: Path) -> tuple[Axis, tuple[Point, ...]]:
-    """Read a table of parameters against speed; `-` reads standard input.
+    """Read a table of parameters over speed; `-` reads standard input.
 
     Columns: speed_m_s and any of the axis' parameters, each with `<name>_std_error` where known; `delta_r0_rad` or
-    `delta_s0_rad` stands in for a trim column that is absent; other columns are passed over. Raises DataError.
+    `delta_s0_rad` replaces a trim column that is absent; other columns are ignored. Raises DataError.
     """
     table = _frame(path)
     if SPEED not in table.columns:
@@ -42,8 +42,8 @@ def read_table(path: Path) -> tuple[Axis, tuple[Point, ...]]:
 
 
 def _no_speed(path: Path, table: pd.DataFrame) -> FieldsidError:
-    """Return the error of a table without speeds: a log, where it has a column of time."""
-    if any((said := canonical(str(c))) is not None and said.signal == TIME for c in table.columns):
+    """Return the error for a table without speeds; with a column of time it is the one for a log in place of a table."""
+    if any((column := canonical(str(c))) is not None and column.signal == TIME for c in table.columns):
         mistaken = if_log(path, "a table of parameters over speed")
         if mistaken is not None:
             return mistaken
@@ -80,9 +80,9 @@ def _frame(path: Path) -> pd.DataFrame:
 
 
 def _axis_of(table: pd.DataFrame, path: Path) -> Axis:
-    held = {a: [n for n in NAMES[a].base if n in table.columns] for a in Axis}
-    best = max(held, key=lambda a: len(held[a]))
-    if not held[best] or all(held.values()):
+    present = {a: [n for n in NAMES[a].base if n in table.columns] for a in Axis}
+    best = max(present, key=lambda a: len(present[a]))
+    if not present[best] or all(present.values()):
         raise DataError(
             f"table `{path}` must give parameters of one axis",
             found=", ".join(map(str, table.columns)),

@@ -13,7 +13,7 @@ from fieldsid.logs.run import Note, Run
 from fieldsid.models.allocation import PlaneFins
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.plant.parameter_source import ParameterSource
-from fieldsid.plant.remedies import refuse_no_fin, wider_fin
+from fieldsid.plant.remedies import fin_limit_hint, refuse_fin_limit
 from fieldsid.records.keys import body_of
 from fieldsid.records.named_inputs import sha256_of
 from fieldsid.schedule.linear_plant import FinLimits, not_counted, plants_at
@@ -55,7 +55,7 @@ def design_schedule(
     knots = _knots(source, speeds)
     if depth and source.axis is not Axis.PITCH:
         raise UsageError("depth is held through pitch", found="axis: yaw", hint="give the pitch models")
-    refuse_no_fin("a fin's limit", fin_limit)
+    refuse_fin_limit("a fin's limit", fin_limit)
     if fins is not None and not fins.follows(fin_limit):
         raise UsageError(
             "the fin's limit is more than the fins reach",
@@ -117,7 +117,7 @@ def _refuse_offsets(source: ParameterSource, knots: Sequence[float], fin_limit: 
     raise UsageError(
         f"the fin limit is below the offset at {speed:.3g} m/s: holding a straight run would take the whole {FIN[source.axis]}",
         found=f"limit {fin_limit:.4g} rad, offset {NAMES[source.axis].trim_fin} = {offsets[speed]:.4g} rad",
-        hint=wider_fin("--fin-max", abs(offsets[speed]), source),
+        hint=fin_limit_hint("--fin-max", abs(offsets[speed]), source),
     )
 
 

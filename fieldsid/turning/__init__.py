@@ -1,1 +1,1 @@
-"""From models at a few speeds to radius and measured circles."""
+"""Turning radius from models at a few speeds or from all runs together, and measured circles."""

@@ -1,4 +1,4 @@
-"""The rows of a prediction that rests on all runs together, and why one of them is not taken as identified."""
+"""The rows of a prediction from the model fitted to all runs, and the reasons why a row does not count as identified."""
 
 from __future__ import annotations
 
@@ -15,21 +15,23 @@ from fieldsid.turning.steady.speed_loss import SurgeModel
 from fieldsid.turning.steady.steady_turn import blended_radius
 
 LEAST_EFFECTIVE = 10.0
-"""Independent draws: with fewer the median is off by more than 0.4 of the spread, and the spread itself by more than a fifth."""
+"""Effective draws: with fewer the error of the median is above 0.4 standard deviations and that of the spread above a fifth."""
 MAX_UNSETTLED = 0.05
-"""Share of the draws without a settled turn above which a turn is not taken as identified."""
+"""Share of draws without a settled turn above which a turn does not count as identified."""
 
 
 def believed_rows(
     source: ParameterSource, belief: Belief, speeds: Sequence[float], rudder: float, surge: SurgeModel | None
 ) -> list[TurnRow]:
-    """Return the rows of a belief at speeds (m/s) to both sides, the identified models' own circle beside each.
+    """Return the rows of a posterior's turns at speeds (m/s) to both sides, each with the circle of the identified models.
 
-    Raises ModelError where nothing that the runs allow has a settled turn.
+    Raises ModelError where no draw of the posterior has a settled turn.
     """
-    own = blended_radius(source, np.array(speeds, dtype=np.float64), rudder, surge)
+    of_models = blended_radius(source, np.array(speeds, dtype=np.float64), rudder, surge)
     return [
-        _believed_row(source, belief, belief.turn(float(speed), rudder, sign), float(own[side][i]), float(speed), side, rudder)
+        _believed_row(
+            source, belief, belief.turn(float(speed), rudder, sign), float(of_models[side][i]), float(speed), side, rudder
+        )
         for side, sign in SIDES.items()
         for i, speed in enumerate(speeds)
     ]
@@ -44,7 +46,7 @@ def _believed_row(
             found=f"rudder {rudder:.3g} rad",
             hint="fly a turning circle there, and give it with `--measured`",
         )
-    because = _missing(turn, flown=source.supports(speed), usual=belief.fitted.is_usual)
+    because = _reasons_against(turn, flown=source.supports(speed), usual=belief.fitted.is_usual)
     time = float(turn.transient.time_180[0])
     low, high = turn.interval95
     return predicted_row(
@@ -65,22 +67,23 @@ def _believed_row(
     )
 
 
-def _missing(turn: BelievedTurn, *, flown: bool, usual: bool) -> tuple[str, ...]:
-    """Return why a turn is not taken as identified; empty where the runs reached it and its band is narrow."""
-    short = {
+def _reasons_against(turn: BelievedTurn, *, flown: bool, usual: bool) -> tuple[str, ...]:
+    """Return why a turn does not count as identified; empty where the runs covered it and its band is narrow."""
+    conditions = {
         "a turn this tight was not flown": turn.curvature_covered >= MIN_COVERED_SHARE,
         "a fin angle this large was not flown": turn.fin_covered >= MIN_COVERED_SHARE,
         "this speed was not flown": flown,
         "the draws are too much alike to tell how wide the band is": turn.effective >= LEAST_EFFECTIVE,
         "the fit lies where no vehicle of the ensemble does": usual,
     }
-    return (*(says for says, fine in short.items() if not fine), *doubts_of_draws(turn.radius, turn.interval95, turn.unsettled))
+    failed = (says for says, is_met in conditions.items() if not is_met)
+    return (*failed, *doubts_of_draws(turn.radius, turn.interval95, turn.unsettled))
 
 
 def doubts_of_draws(radius: float, band: tuple[float, float], unsettled: float) -> tuple[str, ...]:
-    """Return what the draws say against taking a turn as identified: a wide band (m, m), or draws that never settle."""
-    doubts = {
+    """Return the reasons in the draws why a turn does not count as identified: a wide band (m, m), or draws that never settle."""
+    conditions = {
         f"the band is wider than {MAX_KNOWN_WIDTH:.0%} of the radius": not is_band_only(radius, band),
         f"{unsettled:.0%} of what the runs allow has no settled turn there": unsettled <= MAX_UNSETTLED,
     }
-    return tuple(says for says, fine in doubts.items() if not fine)
+    return tuple(says for says, is_met in conditions.items() if not is_met)

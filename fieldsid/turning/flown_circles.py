@@ -1,4 +1,4 @@
-"""Circles that were flown beside a prediction: found in their runs, compared with it, and put in its place."""
+"""Measured circles for a prediction: found in their runs, compared with it, and put in place of its radius."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from fieldsid.turning.measured.measured_turn import MeasuredTurn, measure_turn
 from fieldsid.turning.prediction import MeasuredRow, TurnRow
 
 REPEATED_SD = 0.005
-"""Share by which a circle differs from one flight to the next: hulls of the ensemble (seed 1) were 0.1 to 0.3 % off the truth in
-a water that turns them with a hundredth of the rudder's moment, at the very speed and rudder asked for."""
+"""Relative standard deviation of a circle from flight to flight: hulls of the ensemble (seed 1), at the same speed and rudder and
+with a disturbance moment of a hundredth of the rudder's, were 0.1 to 0.3 % off the truth."""
 LEAST_HELD_FIN_RAD = 0.01
-"""A circle with less rudder is that of a trim, or of a current."""
+"""Rudder angle below which a circle is due to the trim or to a current."""
 
 
 def circles_of(measured: Sequence[Run], unfit: Refused[Run] | None, *, needed: bool) -> tuple[list[MeasuredTurn], list[Note]]:
-    """Return the circles of measured runs; where none has one and none is `needed`, a note that they count as runs only."""
+    """Return the circles of measured runs, and a note where no run has a circle; raises DataError there if one is `needed`."""
     try:
         return [turn for _, turn in sifted(measured, (attempt(measure_turn, run) for run in measured), unfit)], []
     except DataError as error:
@@ -37,13 +37,14 @@ def circles_of(measured: Sequence[Run], unfit: Refused[Run] | None, *, needed: b
 
 
 def against_rudder(turn: MeasuredTurn, source: ParameterSource) -> bool:
-    """Return whether a circle was turned away from its rudder, as an unstable hull may: a run, and not the rudder's circle."""
-    way = float(np.sign(source.base_at(float(source.speeds[0]))[NAMES[Axis.YAW].authority])) * turn.fin
-    return bool(np.isfinite(way)) and abs(turn.fin) > LEAST_HELD_FIN_RAD and (way > 0.0) != (turn.side == "starboard")
+    """Return whether a vehicle circled to the other side than its rudder turns it, as an unstable hull may."""
+    to_starboard = float(np.sign(source.base_at(float(source.speeds[0]))[NAMES[Axis.YAW].authority])) * turn.fin
+    is_known = bool(np.isfinite(to_starboard))
+    return is_known and abs(turn.fin) > LEAST_HELD_FIN_RAD and (to_starboard > 0.0) != (turn.side == "starboard")
 
 
-def turned_against(turn: MeasuredTurn) -> Note:
-    """Return the note that says so."""
+def against_rudder_note(turn: MeasuredTurn) -> Note:
+    """Return the note on a circle to the other side than its rudder."""
     words = f"{turn.run} turned to {turn.side} with a rudder of {turn.fin:.3g} rad to the other side: it is not compared"
     return Note("turned_against_rudder", words, {"runs": [turn.run]})
 
@@ -51,7 +52,7 @@ def turned_against(turn: MeasuredTurn) -> Note:
 def compared_with(
     turn: MeasuredTurn, rows_at: Callable[[Sequence[float], float], list[TurnRow]], least: Callable[[float], float]
 ) -> MeasuredRow:
-    """Return a measured turn with its prediction; there is none where its fin is below the least one predicted at its speed."""
+    """Return a measured turn with its prediction; the prediction is NaN where the fin is below `least` (rad) of its speed."""
     if not (np.isfinite(turn.fin) and abs(turn.fin) > max(LEAST_HELD_FIN_RAD, least(turn.flown_at))):
         nan = float("nan")
         return MeasuredRow(turn, nan, (nan, nan))
@@ -62,11 +63,12 @@ def compared_with(
 def with_measurement(row: TurnRow, measured: Sequence[MeasuredRow], rudder: float) -> TurnRow:
     """Return the row with the measured radius where a circle was flown at this speed, side and rudder.
 
-    A u-turn ends before it has settled, and what carried it is not known: a belief has it among its runs, and is nearer.
+    A shorter turn does not replace a row of the model fitted to all runs: its current cannot be estimated, and that model has the
+    turn among its runs.
     """
     for m in measured:
-        whole = row.method != "maneuvering" or abs(m.turn.circle.turned) >= LEAST_TURN_FOR_CURRENT_RAD
-        if whole and m.entered(row.speed, row.side) and m.held(rudder):
+        is_usable = row.method != "maneuvering" or abs(m.turn.circle.turned) >= LEAST_TURN_FOR_CURRENT_RAD
+        if is_usable and m.entered(row.speed, row.side) and m.held(rudder):
             return replace(
                 row,
                 radius=m.turn.circle.radius,
@@ -80,7 +82,7 @@ def with_measurement(row: TurnRow, measured: Sequence[MeasuredRow], rudder: floa
 
 
 def _repeatable(turn: MeasuredTurn) -> tuple[float, float]:
-    """Return the 95 % interval of a measured circle as another flight would give it: the water is not the same again."""
+    """Return the 95 % interval of the radius in another flight, the variation of the water from flight to flight included."""
     low, high = turn.circle.interval95
     middle = turn.circle.radius
     half = float(np.hypot(0.5 * (high - low), TWO_SIDED_95 * REPEATED_SD * middle))

@@ -1,6 +1,6 @@
 """The paper's turning formulas for a first-order yaw model r' = -a22 r + b2 (delta + delta_r0).
 
-U-turn with a trapezoidal yaw rate (ramp t1, hold t2, ramp t1): r_max = |b2| d / a22, t1 = 2.31 / a22 (to 90 %),
+U-turn with a trapezoidal yaw rate (ramp t1, constant for t2, ramp t1): r_max = |b2| d / a22, t1 = 2.31 / a22 (to 90 %),
 r_max (t1 + t2) = pi, so T = pi / r_max + 2.31 / a22 and R = V T / pi. The steady circle is R = V / r_max.
 Rapid On-board Identification of the STARFISH AUV, section on the turning radius; table 4 and 5 are its results.
 """
@@ -16,12 +16,12 @@ from fieldsid.errors import ModelError, UsageError
 from fieldsid.numerics.arrays import FloatArray
 
 RISE_TIME_CONSTANTS = 2.31
-"""ln 10 rounded up, as the paper has it: the time constants to 90 % of the final rate."""
+"""Time constants to 90 % of the final rate, ln 10 rounded up as in the paper."""
 
 
 @dataclass(frozen=True, slots=True)
 class UTurn:
-    """Largest yaw rate (rad/s, magnitude), time for the u-turn (s), u-turn radius and steady radius (m), arrays alike."""
+    """Largest yaw rate (rad/s, magnitude), time of the u-turn (s), u-turn radius and steady radius (m); arrays of one shape."""
 
     yaw_rate_max: FloatArray
     time: FloatArray
@@ -49,7 +49,7 @@ def refuse_unstable(damping: float, where: str, hint: str) -> None:
 
 
 def refuse_short_fin(limit: float, offset: float, where: str, hint: str) -> None:
-    """Raise UsageError when the fin limit does not exceed the offset: one side cannot be turned to at all."""
+    """Raise UsageError when the fin limit does not exceed the offset: the vehicle cannot turn to one of the sides."""
     if limit > abs(offset):
         return
     raise UsageError(

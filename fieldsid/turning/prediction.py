@@ -1,4 +1,4 @@
-"""One row of a turning prediction, the whole of it, their plain records, and how a radius is told."""
+"""The records of a turning prediction: its rows and measured circles, and the words for a radius."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fieldsid.turning.measured.measured_turn import MeasuredTurn
 from fieldsid.turning.steady.speed_loss import SurgeModel
 
 MAX_KNOWN_WIDTH = 0.35
-"""Widest 95 % band of a turn that counts as identified, over the radius: beyond it no number is known, but the band."""
+"""Largest width of the 95 % band over the radius of an identified turn: beyond it only the band is reported as known."""
 BRACKETED = "radius in brackets: these runs tell the band, not the number"
 
 
@@ -25,12 +25,12 @@ def is_band_only(radius: float, band: tuple[float, float]) -> bool:
 
 
 def radius_cell(radius: float, band: tuple[float, float]) -> str:
-    """Return a radius (m) for a table, in brackets where the band alone is known."""
+    """Return a radius (m) for a table, in brackets where its band is too wide (`is_band_only`)."""
     return f"({number(radius, 3)})" if is_band_only(radius, band) else number(radius, 3)
 
 
 def turn_words(radius: float, band: tuple[float, float], where: str) -> str:
-    """Return `4.90 m to port, 95 % 4.39 .. 5.48 m` of a turn somewhere, or `between 4.39 and 9.48 m (95 %) to port`."""
+    """Return `4.90 m to port, 95 % 4.39 .. 5.48 m` for `where` "to port", or `between 4.39 and 9.48 m (95 %) to port`."""
     low, high = number(band[0], 3), number(band[1], 3)
     if is_band_only(radius, band):
         return f"between {low} and {high} m (95 %) {where}"
@@ -39,7 +39,7 @@ def turn_words(radius: float, band: tuple[float, float], where: str) -> str:
 
 SIDES: Mapping[str, float] = {"port": -1.0, "starboard": 1.0}
 EQUAL_TURN_SHARE = 0.05
-"""Share by which speed and rudder of two turns may differ and still be one."""
+"""Relative difference of speed and rudder up to which two turns count as the same."""
 BY_METHOD: Mapping[str, str] = {
     "maneuvering": "one vehicle fitted to all runs",
     "simulated": "each speed's own model flown",
@@ -47,9 +47,9 @@ BY_METHOD: Mapping[str, str] = {
     "steady": "formula of the settled circle",
     "measured": "measured",
 }
-"""How the turns of a method are found, in words."""
+"""The methods in words."""
 MAX_SPEEDS_LISTED = 4
-"""Speeds that are listed one by one."""
+"""Largest number of speeds that are listed one by one."""
 HOW = "one and a half circles, x_m and y_m logged"
 
 
@@ -57,7 +57,7 @@ HOW = "one and a half circles, x_m and y_m logged"
 class TurnRow(Displayed):
     """The turn at one entry speed to one side; lengths m, times s, rates rad/s, NaN where the method does not give it.
 
-    `radius` is the median of what is believed, `of_model` that of the identified yaw model alone.
+    `radius` is the median of the predicted distribution, `of_model` the radius of the identified yaw model.
     """
 
     speed: Annotated[float, Key("Entry speed.", "speed_m_s")]
@@ -103,11 +103,11 @@ class MeasuredRow(Displayed):
     predicted95: Annotated[Interval, Key("Its band.")]
 
     def entered(self, speed: float, side: str) -> bool:
-        """Whether the circle was turned to a side from about a speed in m/s."""
+        """Whether the circle is to this side, with this entry speed (m/s) to within EQUAL_TURN_SHARE."""
         return self.turn.side == side and abs(self.turn.entry_speed - speed) <= EQUAL_TURN_SHARE * speed
 
     def held(self, rudder: float) -> bool:
-        """Whether it was turned with about a rudder in rad."""
+        """Whether the circle was flown with this rudder (rad) to within EQUAL_TURN_SHARE."""
         return abs(abs(self.turn.fin) - rudder) <= EQUAL_TURN_SHARE * rudder
 
     @property
@@ -146,10 +146,10 @@ class TurnPrediction(Plotted):
         if not rows:
             return ()
         flights = [f"to {side} at {_speeds([r.speed for r in rows if r.side == side])}" for side in SIDES if _to(rows, side)]
-        return (*self._asked_otherwise(rows), f"turning_circle {', '.join(flights)} with {self.rudder_max:.3g} rad: {HOW}")
+        return (*self._other_circles(rows), f"turning_circle {', '.join(flights)} with {self.rudder_max:.3g} rad: {HOW}")
 
-    def _asked_otherwise(self, rows: Sequence[TurnRow]) -> Iterator[str]:
-        """Yield why circles that were given are none of the turns asked for."""
+    def _other_circles(self, rows: Sequence[TurnRow]) -> Iterator[str]:
+        """Yield why measured circles belong to none of the rows, and what would make them."""
         fins: dict[str, list[str]] = {}
         for m in self.measured:
             if not m.held(self.rudder_max) and any(m.entered(r.speed, r.side) for r in rows):
@@ -161,7 +161,7 @@ class TurnPrediction(Plotted):
             yield f"with `--fin-max {fin}`, the rudder of {'that turn' if len(names) == 1 else 'those turns'}, {counted}"
 
     def best(self, side: str) -> TurnRow | None:
-        """Return the local minimum of the radius over speed that is farthest up, None where it only rises or falls."""
+        """Return the local minimum of the radius over speed, the one at the highest speed of several; None without one."""
         rows = [r for r in self.rows if r.side == side]
         inner = [
             b for a, b, c in zip(rows[:-2], rows[1:-1], rows[2:], strict=True) if b.radius <= a.radius and b.radius < c.radius
@@ -176,20 +176,23 @@ class TurnPrediction(Plotted):
 
 
 def found_by(methods: Iterable[str]) -> str:
-    """Return how turns were found, in words; circles that were measured are told apart, unless all were."""
+    """Return the methods of turns in words, without `measured` unless all are."""
     kinds = sorted(set(methods))
     return ", ".join(BY_METHOD[m] for m in kinds if m != "measured" or len(kinds) == 1)
 
 
 def settling_flight(because: tuple[str, ...], side: str, speed: float, rudder: float) -> str:
-    """Return the flight that settles what a row lacks."""
+    """Return the flight that would remove the reasons `because` against a row, in words."""
     if not because:
         return "nothing more: the data reached this turn"
     return f"turning_circle to {side} at {speed:.2f} m/s with {rudder:.3g} rad: {HOW}"
 
 
 def predicted_row(speed: float, side: str, rudder: float, because: tuple[str, ...], **found: Any) -> TurnRow:
-    """Return the row of a turn at a speed (m/s) with a rudder (rad), of what was found of it, and of what it lacks."""
+    """Return the row of a predicted turn at a speed (m/s) with a rudder (rad).
+
+    `because` are the reasons why it counts as extrapolated, `found` its other fields.
+    """
     return TurnRow(
         speed=speed,
         side=side,

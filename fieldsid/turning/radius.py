@@ -16,9 +16,9 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Effect
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.parameter_source import ParameterSource
-from fieldsid.plant.remedies import damping_that_holds, refuse_no_fin, wider_fin
+from fieldsid.plant.remedies import fin_limit_hint, limiting_damping_hint, refuse_fin_limit
 from fieldsid.turning.believed_rows import believed_rows, doubts_of_draws
-from fieldsid.turning.flown_circles import against_rudder, circles_of, compared_with, turned_against, with_measurement
+from fieldsid.turning.flown_circles import against_rudder, against_rudder_note, circles_of, compared_with, with_measurement
 from fieldsid.turning.maneuvering.belief import SEED, Belief, believe, not_fitted
 from fieldsid.turning.model_error import DataCoverage, data_coverage, model_error
 from fieldsid.turning.paper_formulas import refuse_short_fin, refuse_unstable, u_turn
@@ -29,7 +29,7 @@ from fieldsid.turning.steady.steady_turn import BlendedTurns, blended_turns
 RADIUS_DRAWS = 500
 METHODS = ("auto", "u_turn", "steady", "simulated", "maneuvering")
 MIN_REPORTED_OFFSET_RAD = 0.0025
-"""An offset in rad that moves a radius by a hundredth."""
+"""Fin offset that changes a radius by 1 %."""
 
 
 def turn_radius(
@@ -47,16 +47,17 @@ def turn_radius(
 ) -> TurnPrediction:
     """Return the turn at every speed (m/s) to both sides with the rudder at rudder_max (rad).
 
-    runs are those the models came from, measured are runs of turns: the turn is that of a vehicle in surge, sway and yaw fitted
-    to all of them, `length` (m) being the vehicle's where it is known. A measured circle is compared with what the other runs
-    alone predict, and counts once where the models were fitted to it too. method "auto" does so where the models carry effects
-    and the runs a speed; without runs it simulates models with effects, and takes the u-turn formula elsewhere, where an offset
-    of the fin below `fin_zero` (rad) is not counted. unfit is told of each of several measured runs without a circle; without
-    it, and where none has one, DataError is raised. Raises UsageError, and ModelError for an unstable model.
+    runs are those the models were fitted to, measured are runs of turns. The method "maneuvering" predicts the turn of a vehicle
+    in surge, sway and yaw that is fitted to all of them; `length` (m) is the vehicle's where it is known. A measured circle is
+    compared with the prediction from the other runs, and is used once where the models were fitted to it too. "auto" takes this
+    method where the models have effects and the runs a speed; without runs it simulates models with effects; otherwise it takes
+    the u-turn formula, which ignores a fin offset below `fin_zero` (rad). unfit is called for each of several measured runs
+    without a circle; without unfit, and where no run has one, DataError is raised. Raises UsageError, and ModelError for an
+    unstable model.
     """
     _check(source, speeds, rudder_max, method)
-    source = source.models_flown_by(runs)
-    runs = _others(runs, measured)
+    source = source.with_speeds_of(runs)
+    runs = _other_runs(runs, measured)
     chosen = _chosen(source, method)
     if chosen in ("simulated", "maneuvering") and source.own_laws:
         raise UsageError(
@@ -66,7 +67,7 @@ def turn_radius(
         )
     before, belief, unfitted = _beliefs(source, runs, measured, length, method, chosen)
     surge = fit_surge(runs) if chosen in ("simulated", "maneuvering") and runs else None
-    turns, lacking = circles_of(measured, unfit, needed=belief is None)
+    turns, notes = circles_of(measured, unfit, needed=belief is None)
 
     def rows_at(at: Sequence[float], rudder: float, known: Belief | None = before) -> list[TurnRow]:
         if known is not None:
@@ -81,16 +82,16 @@ def turn_radius(
     rows = rows_at(speeds, rudder_max, belief)
     least = (lambda _speed: 0.0) if not by_formula else (lambda speed: abs(_offset(source, speed)))
     against = [turn for turn in turns if against_rudder(turn, source)]
-    lacking += [turned_against(turn) for turn in against]
+    notes += [against_rudder_note(turn) for turn in against]
     compared = [compared_with(turn, rows_at, least) for turn in turns if not any(turn is other for other in against)]
     rows = [with_measurement(row, compared, rudder_max) for row in rows]
     return TurnPrediction(
-        tuple(rows), tuple(compared), rudder_max, surge, (*unfitted, *lacking, *_notes(source, rows, chosen, surge, fin_zero))
+        tuple(rows), tuple(compared), rudder_max, surge, (*unfitted, *notes, *_notes(source, rows, chosen, surge, fin_zero))
     )
 
 
-def _others(runs: Sequence[Run], measured: Sequence[Run]) -> Sequence[Run]:
-    """Return the runs that are not among the measured turns; all where every one is, as nothing else was flown."""
+def _other_runs(runs: Sequence[Run], measured: Sequence[Run]) -> Sequence[Run]:
+    """Return the runs that are not among the measured turns; all of them if every one is."""
     files = {run.source.resolve() for run in measured if run.source is not None}
     others = [r for r in runs if not any(r is m for m in measured) and (r.source is None or r.source.resolve() not in files)]
     return others or runs
@@ -99,7 +100,7 @@ def _others(runs: Sequence[Run], measured: Sequence[Run]) -> Sequence[Run]:
 def _beliefs(
     source: ParameterSource, runs: Sequence[Run], measured: Sequence[Run], length: float | None, method: str, chosen: str
 ) -> tuple[Belief | None, Belief | None, list[Note]]:
-    """Return what runs alone and all together make believe, None where nothing is asked of them, and a note where no fit is."""
+    """Return the posterior from the runs, that from runs and measured turns, and notes; None where they are not used or fail."""
     before = belief = None
     notes: list[Note] = []
     if chosen in ("simulated", "maneuvering") and method != "simulated" and runs:
@@ -147,14 +148,14 @@ def _formula_rows(
 
 
 def _refuse_turns(source: ParameterSource, speeds: Sequence[float], rudder: float) -> None:
-    """Refuse what the formula has no turn for, at the speed where it is worst."""
+    """Raise ModelError or UsageError where the formula has no turn, for the speed of the least damping or the largest offset."""
     source.require(speeds)
     damping = {speed: source.base_at(speed)[NAMES[Axis.YAW].damping] for speed in speeds}
-    loosest = min(damping, key=lambda speed: damping[speed])
-    refuse_unstable(damping[loosest], f"at {loosest:.3g} m/s", damping_that_holds(source, loosest))
+    least_damped = min(damping, key=lambda speed: damping[speed])
+    refuse_unstable(damping[least_damped], f"at {least_damped:.3g} m/s", limiting_damping_hint(source, least_damped))
     worst = max(speeds, key=lambda speed: abs(_offset(source, speed)))
     offset = _offset(source, worst)
-    refuse_short_fin(rudder, offset, f"at {worst:.3g} m/s", wider_fin("--fin-max", abs(offset), source))
+    refuse_short_fin(rudder, offset, f"at {worst:.3g} m/s", fin_limit_hint("--fin-max", abs(offset), source))
 
 
 def _offset(source: ParameterSource, speed: float) -> float:
@@ -180,7 +181,7 @@ def _simulated_row(
         raise ModelError(
             f"the model has no steady turn to {side} at {speed:.3g} m/s: it is unstable, and nothing in it holds the rate",
             found=f"a22 = {source.base_at(speed).get('a22', 0.0):.4g} 1/s, effects: {', '.join(turns.effects) or 'none'}",
-            hint=damping_that_holds(source, speed, turns.effects),
+            hint=limiting_damping_hint(source, speed, turns.effects),
         )
     time = turns.transient.time_180[index]
     coverage = _reach(source, speed, rudder, rate, float(np.nan_to_num(turns.transient.time_90[index], nan=60.0)))
@@ -195,7 +196,7 @@ def _simulated_row(
 
 
 def _found(coverage: DataCoverage, radius: FloatArray, spread: FloatArray, time: FloatArray, value: float) -> dict[str, Any]:
-    """Return radius and time of a turn with their bands, by draws of them and of the form's error, and what the turn lacks."""
+    """Return radius and time of a turn with their bands, from draws and the model error's factors `spread`, and `because`."""
     interval = _interval(radius * spread, value)
     return {
         "because": (*coverage.missing, *doubts_of_draws(value, interval, float(np.mean(~np.isfinite(radius))))),
@@ -213,7 +214,7 @@ def _median(draws: FloatArray) -> float:
 
 
 def _interval(draws: FloatArray, value: float) -> tuple[float, float]:
-    """Return the 95 % interval of the draws that have a settled turn, stretched to hold the value itself."""
+    """Return the 95 % interval of the draws that have a settled turn, extended to contain the value."""
     if not np.isfinite(value):
         return float("nan"), float("nan")
     low, high = np.percentile(draws[np.isfinite(draws)], [2.5, 97.5])
@@ -221,7 +222,7 @@ def _interval(draws: FloatArray, value: float) -> tuple[float, float]:
 
 
 def _usable(rudder: float, offset: FloatArray, sign: float, fin_zero: float, rng: np.random.Generator) -> FloatArray:
-    """Return draws of the usable fin; an offset that is not counted still widens the band to both sides."""
+    """Return draws of the usable fin angle; an offset below `fin_zero` is not added, but widens the band to both sides."""
     if abs(offset[0]) > fin_zero:
         fin = rudder + sign * offset
     else:
@@ -236,8 +237,8 @@ def _reach(source: ParameterSource, speed: float, rudder: float, rate: float, qu
         return data_coverage({}, fin=rudder, rate=abs(rate), quarter_s=quarter_s, speed_flown=flown)
     model = source.models[source.near(speed)[0][0]]
     slowest = model.values.get("cross_damping", np.inf) * model.law.scale(speed)
-    seen = slowest * model.trained.get("held_s", 0.0) >= 1.0
-    return data_coverage(model.trained, fin=rudder, rate=abs(rate), quarter_s=quarter_s, speed_flown=flown, sway_settles=seen)
+    settles = slowest * model.trained.get("held_s", 0.0) >= 1.0
+    return data_coverage(model.trained, fin=rudder, rate=abs(rate), quarter_s=quarter_s, speed_flown=flown, sway_settles=settles)
 
 
 def _chosen(source: ParameterSource, method: str) -> str:
@@ -253,7 +254,7 @@ def _check(source: ParameterSource, speeds: Sequence[float], rudder_max: float, 
         raise UsageError(f"there is no method {method!r}", found=", ".join(METHODS), hint="leave `--method` out")
     if method in ("simulated", "maneuvering") and not source.models:
         raise UsageError("a table cannot be simulated", found="no model", hint="give model files, or `--method u_turn`")
-    refuse_no_fin("the rudder held in a turn", rudder_max)
+    refuse_fin_limit("the rudder held in a turn", rudder_max)
     if not len(speeds) or not all(s > 0 and np.isfinite(s) for s in speeds):
         raise UsageError("speeds must be above zero", found=f"{list(speeds)}", hint="write `--speeds 0.5:2.5:0.1` or `1.0,1.5`")
 

@@ -1,1 +1,1 @@
-"""Laws of the parameters against speed."""
+"""Laws of the parameters over speed."""

@@ -1,4 +1,4 @@
-"""All laws of one axis against speed (`sysid fit`): made from points, saved and loaded as `fieldsid/fit/1`."""
+"""All laws of one axis over speed (`sysid fit`): fitted to points, saved and loaded as `fieldsid/fit/1`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ KIND = "fieldsid/fit"
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Laws(Plotted):
-    """The laws of one axis by parameter name, and the points they were drawn through."""
+    """The laws of one axis by parameter name, and the points that they were fitted to."""
 
     axis: Annotated[Axis, Key("The plane.")]
     points: Annotated[tuple[Point, ...], Key("What the laws were drawn through.")]
@@ -69,32 +69,32 @@ class Laws(Plotted):
         return {n: float(law.at(speed)[0]) for n, law in self.by_name.items()}
 
     def std(self, speed: float) -> dict[str, float]:
-        """Return the standard errors of the parameters at a speed, as the laws know them."""
+        """Return the standard errors of the laws at a speed, by parameter name."""
         return {n: float(law.line.std(speed)[0]) for n, law in self.by_name.items()}
 
 
 def fit_laws(axis: Axis, points: Sequence[Point], *, weighted: bool = True) -> Laws:
-    """Fit the law of every parameter of an axis that at least two speeds give.
+    """Fit the law of every parameter of an axis that is known at two speeds or more.
 
-    Weighted by the points' standard errors where all have one (`weighted`), else every point counts alike. Raises
-    DataError when there is one speed only (no law), or the authority's sign is not the same everywhere.
+    `weighted`: the points are weighted by their standard errors where all of them have one; otherwise all weights are equal.
+    Raises DataError when there is one speed only, or when the sign of the authority differs between points.
     """
     points = tuple(sorted(points, key=lambda p: nine_digits(p.speed)))
     sign = check_authority(axis, points)
     _refuse_single_speed(axis, points)
     laws, notes = {}, []
     for name in NAMES[axis].base:
-        held = [p for p in points if name in p.values]
-        if len(held) < 2 or distinct_speeds(np.array([p.speed for p in held])) < 2:
+        known = [p for p in points if name in p.values]
+        if len(known) < 2 or distinct_speeds(np.array([p.speed for p in known])) < 2:
             continue
-        speeds = np.array([p.speed for p in held])
-        values = np.array([p.values[name] for p in held])
-        errors = _errors(name, held) if weighted else None
+        speeds = np.array([p.speed for p in known])
+        values = np.array([p.values[name] for p in known])
+        errors = _errors(name, known) if weighted else None
         if errors is None and weighted:
             notes.append(
                 Note("unweighted", f"{name}: not every point has a standard error, so all count alike", {"parameter": name})
             )
-        labels = [p.name for p in held]
+        labels = [p.name for p in known]
         if name == NAMES[axis].authority:
             laws[name] = authority_law(name, sign, speeds, values, errors, labels)
         else:
@@ -103,7 +103,7 @@ def fit_laws(axis: Axis, points: Sequence[Point], *, weighted: bool = True) -> L
 
 
 def with_own_law(laws: Laws, text: str) -> Laws:
-    """Replace one law by the user's `NAME=c0[,c1]`, meaning c0 + c1 u^2; raises UsageError."""
+    """Return the laws with one of them replaced by the user's `NAME=c0[,c1]`, which means c0 + c1 u^2; raises UsageError."""
     name, _, numbers = text.partition("=")
     try:
         coefficients = np.array([float(n) for n in numbers.split(",")])
@@ -123,15 +123,15 @@ def with_own_law(laws: Laws, text: str) -> Laws:
     powers = (0.0, 2.0)[:size]
     line = Regression("affine" if size == 2 else "constant", powers, coefficients, np.zeros((size, size)), 0, float("nan"), 0.0)
     speeds = laws.speeds
-    bare = ParameterLaw(name, 1.0, speeds, np.asarray(line.at(speeds)), None, (line,), line.kind, None, ())
-    base = laws.by_name.get(name, bare)
+    new = ParameterLaw(name, 1.0, speeds, np.asarray(line.at(speeds)), None, (line,), line.kind, None, ())
+    base = laws.by_name.get(name, new)
     own = replace(base, sign=1.0, values=base.sign * base.values, candidates=(line,), chosen=line.kind, exponent=None, points=())
     return replace(laws, by_name=MappingProxyType({**laws.by_name, name: own}))
 
 
 def law_notes(laws: Laws) -> tuple[Note, ...]:
-    """Return the remarks of every law, those on points that do not belong first."""
-    odd = [
+    """Return the notes of every law, those on outliers first."""
+    outliers = [
         Note(
             "does_not_belong",
             f"{law.name} of `{p.name}` ({p.value:.4g} at {p.speed:.2f} m/s) does not belong to the others' law "
@@ -143,19 +143,19 @@ def law_notes(laws: Laws) -> tuple[Note, ...]:
         for p in law.points
         if not p.belongs
     ]
-    return (*odd, *(n for law in laws.by_name.values() for n in law.notes))
+    return (*outliers, *(n for law in laws.by_name.values() for n in law.notes))
 
 
 def save_laws(laws: Laws, path: Path, *, models: Sequence[Path] = (), inputs: Sequence[Path] = (), force: bool = False) -> Path:
-    """Write the laws as YAML, with the models they came from whole: effects, covariance and all; raises ArtifactError."""
+    """Write the laws as YAML, with the complete records of the models that they were fitted to; raises ArtifactError."""
     carried = [{"name": p.stem, "record": load_record(p, MODEL_KIND)} for p in models]
     return save_record(path, f"{KIND}/1", body_of(laws) | {"models": carried}, inputs=inputs, force=force)
 
 
 def carried_models(path: Path) -> tuple[tuple[str, Model], ...]:
-    """Return the models a fit file carries with their names, none where it came from a table; raises ArtifactError.
+    """Return the models in a fit file with their names, none where the laws came from a table; raises ArtifactError.
 
-    A file that does not say which models it came from would lose their effects without a word: it is refused.
+    A file without the key `models` is refused, because the effects of its models would be lost without notice.
     """
     body = load_record(path, KIND)
     if "models" not in body:
@@ -196,16 +196,16 @@ def _points_of(records: Sequence[Mapping[str, Any]]) -> tuple[Point, ...]:
 
 
 def _law_of(name: str, record: Mapping[str, Any], points: Sequence[Point]) -> ParameterLaw:
-    held = [p for p in points if name in p.values]
+    known = [p for p in points if name in p.values]
     sign = float(record["sign"])
     if abs(sign) != 1.0:
         raise ShapeError(f"the sign of {name} is {sign:g}, not 1 or -1")
     lines = tuple(regression_of(c) for c in record["candidates"].values())
-    values = sign * np.array([p.values[name] for p in held])
-    speeds = np.array([p.speed for p in held])
+    values = sign * np.array([p.values[name] for p in known])
+    speeds = np.array([p.speed for p in known])
     if record["chosen"] not in {line.kind for line in lines}:
         raise ShapeError(f"chosen law {record['chosen']!r} of {name} is not among its candidates")
-    return ParameterLaw(name, sign, speeds, values, _errors(name, held), lines, str(record["chosen"]), None, ())
+    return ParameterLaw(name, sign, speeds, values, _errors(name, known), lines, str(record["chosen"]), None, ())
 
 
 def _errors(name: str, points: Sequence[Point]) -> FloatArray | None:

@@ -1,4 +1,4 @@
-"""The law of one parameter against speed: candidate laws, the exponent with its test, and the points that are outliers.
+"""The law of one parameter over speed: candidate laws, the exponent with its test, and the outliers among the points.
 
 Authority is proportional to u^2 by physics (lift of the fin), so its law is fitted against u^2 and the exponent of |b| = k u^e is
 tested against 2. Damping is proportional to u, the trim to u^2 (asymmetric hull) or constant (buoyancy). Outliers are found by
@@ -23,8 +23,8 @@ from fieldsid.records.keys import Interval, Key, Number
 from fieldsid.rounding import nine_digits, p_value
 
 MIN_DEGREES_OF_FREEDOM = 2
-"""Degrees of freedom of the others' scatter above which a point is tested against it: with one, two points in line by chance
-(rounded digits make such) put a third any number of its standard errors off."""
+"""Degrees of freedom of the other points' scatter from which on a point is tested: with one, points that are collinear by chance
+(as rounded digits make them) have next to no scatter, and the studentised residual of the next point can be of any size."""
 AUTHORITY = (("affine", (0.0, 2.0)), ("through_zero", (2.0,)))
 OTHERS = (("constant", (0.0,)), ("linear", (0.0, 1.0)), ("affine", (0.0, 2.0)))
 
@@ -55,9 +55,9 @@ class Exponent:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class PointCheck(Brief):
-    """One point left out: what the law of the others says there, and how far off the point is, in its standard errors.
+    """The leave-one-out check of a point: the law of the others at its speed, and its externally studentised residual.
 
-    Beyond the limit it does not belong; infinite where the points are too few to say so of any.
+    A point beyond `limit` is an outlier; `limit` is infinite where there are too few points to test.
     """
 
     name: Annotated[str, Key("The point.")]
@@ -145,14 +145,14 @@ def authority_law(
 def other_law(
     name: str, speeds: FloatArray, values: FloatArray, std_errors: FloatArray | None, labels: Sequence[str]
 ) -> ParameterLaw:
-    """Return the law of a damping, stiffness or trim: constant unless its slope is clear of zero.
+    """Return the law of a damping, stiffness or trim: constant, or with a significant slope linear in u or affine in u^2.
 
-    Then linear in u or affine in u^2, whichever leaves less.
+    Of the two the one with the smaller residual is taken.
     """
     lines = [fit_powers(k, p, speeds, values, std_errors) for k, p in OTHERS if len(p) <= max(1, values.size - 1)]
-    rising = [line for line in lines[1:] if _clear_of_zero(line, 1)]
-    # at two speeds both go through the same two means: the first of them then
-    best = max(rising, key=lambda line: nine_digits(line.r2)) if rising else lines[0]
+    sloped = [line for line in lines[1:] if _is_significant(line, 1)]
+    # at two speeds both go through the same two means, and the first of them is taken
+    best = max(sloped, key=lambda line: nine_digits(line.r2)) if sloped else lines[0]
     checks = leave_one_out(best, speeds, values, std_errors, labels)
     return ParameterLaw(name, 1.0, speeds, values, std_errors, tuple(lines), best.kind, None, checks)
 
@@ -160,7 +160,7 @@ def other_law(
 def leave_one_out(
     line: Regression, speeds: FloatArray, values: FloatArray, std_errors: FloatArray | None, labels: Sequence[str]
 ) -> tuple[PointCheck, ...]:
-    """Refit without each point; empty where too few points would be left to measure a scatter."""
+    """Return the leave-one-out check of each point; empty where too few points remain to estimate a scatter."""
     count, size = values.size, len(line.powers)
     degrees = count - 1 - size
     if degrees < 1:
@@ -169,18 +169,19 @@ def leave_one_out(
     checks = []
     for i in range(count):
         keep = np.arange(count) != i
-        rest = None if std_errors is None else std_errors[keep]
-        other = fit_powers(line.kind, line.powers, speeds[keep], values[keep], rest)
-        guess, spread = float(other.at(speeds[i])[0]), float(other.std(speeds[i])[0])
-        own = _scatter(other, speeds[keep], values[keep], rest) * (1.0 if std_errors is None else float(std_errors[i]))
+        errors = None if std_errors is None else std_errors[keep]
+        other = fit_powers(line.kind, line.powers, speeds[keep], values[keep], errors)
+        predicted, law_error = float(other.at(speeds[i])[0]), float(other.std(speeds[i])[0])
+        point_error = _scatter(other, speeds[keep], values[keep], errors) * (1.0 if std_errors is None else float(std_errors[i]))
         least = max(ROUNDING_SHARE * abs(float(values[i])), float(np.finfo(np.float64).tiny))
-        off = (float(values[i]) - guess) / max(float(np.hypot(own, spread)), least)
-        checks.append(PointCheck(labels[i], float(speeds[i]), float(values[i]), guess, float(other.coefficients[-1]), off, limit))
+        studentised = (float(values[i]) - predicted) / max(float(np.hypot(point_error, law_error)), least)
+        leading = float(other.coefficients[-1])
+        checks.append(PointCheck(labels[i], float(speeds[i]), float(values[i]), predicted, leading, studentised, limit))
     return tuple(checks)
 
 
 def _scatter(line: Regression, speeds: FloatArray, values: FloatArray, std_errors: FloatArray | None) -> float:
-    """Return the residual's standard deviation in units of the stated errors (at least one of them)."""
+    """Return the residual standard deviation; with stated errors in units of these, and at least one."""
     error = values - line.at(speeds)
     if std_errors is None:
         return float(np.hypot(np.sqrt(np.sum(error**2) / line.dof), rounding_of(values)))
@@ -188,14 +189,14 @@ def _scatter(line: Regression, speeds: FloatArray, values: FloatArray, std_error
 
 
 def _authority_choice(lines: Sequence[Regression]) -> str:
-    """Affine where its intercept is clear of zero, else through zero."""
+    """Return the kind of the chosen law: affine where its intercept is significant, else through zero."""
     if len(lines) < 2 or lines[0].dof < 1:
         return "through_zero"
-    return "affine" if _clear_of_zero(lines[0], 0) else "through_zero"
+    return "affine" if _is_significant(lines[0], 0) else "through_zero"
 
 
-def _clear_of_zero(line: Regression, index: int) -> bool:
-    """Whether a coefficient's 95 % interval leaves out zero; never where no scatter could be measured."""
+def _is_significant(line: Regression, index: int) -> bool:
+    """Whether the 95 % interval of a coefficient excludes zero; false without a degree of freedom."""
     if line.dof < 1:
         return False
     return bool(abs(line.coefficients[index]) > t_factor(line.dof) * np.sqrt(line.covariance[index, index]))
@@ -211,7 +212,7 @@ def _exponent(power: Regression) -> Exponent:
 
 
 def _notes(name: str, affine: Regression, power: Regression) -> tuple[Note, ...]:
-    """Say where the straight line would give an authority of the wrong sign, and that R^2 says little."""
+    """Return notes: below which speed the affine law has the wrong sign, and that a high R^2 is no evidence for it."""
     notes = []
     if affine.kind == "affine" and affine.coefficients[0] < 0 < affine.coefficients[1]:
         zero = float(np.sqrt(-affine.coefficients[0] / affine.coefficients[1]))

@@ -1,4 +1,4 @@
-"""One law y(u) and its band: a sum of powers of the speed, fitted by (weighted) least squares, or k u^e fitted in logarithms."""
+"""One law y(u) with its confidence band: a sum of powers of u by (weighted) least squares, or k u^e fitted in logarithms."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fieldsid.records.laws import LARGEST_COEFFICIENT, LARGEST_LOGARITHM
 
 CONFIDENCE_LEVEL = 0.95
 ROUNDING_SHARE = 1e-9
-"""Share of the largest value to which values are known at best: what a line leaves below it is rounding, and says nothing."""
+"""Relative precision of the values, of the largest one: residuals below it are rounding errors."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -50,7 +50,7 @@ class Regression(Brief):
         return np.asarray(np.exp(self.coefficients[0]) * u ** self.coefficients[1])
 
     def std(self, speed: npt.ArrayLike) -> FloatArray:
-        """Return the standard error of y, (n,); NaN where there is one point for every coefficient."""
+        """Return the standard error of y, (n,); NaN where there are no degrees of freedom."""
         x = self.columns(speed)
         return np.asarray(np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", x, self.covariance, x), 0.0)))
 
@@ -67,7 +67,7 @@ class Regression(Brief):
 
 
 def regression_of(record: Mapping[str, Any]) -> Regression:
-    """Return the law of a record that has the shape REGRESSION; raises ShapeError where its parts do not belong together."""
+    """Return the law of a record of the shape REGRESSION; raises ShapeError where the sizes of its parts do not agree."""
     powers, count = tuple(float(p) for p in record["powers"]), len(record["coefficients"])
     largest = LARGEST_COEFFICIENT if powers else LARGEST_LOGARITHM
     coefficients = [finite_number(c, "coefficients", -largest, largest) for c in record["coefficients"]]
@@ -92,9 +92,9 @@ def fit_powers(
 ) -> Regression:
     """Fit sum_k c_k u^p_k to values (n,), by QR; weighted by 1/std_error where given.
 
-    With weights the covariance is widened by the scatter when that exceeds the errors given (Birge ratio), never narrowed.
+    With weights the covariance is multiplied by the squared Birge ratio where that exceeds one, and never reduced.
     """
-    with np.errstate(over="ignore"):  # what overflows is refused below
+    with np.errstate(over="ignore"):  # `_least_squares` refuses an overflow
         x = np.stack([speed**p for p in powers], axis=1)
     coefficients, covariance, dof = _least_squares(x, value, std_error, rounding_of(value))
     error = value - x @ coefficients
@@ -102,7 +102,7 @@ def fit_powers(
 
 
 def fit_power_law(speed: FloatArray, value: FloatArray, std_error: FloatArray | None) -> Regression:
-    """Fit value = k u^e (value > 0) in logarithms, errors carried over as std_error/value."""
+    """Fit value = k u^e (value > 0) in logarithms, with std_error/value as the error of the logarithm."""
     x = np.stack([np.ones_like(speed), np.log(speed)], axis=1)
     log_error = None if std_error is None else std_error / value
     coefficients, covariance, dof = _least_squares(x, np.log(value), log_error, ROUNDING_SHARE)
@@ -111,12 +111,12 @@ def fit_power_law(speed: FloatArray, value: FloatArray, std_error: FloatArray | 
 
 
 def t_factor(dof: int, tests: int = 1) -> float:
-    """Return Student's 97.5 % point, Bonferroni's of so many tests; the normal one where no scatter could be measured."""
+    """Return the two-sided 95 % quantile of Student's t, with Bonferroni's correction for `tests`; the normal one for dof 0."""
     return student_quantile(1.0 - (1.0 - CONFIDENCE_LEVEL) / (2 * tests), dof)
 
 
 def rounding_of(value: FloatArray) -> float:
-    """Return the size of rounding errors of values (n,)."""
+    """Return the size of the rounding errors of values (n,)."""
     return ROUNDING_SHARE * float(np.max(np.abs(value)))
 
 
@@ -133,8 +133,8 @@ def _least_squares(
     coefficients = np.linalg.solve(r, q.T @ (y * weight))
     inverse = np.linalg.inv(r)
     dof = y.size - x.shape[1]
-    left = np.hypot(y - x @ coefficients, rounding) * weight
-    scatter = float(np.sum(left**2)) / dof if dof > 0 else float("nan")
+    residual = np.hypot(y - x @ coefficients, rounding) * weight
+    scatter = float(np.sum(residual**2)) / dof if dof > 0 else float("nan")
     if std_error is not None:
         scatter = max(1.0, scatter) if dof > 0 else 1.0
     return coefficients, np.asarray(inverse @ inverse.T * scatter), dof

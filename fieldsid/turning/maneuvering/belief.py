@@ -1,7 +1,7 @@
-"""The turns that all runs together make believe in: median and band of the settled circle, and the way into it.
+"""Turns predicted by the posterior of all runs: median and band of the settled circle, and the transient.
 
-The equations are not the vehicle: beyond the posterior's own spread the radius is spread by what equations with such data were
-off by on hulls of the ensemble and on the field vehicle (`FORM_LOG_SD`, `UNSEEN_LOG_SD`).
+The band contains the spread of the posterior and the model error of the equations, as found with such data on hulls of the
+ensemble and on the field vehicle (`FORM_LOG_SD`, `UNSEEN_LOG_SD`).
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ from fieldsid.turning.steady.transient import LEAST_SURGE_M_S, Transient, read_o
 T = TypeVar("T")
 SEED = 20240511
 FORM_LOG_SD = 0.025
-"""Log error of the equations where the turn was flown: 0.4 % on the ensemble (seed 1), 0.5 to 4 % on a vehicle outside it."""
+"""Log error of the equations for a turn that was flown: 0.4 % on the ensemble (seed 1), 0.5 to 4 % on a vehicle outside it."""
 UNSEEN_LOG_SD = 0.16
-"""More for each share of the turn's curvature that was not flown: with pulses alone the ensemble (seed 1) was off by 10 %."""
+"""Additional log error, times the share of the curvature that was not flown: 10 % on the ensemble (seed 1) with pulses only."""
 TRACK_STEPS = 4800
-"""Of a turn through 180 deg: four minutes of a vehicle, 200 lengths of a ship."""
+"""Time steps of a simulated turn through 180 deg: four minutes for a vehicle, 200 lengths for a ship."""
 
 
 @dataclass(frozen=True, slots=True)
 class BelievedTurn:
     """One turn: radius (m) with its 95 % band, rate (rad/s, magnitude), path speed (m/s).
 
-    `curvature_covered` and `fin_covered` are what was flown over what the turn has, at most one, `unsettled` is the share of
-    the draws that have no settled turn there, `effective` how many independent draws they are worth, `transient` that of the
-    likeliest vector.
+    `curvature_covered` and `fin_covered` are the largest values in the runs over those of the turn, at most one. `unsettled` is
+    the share of draws without a settled turn, `effective` the effective number of independent draws, `transient` that of the
+    maximum a posteriori.
     """
 
     radius: float
@@ -62,7 +62,7 @@ class BelievedTurn:
 
 @dataclass(frozen=True, slots=True)
 class Belief:
-    """The posterior of a vehicle's coefficients, and how its fin goes."""
+    """The posterior of a vehicle's coefficients, and the models that give the steady fin angle."""
 
     fitted: Fitted
     posterior: Posterior
@@ -70,12 +70,12 @@ class Belief:
 
     @property
     def runs(self) -> tuple[FlownRun, ...]:
-        """The runs it rests on."""
+        """The runs of the fit."""
         return self.fitted.runs
 
     def turn(self, entry: float, rudder: float, side: float) -> BelievedTurn:
         """Return the turn to starboard (side +1) or port (-1) from a straight run at `entry` m/s at `rudder` rad."""
-        fin = _fin(self.models, entry, rudder, side)
+        fin = _steady_fin(self.models, entry, rudder, side)
         path, rate = settled_turns(self.posterior, entry, fin)
         radius = path / np.abs(rate)
         ok = np.isfinite(radius) & (side * rate > 0.0)
@@ -84,20 +84,20 @@ class Belief:
         covered = min(self.largest_curvature * middle, 1.0) if np.isfinite(middle) else 0.0
         fin_covered = min(max(float(np.max(np.abs(r.fin))) for r in self.runs) / max(abs(fin), 1e-9), 1.0)
         effective = effective_draws(np.where(ok, log_radius, _median(log_radius)).reshape(self.posterior.chains.shape[:2]))
-        form = FORM_LOG_SD + UNSEEN_LOG_SD * (1.0 - covered) + STALL_LOG_SD * (1.0 - fin_covered)
-        drawn = float(np.std(log_radius[ok])) / np.sqrt(max(effective, 1.0)) if ok.any() else 0.0
-        low, high = _band(log_radius[ok], float(np.hypot(form, drawn)))
-        states = _median(np.abs(rate[ok])), _median(path[ok])
-        way = self._transient(entry, fin, side)
-        return BelievedTurn(middle, (low, high), *states, covered, fin_covered, float(1.0 - ok.mean()), effective, way)
+        model_error = FORM_LOG_SD + UNSEEN_LOG_SD * (1.0 - covered) + STALL_LOG_SD * (1.0 - fin_covered)
+        sampling_error = float(np.std(log_radius[ok])) / np.sqrt(max(effective, 1.0)) if ok.any() else 0.0
+        low, high = _band(log_radius[ok], float(np.hypot(model_error, sampling_error)))
+        medians = _median(np.abs(rate[ok])), _median(path[ok])
+        transient = self._transient(entry, fin, side)
+        return BelievedTurn(middle, (low, high), *medians, covered, fin_covered, float(1.0 - ok.mean()), effective, transient)
 
     @property
     def largest_curvature(self) -> float:
-        """The largest curvature that a run held for a moment, 1/m."""
+        """The largest curvature in a run's means over one second, 1/m."""
         largest = 0.0
         for run in self.runs:
             ok = np.isfinite(run.rate)
-            # where nothing measures the surge it is at most that of the straight part: the curvature is at least this
+            # without a measured surge, that of the straight part is an upper bound, and so the curvature a lower one
             surge = np.where(np.isfinite(run.measured[SURGE]), run.measured[SURGE], run.speed)
             rates, speeds = (block_means(of[ok], block_width(np.diff(run.time), 1.0)) for of in (run.rate, surge))
             largest = max(largest, float(np.max(np.abs(rates) / np.maximum(speeds, LEAST_SURGE_M_S), initial=0.0)))
@@ -107,40 +107,40 @@ class Belief:
         best = coefficients(self.fitted.vector)
         step = longest_step(float(best[0]), entry)
         time = step * np.arange(TRACK_STEPS, dtype=np.float64)
-        time.setflags(write=False)  # as that of a run is: what is compiled for one serves the other
+        time.setflags(write=False)  # like that of a run: the same compiled kernel then serves both
         path = np.full((time.size - 1, 2), fin)
         path[0, 0] = 0.0
         first = np.array([[entry, 0.0, 0.0]])
         motion = simulate(best, entry, first, np.zeros(1, dtype=np.int64), time, path, np.ones(time.size), step)
         u, v, heading = motion[SURGE], motion[SWAY], motion[HEADING]
         along, across = u * np.cos(heading) - v * np.sin(heading), u * np.sin(heading) + v * np.cos(heading)
-        whole = np.cumsum(np.stack([along, across, np.hypot(u, v)]), axis=1) * step
-        track = np.concatenate([heading[None], whole - whole[:, :1]]).T[:, :, None]
+        travelled = np.cumsum(np.stack([along, across, np.hypot(u, v)]), axis=1) * step
+        track = np.concatenate([heading[None], travelled - travelled[:, :1]]).T[:, :, None]
         return read_off(time, track, side)
 
 
 def believe(runs: Sequence[Run], models: Sequence[Model], length: float | None, seed: int = SEED) -> Belief | None:
-    """Return what runs make believe of a vehicle, its length in m where known; None where they lack fin, yaw or speed.
+    """Return the posterior of a vehicle from its runs; None where these lack fin, yaw or speed.
 
-    Raises ModelError where the fit or its posterior has no finite solution.
+    `length` is the vehicle's in m where it is known. Raises ModelError where the fit or its posterior has no finite solution.
     """
     fitted = fitted_to(runs, models, length, seed)
     if fitted is None:
         return None
-    known = _Known(usable_runs(runs, models), length, seed)
-    return Belief(fitted, _finite(lambda: _drawn(known), known.flown), tuple(models))
+    inputs = _Inputs(usable_runs(runs, models), length, seed)
+    return Belief(fitted, _finite(lambda: _drawn(inputs), inputs.flown), tuple(models))
 
 
 def fitted_to(runs: Sequence[Run], models: Sequence[Model], length: float | None, seed: int = SEED) -> Fitted | None:
-    """Return the fit that a belief rests on, without its draws, which take longer; None and errors as `believe`."""
+    """Return the fit of `believe` without the draws of its posterior, which take longer; None and errors as there."""
     flown = usable_runs(runs, models)
-    return _finite(lambda: _fitted(_Known(flown, length, seed)), flown) if flown else None
+    return _finite(lambda: _fitted(_Inputs(flown, length, seed)), flown) if flown else None
 
 
-def _finite(of: Callable[[], T], flown: Sequence[FlownRun]) -> T:
-    """Return what a function of some runs finds; raises ModelError where that is nothing finite."""
+def _finite(compute: Callable[[], T], flown: Sequence[FlownRun]) -> T:
+    """Return the result of a computation on some runs; raises ModelError where it raises LinAlgError."""
     try:
-        return of()
+        return compute()
     except np.linalg.LinAlgError as error:
         raise ModelError(
             "surge, sway and yaw cannot be fitted to all runs at once",
@@ -150,56 +150,56 @@ def _finite(of: Callable[[], T], flown: Sequence[FlownRun]) -> T:
 
 
 def not_fitted(error: ModelError, runs: Sequence[Run]) -> Note:
-    """Return what is said where the fit to all runs fails and each speed's own model is taken."""
+    """Return the note for a fit to all runs that failed, so that the model of each speed is used."""
     words = f"{error.what}: {error.found}; each speed's own model is taken instead: {error.hint}"
     return Note("maneuvering_not_fitted", words, {"runs": [run.name for run in runs]})
 
 
 def like_no_vehicle(fitted: Fitted, length: float | None) -> Note:
-    """Return what is said where the fit lies where no vehicle does and each speed's own model is taken."""
-    away, runs = fitted.prior.cost(fitted.vector), [run.name for run in fitted.runs]
+    """Return the note for a fit whose prior cost exceeds FARTHEST_COST, so that the model of each speed is used."""
+    prior_cost, runs = fitted.prior.cost(fitted.vector), [run.name for run in fitted.runs]
     hint = "" if length is not None else "state `length_m` in vehicle.yaml, "
     words = (
         "what all runs together make of surge, sway and yaw lies where no vehicle does: "
-        f"{away:.0f} from the vehicles known, limit {FARTHEST_COST:.0f} ({', '.join(runs)}); "
+        f"{prior_cost:.0f} from the vehicles known, limit {FARTHEST_COST:.0f} ({', '.join(runs)}); "
         f"each speed's own model is taken instead: {hint}look at the runs with `sysid inspect`, or fly a zig-zag"
     )
-    return Note("like_no_vehicle", words, {"runs": runs, "value": away, "limit": FARTHEST_COST})
+    return Note("like_no_vehicle", words, {"runs": runs, "value": prior_cost, "limit": FARTHEST_COST})
 
 
-class _Known:
-    """What a belief rests on, told from another by all that it holds: its runs, the length (m), the seed of its draws."""
+class _Inputs:
+    """The inputs of a fit, hashable by their content for a cache: runs, length (m) and the seed of the draws."""
 
     def __init__(self, flown: tuple[FlownRun, ...], length: float | None, seed: int) -> None:
         self.flown, self.length, self.seed = flown, length, seed
-        of = sha256(repr((length, seed)).encode())
+        digest = sha256(repr((length, seed)).encode())
         for run in flown:
-            of.update(repr((run.name, run.time.size, run.speed, run.speed_sd, run.rate_bias_sd)).encode())
+            digest.update(repr((run.name, run.time.size, run.speed, run.speed_sd, run.rate_bias_sd)).encode())
             for values in (run.time, run.fin, run.thrust, run.measured, run.discrepancy):
-                of.update(np.ascontiguousarray(values).tobytes())
-        self.digest = of.digest()
+                digest.update(np.ascontiguousarray(values).tobytes())
+        self.digest = digest.digest()
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Known) and self.digest == other.digest
+        return isinstance(other, _Inputs) and self.digest == other.digest
 
     def __hash__(self) -> int:
         return hash(self.digest)
 
 
 @lru_cache(maxsize=4)
-def _fitted(known: _Known) -> Fitted:
-    """Return the fit; a turn, the gains and their check of one morning rest on the same runs."""
-    return fit_maneuvering(known.flown, known.length)
+def _fitted(inputs: _Inputs) -> Fitted:
+    """Return the fit, cached: turns, gains and their verification use the same runs."""
+    return fit_maneuvering(inputs.flown, inputs.length)
 
 
 @lru_cache(maxsize=4)
-def _drawn(known: _Known) -> Posterior:
-    """Return the draws."""
-    return draw_posterior(_fitted(known), np.random.default_rng(known.seed))
+def _drawn(inputs: _Inputs) -> Posterior:
+    """Return the draws of the posterior, cached like the fit."""
+    return draw_posterior(_fitted(inputs), np.random.default_rng(inputs.seed))
 
 
-def _fin(models: Sequence[Model], speed: float, rudder: float, side: float) -> float:
-    """Return the fin angle that a rudder at its limit leaves, positive to port, as the equations have it."""
+def _steady_fin(models: Sequence[Model], speed: float, rudder: float, side: float) -> float:
+    """Return the steady fin angle (rad, positive turns to port as in the equations) for a rudder command toward `side`."""
     if not models:
         return -side * rudder
     near = nearest_model(models, speed)
@@ -210,14 +210,14 @@ def _fin(models: Sequence[Model], speed: float, rudder: float, side: float) -> f
 
 
 def _median(values: FloatArray) -> float:
-    """Return the median of what is not NaN, NaN where nothing is."""
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if known.size else float("nan")
+    """Return the median of the finite values, NaN where there are none."""
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if finite.size else float("nan")
 
 
 def _band(log_radius: FloatArray, spread: float) -> tuple[float, float]:
-    """Return the 95 % band of draws (n,), each spread by a normal error of the equations."""
-    nodes, parts = np.polynomial.hermite_e.hermegauss(15)
-    whole = (log_radius[:, None] + spread * nodes[None, :]).ravel()
-    shares = np.broadcast_to(parts, (log_radius.size, parts.size)).ravel()
-    return float(np.exp(weighted_quantile(whole, shares, 0.025))), float(np.exp(weighted_quantile(whole, shares, 0.975)))
+    """Return the 95 % band of the radius (m): draws (n,) of its logarithm, convolved with a normal error of sd `spread`."""
+    nodes, node_weights = np.polynomial.hermite_e.hermegauss(15)
+    values = (log_radius[:, None] + spread * nodes[None, :]).ravel()
+    weights = np.broadcast_to(node_weights, (log_radius.size, node_weights.size)).ravel()
+    return float(np.exp(weighted_quantile(values, weights, 0.025))), float(np.exp(weighted_quantile(values, weights, 0.975)))

@@ -1,13 +1,13 @@
-"""Surge, sway and yaw of a hull with a rudder at its stern, in coefficients without units, compiled.
+"""Surge, sway and yaw of a hull with a stern rudder, in dimensionless coefficients, compiled.
 
     u' = (D (s^2 (1 + t (1 - u/s)) - u^2) + X0 U (s - u) - M R w^2 f(alpha) sin(delta)) / L + M v r + X L r^2
     v' = (-(Yv u + Y0 U) v - Yr L u r - C J0 + R w^2 f(alpha) cos(delta)) / L
     r' = (-Nv u v - (Nr u + N0 U) L r - b C J1 + a R w^2 f(alpha) cos(delta)) / (k L^2)
     Jn = int_{-1/2}^{1/2} h(x) (v + x L r)|v + x L r| x^n dx,   h = sqrt(1 - |2 x|^3)
     alpha = delta + d0 - atan((v + a L r)/u),  w^2 = u^2 + (v + a L r)^2,  f(alpha) = alpha / (1 + (alpha/c)^4)^(1/4)
-(Yv u + Y0 U) not below nil; s the speed that the thrust holds on a straight course, t how thrust falls with speed, L the length,
-U = 1.5 m/s; R goes with (s/U)^e.
-Source: Fossen 2011, sections 6.4, 6.5 and 9.4; cross-flow drag as Faltinsen 1990, chapter 6; lift that fades at the stall.
+(Yv u + Y0 U) is at least zero; s is the speed of the straight run at this thrust, t the slope of the thrust over speed, L the
+length, U = 1.5 m/s; R is proportional to (s/U)^e; f is the lift with a stall at the angle c.
+Source: Fossen 2011, sections 6.4, 6.5 and 9.4; cross-flow drag as in Faltinsen 1990, chapter 6.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ NAMES = (
     "yaw_lift", "yaw_rate", "cross_drag", "stall", "rudder_offset", "lag", "rate_surge", "rate_limit",
     "wash", "sway_viscous", "yaw_viscous", "yaw_drag", "surge_viscous",
 )  # fmt: skip
-"""In order: L, D, M, t, R, a, k, Yv, Yr, Nv, Nr, C, c, d0, servo's lag (s), X, its rate limit (rad/s), e, Y0, N0, b, X0."""
+"""In order: L, D, M, t, R, a, k, Yv, Yr, Nv, Nr, C, c, d0, servo lag (s), X, servo rate limit (rad/s), e, Y0, N0, b, X0."""
 LOGARITHMS = {
     "length", "drag", "rudder", "gyration", "cross_drag", "stall", "lag", "rate_limit", "yaw_drag",
     "sway_viscous", "yaw_viscous", "surge_viscous",
@@ -34,23 +34,23 @@ LOGARITHMS = {
 IN_LOGARITHM = np.array([n in LOGARITHMS for n in NAMES])
 REFERENCE_SPEED_M_S = 1.5
 LENGTHS_A_STEP = 1.0 / 24.0
-"""The longest time step, in the time that the hull takes over its own length: its modes turn by less than a fifth in it."""
+"""Longest time step, over the time in which the hull travels its length: the product with its eigenvalues is below a fifth."""
 FINEST_STEP_S = 0.05
-"""A step that logs of vehicles have, and that the smallest of them need no finer."""
+"""Lower limit of the longest time step: the usual sampling interval of logs, fine enough for the smallest vehicles."""
 STATIONS = np.linspace(-0.45, 0.45, 10)
 HEIGHTS = 0.1 * np.sqrt(1.0 - np.abs(2.0 * STATIONS) ** 3)
 SUMS = np.concatenate([np.zeros((1, 4)), np.cumsum(HEIGHTS[:, None] * STATIONS[:, None] ** np.arange(4), axis=0)])
-"""Sums of h x^n over the first stations (11, 4): the flow across changes its sign at one place along the hull at most."""
+"""Sums of h x^n over the first 0 to 10 stations, (11, 4): the cross flow changes its sign at most once along the hull."""
 FIRST_STATION, STATION_STEP = float(STATIONS[0]), float(STATIONS[1] - STATIONS[0])
 OFFSET = NAMES.index("rudder_offset")
 DIFFERENCE = 1e-5
-"""Width of a difference, of speed, of speed over length, in rad: its third order is below 1e-10 of what it is of."""
+"""Width of the central differences, relative to speed and speed over length, and in rad; truncation error below 1e-10."""
 LEAST_SURGE_M_S = 0.02
 
 
 @inner
 def crossflow(v: float, w: float) -> tuple[float, float]:
-    """Return J0 and J1 of the strips, with w = L r the flow across for each length along: sum h x^n (v + x w)|v + x w|."""
+    """Return the strip sums J0 and J1, sum h x^n (v + x w)|v + x w|, for w = L r."""
     last = SUMS.shape[0] - 1
     below = 0
     sign = 1.0 if v > 0.0 else -1.0
@@ -67,7 +67,7 @@ def crossflow(v: float, w: float) -> tuple[float, float]:
 def slope(
     u: float, v: float, r: float, delta: float, push: float, straight: float, lift: float, p: FloatArray
 ) -> tuple[float, float, float]:
-    """Return the accelerations; `push` is the thrust over that of the straight run, `lift` from `rudder_lift`, p the rest."""
+    """Return u', v' and r'; push: thrust over that of the straight run; straight: s; lift: R of `rudder_lift`; p (22,)."""
     length = p[0]
     surge = max(u, LEAST_SURGE_M_S)
     j0, j1 = crossflow(v, length * r)
@@ -85,7 +85,7 @@ def slope(
         + p[15] * length * r * r
         - p[2] * force * math.sin(delta) / length
     )
-    # water takes energy from a hull that sways, and gives it none (Fossen 2011, property 6.3)
+    # damping dissipates: the linear sway damping is not negative (Fossen 2011, property 6.3)
     linear_sway, linear_yaw = max(p[7] * surge + p[18] * REFERENCE_SPEED_M_S, 0.0), p[10] * surge + p[19] * REFERENCE_SPEED_M_S
     dv = (-linear_sway * v - p[8] * length * surge * r - p[11] * j0 + cosine) / length
     moment = -p[9] * surge * v - linear_yaw * length * r - p[20] * p[11] * j1 + p[5] * cosine
@@ -95,7 +95,7 @@ def slope(
 
 @inner
 def rudder_lift(p: FloatArray, straight: float) -> float:
-    """Return R at the speed in m/s that the thrust holds on a straight course."""
+    """Return R at the speed s = `straight` (m/s) of the straight run."""
     return float(p[4] * (straight / REFERENCE_SPEED_M_S) ** p[17])
 
 
@@ -110,10 +110,10 @@ def simulate(
     thrust: FloatArray,
     longest: float,
 ) -> FloatArray:
-    """Return surge, sway, rate and heading (4, n) of a run in segments that begin at samples `begins` with states (m, 3).
+    """Return surge, sway, rate and heading (4, n) of a run in segments that begin at samples `begins` with states first (m, 3).
 
-    fin (n-1, 2) rad at either end of each interval before the servo's lag, thrust (n,) over the straight run's; `longest` (s) is
-    the longest time step (`longest_step`).
+    fin (n-1, 2), rad, is the command at the start and end of each interval, ahead of the servo; thrust (n,) is relative to the
+    straight run; `longest` is the longest time step in s (`longest_step`).
     """
     count = time.size
     out = np.empty((4, count))
@@ -129,14 +129,14 @@ def simulate(
         out[0, i], out[1, i], out[2, i], out[3, i] = u, v, r, heading
         if i == count - 1:
             break
-        whole = time[i + 1] - time[i]
-        pieces = max(math.ceil(whole / longest - 1e-6), 1)
-        h = whole / pieces
+        interval = time[i + 1] - time[i]
+        pieces = max(math.ceil(interval / longest - 1e-6), 1)
+        h = interval / pieces
         if h != last:
             last, keep, half = h, math.exp(-h / p[14]), math.exp(-0.5 * h / p[14])
         for j in range(pieces):
-            asked = fin[i, 0] + (fin[i, 1] - fin[i, 0]) * (j + 0.5) / pieces
-            between = angle + min(max((asked - angle) * (1.0 - half), -0.5 * h * p[16]), 0.5 * h * p[16])
+            command = fin[i, 0] + (fin[i, 1] - fin[i, 0]) * (j + 0.5) / pieces
+            between = angle + min(max((command - angle) * (1.0 - half), -0.5 * h * p[16]), 0.5 * h * p[16])
             push = thrust[i] + (thrust[i + 1] - thrust[i]) * (j + 0.5) / pieces
             du, dv, dr = slope(u, v, r, angle, push, straight, lift, p)
             mu, mv, mr = u + 0.5 * h * du, v + 0.5 * h * dv, r + 0.5 * h * dr
@@ -145,15 +145,15 @@ def simulate(
             u = min(max(u + h * du, LEAST_SURGE_M_S), LARGEST_SPEED_M_S)
             v = min(max(v + h * dv, -LARGEST_SPEED_M_S), LARGEST_SPEED_M_S)
             r = min(max(r + h * dr, -LARGEST_SPEED_M_S), LARGEST_SPEED_M_S)
-            angle += min(max((asked - angle) * (1.0 - keep), -h * p[16]), h * p[16])
+            angle += min(max((command - angle) * (1.0 - keep), -h * p[16]), h * p[16])
     return out
 
 
 @jit
 def settle(p: FloatArray, straight: float, fin: float) -> FloatArray:
-    """Return surge, sway and rate (3,) of the circle that a straight run settles to with the rudder at `fin` rad.
+    """Return surge, sway and rate (3,) of the steady circle after a straight run with the rudder at `fin` rad.
 
-    NaN where it has not settled after 400 lengths: within a thousandth over the last 40.
+    NaN where the rate has not settled after 400 lengths; settled is a range below a thousandth of it over 40 lengths.
     """
     h = 0.1 * p[0] / straight
     lift = rudder_lift(p, straight)
@@ -181,15 +181,15 @@ def longest_step(length: float, speed: float) -> float:
 
 
 def coefficients(theta: FloatArray) -> FloatArray:
-    """Return the coefficients (22,) of a vector in which the positive ones are logarithms."""
+    """Return the coefficients (22,) of a vector theta (22,), which has the positive ones as logarithms."""
     return np.where(IN_LOGARITHM, np.exp(np.where(IN_LOGARITHM, theta, 0.0)), theta)
 
 
 @jit
 def about_straight(hulls: FloatArray, speed: float) -> FloatArray:
-    """Return the derivatives (d, 2, 3) of the accelerations in sway and yaw by sway, rate and rudder, of hulls (d, 22).
+    """Return the derivatives (d, 2, 3) of v' and r' by v, r and delta on a straight run at a speed in m/s, for hulls (d, 22).
 
-    On a straight run at a speed in m/s, by central differences of `slope`; of two widths, as the cross flow goes with v|v|.
+    By central differences of `slope`, extrapolated from two widths because the cross-flow drag is proportional to v|v|.
     """
     out = np.zeros((hulls.shape[0], 2, 3))
     for i in range(hulls.shape[0]):
@@ -208,5 +208,5 @@ def about_straight(hulls: FloatArray, speed: float) -> FloatArray:
 
 
 def growth_rate(p: FloatArray, speed: float) -> float:
-    """Return the largest real part of the straight run's lateral modes at a speed in m/s, 1/s."""
+    """Return the largest real part (1/s) of the eigenvalues of sway and yaw on a straight run at a speed in m/s."""
     return float(np.max(np.linalg.eigvals(about_straight(p[None], speed)[0, :, :2]).real))

@@ -1,9 +1,9 @@
-"""The maneuvering model fitted to all runs at once: maximum a posteriori by Gauss-Newton, nuisances of the runs profiled out.
+"""The maneuvering model fitted to all runs at once: maximum a posteriori by Gauss-Newton, with the runs' nuisances profiled out.
 
-Runs are cut into segments (multiple shooting, Bock 1983), short ones first and longer ones then, so that the start is not led
-to a wrong minimum. Every run has its straight speed and the biases of its rate and sway, every segment the state that it begins
-with, so that a hull without stability of course is fitted as well. The noise of each channel is that of its residuals, taken
-larger by (1 + rho)/(1 - rho) where these are correlated.
+Runs are cut into segments (multiple shooting, Bock 1983), at first short and then longer, to avoid local minima. The nuisance
+parameters of a run are its straight speed and the biases of rate and sway, those of a segment its initial state, so that a
+directionally unstable hull can be fitted as well. The noise variance of each channel is that of its residuals, multiplied by
+(1 + rho)/(1 - rho) where these are correlated.
 """
 
 from __future__ import annotations
@@ -24,18 +24,19 @@ from fieldsid.turning.maneuvering.prior import FARTHEST_COST, Prior, prior
 from fieldsid.turning.steady.transient import LEAST_SURGE_M_S
 
 OWN = 3
-"""Nuisances of a run before its segments': straight speed, bias of the rate, bias of the sway."""
+"""Number of a run's nuisances ahead of those of its segments: straight speed, bias of the rate, bias of the sway."""
 SWAY_BIAS_SD = 0.02
-"""m/s: what a Doppler log may be off by across the hull."""
+"""Standard deviation of a Doppler log's sway bias, m/s."""
 LARGEST_RESIDUAL = 1e6
-"""Weighted residuals are clipped here where a simulation has left the water."""
+"""Weighted residuals are clipped to this size, for simulations that diverge."""
 
 
 @dataclass(frozen=True, slots=True)
 class CutRun:
-    """A run whose segments begin at samples `begins` (m,), the nuisances (3 + 3 m,) measured there, one over their spread.
+    """A run cut into segments that begin at samples `begins` (m,).
 
-    `longest` is the longest time step, s.
+    `first` (3 + 3 m,) are prior means of its nuisances, as measured, `weight` one over their standard deviations; `longest` is
+    the longest time step in s.
     """
 
     run: FlownRun
@@ -61,11 +62,11 @@ class CutRun:
         return np.where(np.isfinite(self.run.measured), np.clip(weighted, -LARGEST_RESIDUAL, LARGEST_RESIDUAL), 0.0)
 
     def away(self, local: FloatArray) -> FloatArray:
-        """Return the weighted distances of the nuisances from what was measured of them, (3 + 3 m,)."""
+        """Return the weighted deviations of the nuisances from their prior means, (3 + 3 m,)."""
         return np.asarray((local - self.first) * self.weight)
 
     def cost(self, p: FloatArray, local: FloatArray, noise: FloatArray) -> float:
-        """Return the sum of the squares of both."""
+        """Return the sum of squares of the weighted residuals and of the weighted deviations of the nuisances."""
         away = self.away(local)
         spread = np.hypot(noise, self.run.discrepancy)
         return float(away @ away) + float(_square_sum(self.misfit(p, local), self.run.measured, spread))
@@ -73,7 +74,7 @@ class CutRun:
 
 @jit
 def _square_sum(misfit: FloatArray, measured: FloatArray, spread: FloatArray) -> float:
-    """Return the sum of the residuals' squares; a simulation that ends in a NaN is as bad as any can be."""
+    """Return the sum of squares of the weighted residuals, where a NaN counts as LARGEST_RESIDUAL."""
     total = 0.0
     for i in range(misfit.shape[0]):
         for j in range(misfit.shape[1]):
@@ -84,7 +85,7 @@ def _square_sum(misfit: FloatArray, measured: FloatArray, spread: FloatArray) ->
 
 
 def cut_run(run: FlownRun, segment_s: float, length: float) -> CutRun:
-    """Return a run cut into segments of about `segment_s`, of a vehicle about `length` m long."""
+    """Return a run cut into segments of about `segment_s` s; `length` (m) of the vehicle decides on the time step."""
     begins = run.begins(segment_s)
     states = np.zeros((begins.size, 3))
     for i, begin in enumerate(begins):
@@ -104,25 +105,28 @@ def cut_run(run: FlownRun, segment_s: float, length: float) -> CutRun:
 SHARED = len(NAMES)
 FIRST_NOISE = np.array([0.05, 0.05, 0.02, 0.02])
 LEAST_NOISE = np.array([1e-3, 1e-3, 2e-4, 2e-4])
-"""m/s, m/s, rad/s, rad: no sensor of a vehicle is finer."""
+"""m/s, m/s, rad/s, rad: lower limits, since no sensor of a vehicle is better."""
 FIRST_SEGMENTS_S = (1.5, 6.0)
-"""What a wrong vector does within so short a time is still near to what was measured, so that it is led to the right one: an
-unstable hull fitted to 6 s at once stayed at a cost of 2378 where the right vector has 866."""
+"""Over short segments the simulation of a wrong vector stays near the measurement, so that the iteration converges: an unstable
+hull fitted to segments of 6 s at once stayed at a cost of 2378 where the right vector has 866."""
 LEAST_SEGMENT_S, SEGMENT_LENGTHS = 12.0, 3.0
-"""Segments are this long, s, or the way of so many hulls: what the water does to the vehicle is forgotten at the next one."""
+"""Segments last this many s, or for the travel of this many hull lengths if longer; disturbances do not act beyond a segment."""
 SHORTEST_SEGMENT_S = 4.0
 LONGEST_GROWTH = 2.5
-"""Segments end before an unstable mode has grown by exp of this."""
+"""Segments end before an unstable mode has grown by the factor exp(LONGEST_GROWTH)."""
 MAX_ITERATIONS = 25
 MAX_BACKTRACKS = 8
 TOLERANCE, START_TOLERANCE = 0.02, 0.5
-"""Of minus twice the log posterior; a start need not be at its minimum."""
+"""Decrease of minus twice the log posterior at which the iteration ends; larger for a start, which need not be a minimum."""
 DIFFERENCE = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """Vector (22,) at the maximum, its covariance (22, 22), and what the likelihood of another vector needs."""
+    """The vector (22,) at the maximum, its covariance (22, 22), and the data for the likelihood of other vectors.
+
+    `local` are the nuisances of each run, `response` their derivatives by the vector, `cost` minus twice the log posterior.
+    """
 
     vector: FloatArray
     covariance: FloatArray
@@ -134,7 +138,7 @@ class Fitted:
     cost: float
 
     def cost_at(self, vector: FloatArray) -> float:
-        """Return minus twice the log posterior at a vector, the nuisances moved to where they fit best to first order."""
+        """Return minus twice the log posterior at a vector, with the nuisances at their optimum to first order."""
         step, p = vector - self.vector, coefficients(vector)
         total = self.prior.cost(vector)
         for cut, local, response in zip(self.cuts, self.local, self.response, strict=True):
@@ -143,42 +147,42 @@ class Fitted:
 
     @property
     def is_usual(self) -> bool:
-        """Whether the vector is one that vehicles have."""
+        """Whether the prior cost of the vector is below FARTHEST_COST."""
         return self.prior.cost(self.vector) < FARTHEST_COST
 
     @property
     def runs(self) -> tuple[FlownRun, ...]:
-        """The runs it rests on."""
+        """The runs of the fit."""
         return tuple(cut.run for cut in self.cuts)
 
 
 def fit_maneuvering(runs: Sequence[FlownRun], length: float | None) -> Fitted:
-    """Fit the coefficients to runs; `length` of the vehicle in m where it is known.
+    """Fit the coefficients to runs; `length` is the vehicle's in m where it is known.
 
-    Raises LinAlgError where the normal equations are singular or what they give is not finite.
+    Raises LinAlgError where the normal equations are singular or the solution is not finite.
     """
     believed = prior(length)
     found = _from_start(runs, believed.mean, believed)
     if not found.is_usual:
-        away = np.zeros(SHARED)
-        away[0] = 1.0 / believed.axes[0, 0]
-        tried = [found, *(_from_start(runs, believed.mean + way * away, believed) for way in (-1.0, 1.0))]
-        found = min(tried, key=lambda f: f.cost)
+        length_step = np.zeros(SHARED)
+        length_step[0] = 1.0 / believed.axes[0, 0]
+        candidates = [found, *(_from_start(runs, believed.mean + sign * length_step, believed) for sign in (-1.0, 1.0))]
+        found = min(candidates, key=lambda f: f.cost)
     best, speed = coefficients(found.vector), float(np.median([r.speed for r in runs]))
     growth = growth_rate(best, speed)
     segment = max(LEAST_SEGMENT_S, SEGMENT_LENGTHS * float(best[0]) / speed)
     if growth > 0.0:
         segment = min(segment, max(LONGEST_GROWTH / growth, SHORTEST_SEGMENT_S))
-    whole = _problem(runs, segment, believed)
-    # a noise taken from what does not follow yet, vector or first states, passes for one that hides what the run says
-    found = whole.solved(found.vector, found.noise, keep_noise=True)
-    found = whole.solved(found.vector, found.noise, keep_noise=False, local=found.local)
+    problem = _problem(runs, segment, believed)
+    # a noise estimated before vector and initial states have converged would be too large and hide information in the run
+    found = problem.solved(found.vector, found.noise, keep_noise=True)
+    found = problem.solved(found.vector, found.noise, keep_noise=False, local=found.local)
     _refuse_not_finite(found)
     return found
 
 
 def _from_start(runs: Sequence[FlownRun], start: FloatArray, believed: Prior) -> Fitted:
-    """Return the fit to longer and longer segments, the noise not known yet."""
+    """Return the fit from a start vector to segments of the lengths FIRST_SEGMENTS_S in turn, with FIRST_NOISE."""
     for segment in FIRST_SEGMENTS_S:
         found = _problem(runs, segment, believed).solved(start, FIRST_NOISE, keep_noise=True)
         _refuse_not_finite(found)
@@ -187,7 +191,7 @@ def _from_start(runs: Sequence[FlownRun], start: FloatArray, believed: Prior) ->
 
 
 def _refuse_not_finite(found: Fitted) -> None:
-    """Refuse a fit with a NaN in it: residuals weighted by such a noise are nil, and the prior would be taken for a result."""
+    """Raise LinAlgError for a fit with a NaN: residuals weighted by such a noise vanish, and the result would be the prior."""
     parts = {"noise": found.noise, "coefficients": found.vector, "covariance": found.covariance, "cost": np.array(found.cost)}
     bad = [name for name, values in parts.items() if not np.isfinite(values).all()]
     if bad:
@@ -206,7 +210,10 @@ class _Problem:
     def solved(
         self, vector: FloatArray, noise: FloatArray, *, keep_noise: bool, local: Sequence[FloatArray] | None = None
     ) -> Fitted:
-        """Return the fit that starts from a vector and the runs' nuisances, those measured where none are given."""
+        """Return the fit from a start vector and start nuisances `local` of the runs, by default their prior means.
+
+        keep_noise: the noise is not estimated.
+        """
         local = [cut.first for cut in self.cuts] if local is None else list(local)
         damping = 1e-2
         cost = self._cost(vector, local, noise)
@@ -218,10 +225,10 @@ class _Problem:
             before = cost
             for _ in range(MAX_BACKTRACKS):
                 step, own = _step(parts, precision, pull, damping)
-                tried = [l + o for l, o in zip(local, own, strict=True)]
-                new = self._cost(vector + step, tried, noise)
+                new_local = [l + o for l, o in zip(local, own, strict=True)]
+                new = self._cost(vector + step, new_local, noise)
                 if new < cost:
-                    vector, local, cost, moved = vector + step, tried, new, True
+                    vector, local, cost, moved = vector + step, new_local, new, True
                     damping = max(0.2 * damping, 1e-7)
                     break
                 damping *= 6.0
@@ -244,11 +251,11 @@ class _Problem:
         return self.prior.cost(vector) + sum(cut.cost(p, own, noise) for cut, own in zip(self.cuts, local, strict=True))
 
     def _noise(self, vector: FloatArray, local: Sequence[FloatArray]) -> FloatArray:
-        """Return each channel's noise, correlated residuals counted as the fewer independent ones that they are."""
+        """Return the noise of each channel (4,): the rms of the residuals, inflated for their autocorrelation."""
         out, p = FIRST_NOISE.copy(), coefficients(vector)
-        left = [cut.misfit(p, own) for cut, own in zip(self.cuts, local, strict=True)]
+        residuals = [cut.misfit(p, own) for cut, own in zip(self.cuts, local, strict=True)]
         for channel in range(4):
-            parts = [e[channel][np.isfinite(cut.run.measured[channel])] for e, cut in zip(left, self.cuts, strict=True)]
+            parts = [e[channel][np.isfinite(cut.run.measured[channel])] for e, cut in zip(residuals, self.cuts, strict=True)]
             parts = [p for p in parts if p.size > 1]
             if not parts:
                 continue
@@ -263,7 +270,7 @@ def _problem(runs: Sequence[FlownRun], segment_s: float, believed: Prior) -> _Pr
 
 
 def _normal(cut: CutRun, vector: FloatArray, local: FloatArray, noise: FloatArray) -> _Normal:
-    """Return the normal equations of a run; a segment's first state moves nothing but its segment (the heading is not cut)."""
+    """Return the normal equations of a run; the initial state of a segment acts on this segment only (the heading is not cut)."""
     p, columns = coefficients(vector), []
     base = cut.residual(p, local, noise)
     for i in range(SHARED):
@@ -276,10 +283,10 @@ def _normal(cut: CutRun, vector: FloatArray, local: FloatArray, noise: FloatArra
         start[part] += DIFFERENCE
         columns.append(cut.residual(p, start, noise))
     moves = (np.array(columns) - base) / DIFFERENCE
-    whole, first = np.concatenate([moves[: SHARED + OWN], base[None]]), moves[SHARED + OWN :]
-    dense = whole.reshape(whole.shape[0], -1)
+    of_run, first = np.concatenate([moves[: SHARED + OWN], base[None]]), moves[SHARED + OWN :]
+    dense = of_run.reshape(of_run.shape[0], -1)
     square = dense @ dense.T
-    by_segment = np.add.reduceat(np.einsum("jcn,acn->jan", first, whole), cut.begins, axis=2)
+    by_segment = np.add.reduceat(np.einsum("jcn,acn->jan", first, of_run), cut.begins, axis=2)
     size, m = local.size, cut.begins.size
     cross, own, gradient = np.empty((size, SHARED)), np.zeros((size, size)), np.empty(size)
     cross[:OWN], own[:OWN, :OWN], gradient[:OWN] = square[SHARED:-1, :SHARED], square[SHARED:-1, SHARED:-1], square[SHARED:-1, -1]
@@ -296,7 +303,7 @@ def _normal(cut: CutRun, vector: FloatArray, local: FloatArray, noise: FloatArra
 
 @dataclass(frozen=True, slots=True)
 class _Normal:
-    """Normal equations of one run: shared by shared, own by shared, own by own, and the gradients."""
+    """Normal equations of one run in blocks: coefficients (`shared`), nuisances by coefficients (`cross`), nuisances (`own`)."""
 
     shared: FloatArray
     cross: FloatArray
@@ -306,12 +313,12 @@ class _Normal:
 
     @property
     def response(self) -> FloatArray:
-        """How the nuisances follow the shared coefficients, (own, 22)."""
+        """The derivatives of the optimal nuisances by the shared coefficients, (3 + 3 m, 22)."""
         return np.asarray(-np.linalg.solve(self.own, self.cross))
 
     @property
     def profiled(self) -> FloatArray:
-        """What the run says of the shared coefficients, (22, 22)."""
+        """The run's information on the shared coefficients with the nuisances profiled out, (22, 22)."""
         return self.shared + self.cross.T @ self.response
 
 

@@ -1,4 +1,4 @@
-"""What the maneuvering model takes of a run: fin, thrust and the motion that was measured, cut into segments."""
+"""A run as the maneuvering model uses it: fin, thrust and the measured motion."""
 
 from __future__ import annotations
 
@@ -21,28 +21,29 @@ from fieldsid.numerics.ljung_box import inflation
 from fieldsid.turning.steady.speed_loss import LEAST_SAMPLES, RPM, at_start, thrust_ratio
 
 OWN_EFFECTS = frozenset({"servo_lag", "rate_limit"})
-"""Effects of the actuator that the maneuvering model has itself."""
+"""Actuator effects that are part of the maneuvering model."""
 LEAST_TURN_RAD_S = 0.005
 UNKNOWN_BIAS_RAD_S = 0.002
-"""What a gyro may be off by, where no heading shows it."""
+"""Standard deviation of a gyro bias that no heading shows."""
 LEAST_BIAS_SD_RAD_S = 1e-5
 DISCREPANCY = 0.03
-"""Share of the motion that the equations themselves are off by."""
+"""Model error of the equations, as a share of the motion."""
 DISCREPANCY_LENGTH_M = 2.0
 STATE_SD = 0.3
-"""Of a straight speed, and of a segment's first state, about that measured: m/s, and rad/s."""
+"""Standard deviation of a straight speed (m/s) and of a segment's initial state (m/s, rad/s) about the measured ones."""
 SPEED_OF_RPM_SHARE = 0.03
-"""A propeller's slip on a straight course is alike at every speed to within a few hundredths (Fossen 2011, section 9.4)."""
+"""Relative error of a speed from the rpm: the slip on a straight course hardly depends on speed (Fossen 2011, section 9.4)."""
 SURGE, SWAY, RATE, HEADING = range(4)
 
 
 @dataclass(frozen=True, slots=True)
 class FlownRun:
-    """One run: time (n,) s, fin (n-1, 2) rad before the servo's lag, thrust (n,) over the straight run's.
+    """One run: time (n,) s, fin (n-1, 2) rad ahead of the servo, thrust (n,) over that of the straight run.
 
-    `measured` (4, n) surge, sway, rate and heading, NaN where not measured; heading only where there is no rate. The rate is
-    free of the bias that the heading shows, to within `rate_bias_sd` rad/s. `speed` is that of its straight part, m/s, known to
-    `speed_sd`: measured, or that of the propeller's turns.
+    `measured` (4, n) are surge, sway, rate and heading, NaN where not measured; heading only if the rate was not measured. The
+    rate is corrected for its bias against the heading, which has the standard deviation `rate_bias_sd` (rad/s). `speed` (m/s),
+    with the standard deviation `speed_sd`, is that of the straight part: measured, or from the rpm of the propeller.
+    `discrepancy` (4,) is the standard deviation of the model error.
     """
 
     name: str
@@ -63,7 +64,7 @@ class FlownRun:
 
     @property
     def turns(self) -> bool:
-        """Whether it turns at all."""
+        """Whether its yaw rate exceeds LEAST_TURN_RAD_S for 2 % of the time."""
         return float(np.nanpercentile(np.abs(self.rate), 98)) > LEAST_TURN_RAD_S
 
     def begins(self, segment_s: float) -> npt.NDArray[np.int64]:
@@ -73,10 +74,10 @@ class FlownRun:
 
 
 def flown_run(run: Run, model: Model | None, speed_per_rpm: float | None = None) -> FlownRun | None:
-    """Return what a run says of a maneuver, None where it lacks fin, yaw or speed; a model's actuator effects shape the fin.
+    """Return a run for the maneuvering model, None where it lacks fin, yaw or speed; the fin passes the model's actuator effects.
 
-    A run without a speed has that of its propeller's turns on a straight course, where `speed_per_rpm` (m/s per 1/min) is known:
-    the surge in its turns is then a state that nothing measures.
+    Without a measured speed the straight speed comes from the propeller's rpm, where `speed_per_rpm` (m/s per 1/min) is known;
+    the surge is then a state without measurement.
     """
     steered = run.has("rudder_rad") or run.has("rudder_measured_rad")
     if not steered or not (run.has("yaw_rate_rad_s") or run.has("yaw_rad")):
@@ -84,7 +85,7 @@ def flown_run(run: Run, model: Model | None, speed_per_rpm: float | None = None)
     surge = run["surge_m_s"] if knows_speed(run) else np.full(len(run), np.nan)
     speed, speed_sd = float(np.nanpercentile(surge, 90)) if knows_speed(run) else float("nan"), STATE_SD
     if not np.isfinite(speed) and speed_per_rpm is not None and run.has(RPM):
-        speed = speed_per_rpm * _turns_at_start(run)
+        speed = speed_per_rpm * _rpm_at_start(run)
         speed_sd = SPEED_OF_RPM_SHARE * speed
     if not speed > 0.0:
         return None
@@ -105,26 +106,27 @@ def flown_run(run: Run, model: Model | None, speed_per_rpm: float | None = None)
     measured = np.stack([surge, sway, rate if has_rate else none, heading])
     fin = np.stack([path.start, path.end], axis=1)
     if model is not None and model.base[NAMES[model.axis].authority] > 0.0:
-        fin = -fin  # the equations' rudder turns to port
-    off = _discrepancy(record.time, measured, speed)
-    return FlownRun(run.name, record.time, fin, thrust_ratio(record), measured, bias_sd, off, speed, speed_sd)
+        fin = -fin  # a positive rudder of the equations turns to port
+    discrepancy = _discrepancy(record.time, measured, speed)
+    return FlownRun(run.name, record.time, fin, thrust_ratio(record), measured, bias_sd, discrepancy, speed, speed_sd)
 
 
 def speed_per_rpm(runs: Sequence[Run]) -> float | None:
-    """Return the straight speed (m/s) for each turn of the propeller in a minute, by runs that have both; None where none has."""
+    """Return the straight speed per rpm of the propeller (m/s per 1/min) from the runs that have both; None without any."""
     both = [r for r in runs if knows_speed(r) and r.has(RPM)]
-    known = [float(np.nanpercentile(r["surge_m_s"], 90)) / turns for r in both if (turns := _turns_at_start(r)) > 0.0]
-    return float(np.median(known)) if known else None
+    ratios = [float(np.nanpercentile(r["surge_m_s"], 90)) / rpm for r in both if (rpm := _rpm_at_start(r)) > 0.0]
+    return float(np.median(ratios)) if ratios else None
 
 
-def _turns_at_start(run: Run) -> float:
+def _rpm_at_start(run: Run) -> float:
     return at_start(run[RPM][np.isfinite(run[RPM])])
 
 
 def _discrepancy(time: FloatArray, measured: FloatArray, speed: float) -> FloatArray:
-    """Standard deviation (4,) that the model's own error counts as in every sample: a share of what the run shows.
+    """Return the standard deviation (4,) per sample of the model error, a share of the run's motion.
 
-    It stays alike for the time that the hull takes over a few metres, and so counts as the more in single samples.
+    The error is correlated over the time in which the hull travels a few metres; as white noise it is larger by the root of the
+    number of samples in that time.
     """
     step = float(np.median(np.diff(time)))
     width = max(1, round(1.0 / step))
@@ -133,13 +135,13 @@ def _discrepancy(time: FloatArray, measured: FloatArray, speed: float) -> FloatA
     for i in range(4):
         values = measured[i][np.isfinite(measured[i])] - straight[i]
         if values.size >= width:
-            whole = block_means(values, width)
-            out[i] = np.sqrt(np.mean((whole - (whole.mean() if i == HEADING else 0.0)) ** 2))
+            means = block_means(values, width)
+            out[i] = np.sqrt(np.mean((means - (means.mean() if i == HEADING else 0.0)) ** 2))
     return np.asarray(DISCREPANCY * out * np.sqrt(max(2.0 * DISCREPANCY_LENGTH_M / speed / step, 1.0)))
 
 
 def _rate_bias(record: Record) -> tuple[float, float]:
-    """Return the bias of the rate gyro against the heading and its standard deviation, rad/s: the slope of what is between."""
+    """Return the bias of the rate gyro and its standard deviation, rad/s: the slope of integrated rate less heading over time."""
     if not (record.rate_ok.any() and record.angle_ok.sum() > LEAST_SAMPLES):
         return 0.0, UNKNOWN_BIAS_RAD_S
     rate = np.interp(record.time, record.time[record.rate_ok], record.rate[record.rate_ok])
@@ -147,18 +149,21 @@ def _rate_bias(record: Record) -> tuple[float, float]:
     time, between = (record.time - record.time.mean())[record.angle_ok], (turned - record.angle)[record.angle_ok]
     power = float(time @ time)
     slope = float(time @ between) / power
-    left = between - between.mean() - slope * time
-    sd = float(np.sqrt(np.mean(left**2) / power * inflation([left])))
+    residual = between - between.mean() - slope * time
+    sd = float(np.sqrt(np.mean(residual**2) / power * inflation([residual])))
     return slope, min(max(sd, LEAST_BIAS_SD_RAD_S), UNKNOWN_BIAS_RAD_S)
 
 
 def nearest_model(models: Sequence[Model], speed: float) -> Model:
-    """Return the model whose own speed is nearest to a speed in m/s."""
+    """Return the model whose reference speed is nearest to a speed in m/s."""
     return min(models, key=lambda m: abs(np.log(m.law.reference / speed)) if m.law.reference > 0 else np.inf)
 
 
 def usable_runs(runs: Sequence[Run], models: Sequence[Model]) -> tuple[FlownRun, ...]:
-    """Return what runs say; the fin is shaped by the model of the nearest speed, the first where a run has none."""
+    """Return the runs that can be used, empty if none of them turns; the fin passes the actuator effects of the nearest model.
+
+    The nearest model is that of the nearest speed, the first one for a run without a speed.
+    """
     found = []
     of_rpm = speed_per_rpm(runs)
     for run in runs:

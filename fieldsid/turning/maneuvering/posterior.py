@@ -1,9 +1,9 @@
-"""Draws from the posterior of the maneuvering model by elliptical slices, and the turns that they settle to.
+"""Draws from the posterior of the maneuvering model by elliptical slice sampling, and their steady turns.
 
 Chains start about the maximum and move on ellipses of a Gaussian that is fitted to the posterior (generalised elliptical slice
-sampling: Nishihara, Murray and Adams 2014): no step is rejected, and none is tuned. What is left of the first part of the
-chains moves the Gaussian to where they went. The posterior bends: weights of draws from a Gaussian or a Student's t about the
-maximum were worth 1 to 26 of 400. Draws without a settled turn are rejected for that turn and counted.
+sampling: Nishihara, Murray and Adams 2014): no step is rejected, and no step size is tuned. The first part of the chains, without
+its first half, adapts the Gaussian. The posterior is far from Gaussian: of 400 draws from a Gaussian or a Student's t about the
+maximum, importance weighting left 1 to 26 effective ones. Draws without a settled turn are left out for that turn and counted.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from fieldsid.turning.maneuvering.fit import Fitted
 
 CHAINS = 8
 STEPS, EVERY = 76, 2
-"""Steps of a chain, each of about five simulations of all runs, and of which of them the turns are worked out."""
+"""Steps of a chain, each of about five simulations of all runs, and the thinning of those used."""
 BEFORE_ADAPTED, LEFT_OUT = 14, 16
-"""Steps before the Gaussian is moved, and those of them and after them that are left out."""
+"""Steps before the Gaussian is adapted, and steps at the start of a chain that are discarded."""
 START_SHARE = 0.5
-"""Chains start within this share of the Gaussian's spread: the posterior bends away from all of it."""
+"""Spread of the chains' starts over that of the posterior's covariance, in whose tails the true posterior is low."""
 WIDER = 1.2
-"""The Gaussian's spread over the posterior's: narrower tails than the posterior's would hold a chain."""
+"""Spread of the Gaussian over that of the posterior: with narrower tails than the posterior's a chain would be trapped there."""
 NARROWEST_RAD = 1e-6
-"""Of an ellipse: below it a step stays where it is."""
+"""Bracket of the angle on an ellipse below which a step ends where it began."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,11 +48,11 @@ def draw_posterior(fitted: Fitted, rng: np.random.Generator) -> Posterior:
     """Return draws of the coefficients from the posterior of a fit."""
     about = _Gaussian.of(fitted.vector, fitted.covariance)
     now = about.centre + START_SHARE / WIDER * rng.standard_normal((CHAINS, about.centre.size)) @ about.root.T
-    first = _moved(fitted.cost_at, about, now, BEFORE_ADAPTED, rng)
-    went = first[:, BEFORE_ADAPTED // 2 :].reshape(-1, about.centre.size)
-    # few draws tell 22 by 22 numbers badly: half of the spread stays that of the maximum
-    about = _Gaussian.of(went.mean(axis=0), np.asarray(0.5 * (fitted.covariance + np.cov(went.T)), dtype=np.float64))
-    later = _moved(fitted.cost_at, about, first[:, -1], STEPS - BEFORE_ADAPTED, rng)
+    first = _advanced(fitted.cost_at, about, now, BEFORE_ADAPTED, rng)
+    draws = first[:, BEFORE_ADAPTED // 2 :].reshape(-1, about.centre.size)
+    # so few draws estimate a covariance of 22 by 22 badly: it is averaged with that at the maximum
+    about = _Gaussian.of(draws.mean(axis=0), np.asarray(0.5 * (fitted.covariance + np.cov(draws.T)), dtype=np.float64))
+    later = _advanced(fitted.cost_at, about, first[:, -1], STEPS - BEFORE_ADAPTED, rng)
     return Posterior(later[:, LEFT_OUT - BEFORE_ADAPTED :: EVERY])
 
 
@@ -64,27 +64,28 @@ class _Gaussian:
 
     @classmethod
     def of(cls, centre: FloatArray, covariance: FloatArray) -> _Gaussian:
-        whole = 0.5 * WIDER**2 * (covariance + covariance.T)
+        wider = 0.5 * WIDER**2 * (covariance + covariance.T)
         return cls(
-            centre, np.asarray(np.linalg.cholesky(whole), dtype=np.float64), np.asarray(np.linalg.inv(whole), dtype=np.float64)
+            centre, np.asarray(np.linalg.cholesky(wider), dtype=np.float64), np.asarray(np.linalg.inv(wider), dtype=np.float64)
         )
 
 
-def _moved(
+def _advanced(
     cost: Callable[[FloatArray], float], about: _Gaussian, start: FloatArray, steps: int, rng: np.random.Generator
 ) -> FloatArray:
-    """Return the chains (c, steps, 22) that go on from states (c, 22), each by draws of its own: they are shared out."""
-    own = rng.spawn(start.shape[0])
+    """Return the chains (c, steps, 22) from start states (c, 22), computed in parallel, each with its own generator."""
+    generators = rng.spawn(start.shape[0])
 
-    def rest(vector: FloatArray) -> float:
+    def log_ratio(vector: FloatArray) -> float:
+        """Return the log density of the posterior over that of the Gaussian."""
         away = vector - about.centre
         return -0.5 * (cost(vector) - float(away @ about.precision @ away))
 
     def chain(number: int) -> FloatArray:
         vector, out = start[number], np.empty((steps, start.shape[1]))
-        height = rest(vector)
+        height = log_ratio(vector)
         for step in range(steps):
-            vector, height = _slice(rest, about, vector, height, own[number])
+            vector, height = _slice(log_ratio, about, vector, height, generators[number])
             out[step] = vector
         return out
 
@@ -92,16 +93,16 @@ def _moved(
 
 
 def _slice(
-    rest: Callable[[FloatArray], float], about: _Gaussian, vector: FloatArray, height: float, rng: np.random.Generator
+    log_ratio: Callable[[FloatArray], float], about: _Gaussian, vector: FloatArray, height: float, rng: np.random.Generator
 ) -> tuple[FloatArray, float]:
-    """Return the next state, on an ellipse through this one and a draw of the Gaussian, and what `rest` gives there."""
+    """Return the next state, on the ellipse through `vector` and a draw of the Gaussian, and `log_ratio` there."""
     away, other = vector - about.centre, about.root @ rng.standard_normal(vector.size)
     least = height + math.log(1.0 - rng.uniform())
     angle = rng.uniform(0.0, 2.0 * math.pi)
     low, high = angle - 2.0 * math.pi, angle
     while high - low > NARROWEST_RAD:
         new = about.centre + away * math.cos(angle) + other * math.sin(angle)
-        found = rest(new)
+        found = log_ratio(new)
         if found > least:
             return new, found
         low, high = (angle, high) if angle < 0.0 else (low, angle)
@@ -110,18 +111,18 @@ def _slice(
 
 
 def effective_draws(values: FloatArray) -> float:
-    """Return how many independent draws the values (c, s) of c chains are worth; nil where they hold a NaN.
+    """Return the effective number of independent draws in values (c, s) of c chains; zero where there is a NaN.
 
-    The variance between the chains counts (Gelman and others 2013, section 11.5): chains that stay apart are worth few.
+    It takes the variance between the chains into account (Gelman and others 2013, section 11.5).
     """
     chains, steps = values.shape
     within = float(np.mean(np.var(values, axis=1, ddof=1)))
-    whole = (steps - 1) / steps * within + float(np.var(values.mean(axis=1), ddof=1))
-    if not whole > 0.0:
+    variance = (steps - 1) / steps * within + float(np.var(values.mean(axis=1), ddof=1))
+    if not variance > 0.0:
         return 0.0
     total = 0.0
     for lag in range(1, steps - 1, 2):
-        pair = sum(1.0 - float(np.mean((values[:, t:] - values[:, :-t]) ** 2)) / (2.0 * whole) for t in (lag, lag + 1))
+        pair = sum(1.0 - float(np.mean((values[:, t:] - values[:, :-t]) ** 2)) / (2.0 * variance) for t in (lag, lag + 1))
         if pair < 0.0:
             break
         total += pair
@@ -129,16 +130,16 @@ def effective_draws(values: FloatArray) -> float:
 
 
 def settled_turns(posterior: Posterior, entry: float, fin: float) -> tuple[FloatArray, FloatArray]:
-    """Return path speed m/s and rate rad/s (n,) of the circles that a straight run at `entry` m/s settles to, NaN where none.
+    """Return path speed m/s and rate rad/s (n,) of each draw's steady circle with the rudder at `fin` rad, NaN without one.
 
-    The rudder is at `fin` rad.
+    `entry` (m/s) is the speed of the straight run before the turn.
     """
     surge, sway, rate = np.array([settle(coefficients(vector), entry, fin) for vector in posterior.vectors]).T
     return np.hypot(surge, sway), rate
 
 
 def weighted_quantile(values: FloatArray, weights: FloatArray, share: float) -> float:
-    """Return the quantile of weighted values (n,), NaN among them left out; NaN where none is left."""
+    """Return the quantile of the finite values (n,) with positive weights (n,); NaN where there are none."""
     ok = np.isfinite(values) & (weights > 0.0)
     if not ok.any():
         return float("nan")

@@ -1,1 +1,1 @@
-"""The circle a run really turned."""
+"""The circle in a measured run."""

@@ -1,8 +1,8 @@
-"""A robust geometric circle through a track, on a centre that a steady current carries along.
+"""A robust geometric fit of a circle to a track, whose centre drifts with a steady current.
 
 Minimises sum rho(d_i), d_i = |p_i - c - w t_i| - R, over centre c, radius R and current w (Gander, Golub & Strebel 1994
-for the geometric distance; Huber's rho for outliers). The heading gives a start that stands any current. The standard error is
-corrected for correlated residuals by the length of their autocorrelation.
+for the geometric distance; Huber's rho for outliers). A linear fit by the heading gives a start for any current. The standard
+error is corrected for the autocorrelation of the residuals.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ HUBER = 1.345
 LEAST_SAMPLES = 12
 MAX_REWEIGHTINGS = 12
 LEAST_TURN_RAD = 1.5
-"""Below about a quarter circle the radius and the centre trade against each other."""
+"""Turned angle below which, about a quarter circle, radius and centre cannot be distinguished."""
 LEAST_TURN_FOR_CURRENT_RAD = 5.0
-"""Below most of a full circle a current cannot be told from a shift of the centre."""
+"""Turned angle below which a current cannot be distinguished from a shift of the centre."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -48,7 +48,7 @@ class Circle(Brief):
 
 
 def fit_circle(time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray) -> Circle:
-    """Fit a circle to a track and its unwrapped heading, (n,) in s, m and rad; the current too where most of a circle was turned.
+    """Fit a circle, and from LEAST_TURN_FOR_CURRENT_RAD on the current, to a track and its unwrapped heading, (n,) in s, m, rad.
 
     Raises DataError when there are too few samples or too short an arc.
     """
@@ -89,18 +89,20 @@ def _refined(
     span = float(t[-1]) or 1.0
     points, share = (track - middle) / scale, t / span
 
-    def off(p: FloatArray) -> FloatArray:
+    def distances(p: FloatArray) -> FloatArray:
         full = np.concatenate([p, np.zeros(5 - p.size)])  # cx, cy, R, wx, wy
         away = points - full[:2] - share[:, None] * full[3:]
         return np.asarray(np.hypot(away[:, 0], away[:, 1]) - full[2])
 
     best = start[:free]
     for _ in range(4):
-        spread = max(_robust_sd(off(best)), 1e-9)
-        fit = least_squares(off, best, loss="huber", f_scale=HUBER * spread, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14)
+        scaled, tolerance = HUBER * max(_robust_sd(distances(best)), 1e-9), 1e-14
+        fit = least_squares(
+            distances, best, loss="huber", f_scale=scaled, x_scale="jac", xtol=tolerance, ftol=tolerance, gtol=tolerance
+        )
         best = np.asarray(fit.x)
-    residual = off(best)
-    size = _effective(residual)
+    residual = distances(best)
+    size = _effective_samples(residual)
     jac = np.asarray(fit.jac, dtype=np.float64)
     inverse = np.linalg.pinv(jac.T @ jac)
     error = _robust_sd(residual) * float(np.sqrt(inverse[2, 2] * t.size / max(size - free, 1.0)))
@@ -119,7 +121,7 @@ def _refined(
 def _by_heading(points: FloatArray, share: FloatArray, heading: FloatArray) -> FloatArray:
     """Return (cx, cy, R, wx, wy): x = cx + wx t + p sin + q cos, y = cy + wy t - p cos + q sin of the heading.
 
-    Linear in all of it; least absolute deviations by reweighting, so that wild fixes do not count.
+    Linear in all parameters; least absolute deviations by reweighting, so that outliers among the fixes have little influence.
     """
     one, zero, sin, cos = np.ones_like(share), np.zeros_like(share), np.sin(heading), np.cos(heading)
     along = np.stack([one, zero, share, zero, sin, cos], axis=1)
@@ -137,11 +139,11 @@ def _robust_sd(residual: FloatArray) -> float:
     return float(np.median(np.abs(residual - np.median(residual)))) / MEDIAN_OF_NORMAL
 
 
-def _effective(residual: FloatArray) -> float:
-    """Return the number of independent samples in correlated residuals (n,), the lesser of two estimates.
+def _effective_samples(residual: FloatArray) -> float:
+    """Return the number of independent samples in correlated residuals (n,), the smaller of two estimates.
 
-    n / (1 + 2 sum of the autocorrelation), and that of an AR(1) whose coefficient is corrected for its bias (Kendall 1954):
-    the sum is cut where it is lost in noise, the AR(1) misses colour under white noise.
+    One is n / (1 + 2 sum of the autocorrelation), the sum cut where it is below its noise; the other is that of an AR(1) whose
+    coefficient is corrected for bias (Kendall 1954), which underestimates the correlation of coloured plus white noise.
     """
     centred = residual - residual.mean()
     power = float(centred @ centred)

@@ -21,7 +21,7 @@ TURNING_SHARE = 0.5
 SMOOTH_S = 2.0
 APPROACH_S = 5.0
 LEAST_RATE_RAD_S = 0.01
-"""Yaw rate below which nothing turns."""
+"""Yaw rate below which a run has no turn."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -44,7 +44,7 @@ class MeasuredTurn(Plotted):
 
     @property
     def flown_at(self) -> float:
-        """The speed (m/s) that the turn was entered with; where that is unknown, the one along the circle."""
+        """The entry speed of the turn (m/s), or the path speed where that is unknown."""
         return self.entry_speed if np.isfinite(self.entry_speed) else self.path_speed
 
 
@@ -76,7 +76,7 @@ def measure_turn(run: Run) -> MeasuredTurn:
 
 
 def is_circle(run: Run) -> bool:
-    """Whether a run settles on most of a full circle, as a turning circle does: a turn that is broken off is none."""
+    """Whether a run contains a settled circle of LEAST_TURN_FOR_CURRENT_RAD or more."""
     try:
         return measure_turn(run).circle.turned >= LEAST_TURN_FOR_CURRENT_RAD
     except DataError:  # no positions, no turn, or too short an arc
@@ -94,7 +94,7 @@ def _need_positions(run: Run) -> None:
 
 
 def _yaw_rate(run: Run) -> FloatArray:
-    """Return the yaw rate (n,): measured, or by the heading's slope."""
+    """Return the yaw rate (n,): measured, or the derivative of the heading."""
     for name in ("yaw_rate_rad_s", "yaw_rad"):
         if run.has(name):
             ok = np.isfinite(run[name])
@@ -105,7 +105,7 @@ def _yaw_rate(run: Run) -> FloatArray:
 
 
 def _heading(run: Run, rate: FloatArray) -> FloatArray:
-    """Return the unwrapped heading (n,), or the integral of the rate where it was not measured."""
+    """Return the unwrapped heading (n,), or the integral of the rate if it was not measured."""
     if run.has("yaw_rad"):
         ok = np.isfinite(run["yaw_rad"])
         return np.asarray(np.interp(run.time, run.time[ok], np.unwrap(run["yaw_rad"][ok])))
@@ -114,7 +114,7 @@ def _heading(run: Run, rate: FloatArray) -> FloatArray:
 
 
 def _settled(run: Run, rate: FloatArray) -> tuple[int, int]:
-    """Return the samples of the longest stretch of turning, its run-in left out: rate within 5 % of its later half."""
+    """Return first and last sample of the settled part of the longest turn: rate within 5 % of that of its second half."""
     peak = float(np.percentile(np.abs(rate), 95))
     if peak < LEAST_RATE_RAD_S:
         raise DataError(
@@ -153,7 +153,7 @@ def _fin(run: Run, span: slice) -> float:
 
 
 def _entry_speed(run: Run, turn_start: int) -> float:
-    """Return the speed before the turn: measured surge, else that over ground, NaN where the turn starts the log."""
+    """Return the speed before the turn: the measured surge, else the speed over ground, NaN where the log starts in the turn."""
     since = float(run.time[turn_start]) - APPROACH_S
     span = slice(int(np.searchsorted(run.time, since)), turn_start + 1)
     if turn_start < 10:

@@ -1,1 +1,1 @@
-"""The steady turn of a model: speed lost, drift, transient, and models blended over speed."""
+"""The steady turn of a model: loss of speed, drift, transient, and interpolation of models over speed."""

@@ -1,4 +1,4 @@
-"""Speed lost in a turn and drift, identified from measured surge and sway of the runs.
+"""Loss of speed and drift in a turn, identified from the measured surge and sway of the runs.
 
     u' = a_u (u0^2 - u^2) - k_r r^2 - k_d u^2 delta^2      (drag of hull; added resistance of the turn; drag of the fin)
 In a settled turn u0^2 = u^2 (1 + (k_d/a_u) delta^2 + (k_r/a_u) (r/u)^2). Drift: v = -l_r r, so the path's speed is
@@ -32,7 +32,7 @@ def at_start(values: FloatArray) -> float:
 
 
 def thrust_ratio(record: Record) -> FloatArray:
-    """Return the thrust (n,) over that at the run's start, one where it is not logged; it goes with the rpm squared."""
+    """Return the thrust (n,) over that at the run's start, one where it is not logged; from the rpm by its square."""
     thrust = record.signals.get("thrust")
     start = float("nan") if thrust is None else at_start(thrust)
     if thrust is None or not start > 0.0:
@@ -42,21 +42,21 @@ def thrust_ratio(record: Record) -> FloatArray:
 
 
 BLOCK_S, BLOCK_SHARE = 0.2, 0.2
-"""Block means are of 0.2 s, or of a fifth of the time in which a slow vehicle takes up its largest rate: its speed is slower."""
+"""Length of a block: 0.2 s, or for a slow vehicle a fifth of the time to its largest rate; its speed changes more slowly."""
 LEAST_BLOCKS = 200
-"""A run keeps so many blocks, however slow it is."""
+"""Least number of blocks of a run, however slow the vehicle is."""
 LEAST_SAMPLES = 40
 LEAST_TURN_RAD_S = 0.03
 TYPICAL_LOSS = 0.15
 TYPICAL_LOSS_LOG_SD = 0.6
 TYPICAL_DRIFT_RAD = 0.12
 TYPICAL_DRIFT_LOG_SD = 0.5
-"""Assumed where nothing was measured: 15 % of the speed lost (95 %: 5 .. 50) and 7 deg of drift (3 .. 18) in the requested turn.
-The ensemble of `model_error.py` lost 9 .. 38 % and drifted 2 .. 5 deg."""
+"""Assumed without measurements: a loss of 15 % of the speed (95 %: 5 .. 50) and a drift angle of 7 deg (3 .. 18) in the turn.
+In the ensemble of `model_error.py` the loss was 9 .. 38 % and the drift angle 2 .. 5 deg."""
 
 
 MIN_VARIANCE = 1e-18
-"""Variance below which a coefficient counts as known."""
+"""Lower limit of the variances by which a covariance is scaled, for coefficients that are known exactly."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -87,21 +87,21 @@ class SpeedLoss:
         return np.asarray(np.sqrt(1.0 + self.fin * fin**2 + self.turn * rate_per_speed**2))
 
     def one(self, index: int = 0) -> SpeedLoss:
-        """Return one draw alone."""
+        """Return a single draw."""
         keep = slice(index, index + 1)
         return SpeedLoss(self.turn[keep], self.fin[keep], self.drift_per_rate[keep], self.drag[keep])
 
 
 def no_speed_loss(count: int) -> SpeedLoss:
-    """Return a speed that is kept and no drift, for the formulas."""
+    """Return draws (count, 1) without loss of speed and drift, for the formulas."""
     zero = np.zeros((count, 1))
     return SpeedLoss(zero, zero, zero, np.full((count, 1), 0.1))
 
 
 def draw_speed_loss(model: SurgeModel | None, typical_curvature: float, count: int, rng: np.random.Generator) -> SpeedLoss:
-    """Return draws of the slowing, the first the estimate; typical values where nothing was measured.
+    """Return draws of the loss of speed and the drift, the first the estimate; typical values where they were not measured.
 
-    `typical_curvature` (1/m) is that of the turn in question: it turns a typical loss of speed into a coefficient.
+    `typical_curvature` (1/m) is that of the turn in question: it converts the typical loss of speed to a coefficient.
     """
     z = rng.standard_normal((count, 4))
     z[0] = 0.0
@@ -122,7 +122,7 @@ def draw_speed_loss(model: SurgeModel | None, typical_curvature: float, count: i
 
 
 def _root(covariance: FloatArray) -> FloatArray:
-    """Return the lower root (n, n) of a covariance: Cholesky's, and one where rounding has made it indefinite as well."""
+    """Return the lower triangular root (n, n) of a covariance, also of one that is indefinite by rounding."""
     scale = np.sqrt(np.maximum(np.diag(covariance), MIN_VARIANCE))
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T) / np.outer(scale, scale))
     upper = np.asarray(np.linalg.qr((vectors * np.sqrt(np.maximum(values, 0.0))).T, mode="r"))
@@ -130,9 +130,9 @@ def _root(covariance: FloatArray) -> FloatArray:
 
 
 def fit_surge(runs: Sequence[Run]) -> SurgeModel | None:
-    """Fit the slowing to runs with measured surge and yaw rate, jointly; None where none of them says anything.
+    """Fit the loss of speed and the drift jointly to all runs with measured surge or sway and a yaw rate; None without any.
 
-    A run says something when it turns at more than a few hundredths of a rad/s.
+    Runs whose yaw rate stays below LEAST_TURN_RAD_S are left out.
     """
     cases = [c for c in (_case(run) for run in runs) if c is not None]
     if not cases:
@@ -165,7 +165,7 @@ class _Case:
 def _case(run: Run) -> _Case | None:
     if not (run.has("yaw_rate_rad_s") or run.has("yaw_rad")) or not (run.has("rudder_rad") or run.has("rudder_measured_rad")):
         return None
-    # the surge is taken as it was measured: what a record makes of it takes longer than all else here
+    # the raw surge is used below: the smoothing in a record takes longer than all else here
     record = record_of(replace(run, signals={n: v for n, v in run.signals.items() if n != "surge_m_s"}), Axis.YAW)
     angle_only = not record.rate_ok.any()
     rate = (
@@ -184,7 +184,7 @@ def _case(run: Run) -> _Case | None:
 
 
 def _time_of_change(time: FloatArray, rate: FloatArray) -> float:
-    """Return the largest rate over its largest derivative, s, in block means: noise makes it shorter; it leaves blocks enough."""
+    """Return the largest rate over its largest derivative, in s, from block means; at most such that LEAST_BLOCKS remain."""
     width = block_width(np.diff(time), BLOCK_S)
     blocks, at = block_means(rate, width), block_means(time, width)
     if blocks.size < LEAST_SAMPLES:
@@ -204,7 +204,7 @@ def _filled(run: Run, name: str, none: FloatArray) -> FloatArray:
 
 @jit
 def simulated(steps: FloatArray, push: FloatArray, drag: FloatArray, loss: FloatArray, first: float) -> FloatArray:
-    """Return surge (n,) of u' = push - drag u^2 - loss by Heun's steps (n - 1,) s; what is given is (n,)."""
+    """Return the surge (n,) of u' = push - drag u^2 - loss by Heun's method; steps (n-1,) s, push, drag and loss (n,)."""
     u = np.empty(push.size)
     u[0] = first
     for i in range(steps.size):
@@ -240,10 +240,10 @@ def _fit_loss(cases: Sequence[_Case]) -> tuple[tuple[float, float, float], Float
 
 
 def _fit_drift(cases: Sequence[_Case]) -> tuple[float, float]:
-    """Return l_r of v = -l_r r + v_0 and its variance, each run with an offset of its own."""
+    """Return l_r of v = -l_r r + v_0 and its variance, with a separate v_0 for each run."""
     rate = np.concatenate([c.rate - c.rate.mean() for c in cases])
     sway = np.concatenate([c.sway - c.sway.mean() for c in cases])
     power = float(rate @ rate)
     slope = -float(rate @ sway) / power
-    left = sway + slope * rate
-    return slope, float(np.mean(left**2)) / power * inflation([left - left.mean()])
+    residual = sway + slope * rate
+    return slope, float(np.mean(residual**2)) / power * inflation([residual - residual.mean()])

@@ -1,6 +1,6 @@
-"""The steady circle of a plant, with speed lost and drift, for all draws and speeds at once; and of a source of models.
+"""The steady circle of a plant with loss of speed and drift, for all draws and speeds at once; and that of a source of models.
 
-Each model is scaled by its own law, neighbours in speed are blended.
+Each model is scaled by its speed law; between two models the turns are interpolated in log speed.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def balance(plant: YawPlant, surge: FloatArray, side: float) -> FloatArray:
     """Return the steady rate (d, s) toward `side` at a surge speed (d, s), NaN where there is none."""
     fin = plant.fin[side]
     core = plant.core[:, None, :] * plant.scale(surge)[:, :, None] ** plant.powers
-    core[:, :, CROSS_SHARE] *= plant.sway_seen
+    core[:, :, CROSS_SHARE] *= plant.cross_share_seen
     moment = plant.authority_at(surge) * fin + plant.trim_at(surge) + plant.moment
     damping, moment, fins = (np.broadcast_to(part, surge.shape).flatten() for part in (plant.damping_at(surge), moment, fin))
     out = np.empty(surge.size)
@@ -74,7 +74,7 @@ FALLBACK_CURVATURE = 0.3
 
 @dataclass(frozen=True, slots=True)
 class BlendedTurns:
-    """Turns to one side from entry speeds (s,): radius (d, s) over draws; magnitudes (s,) of rate and path speed; transient."""
+    """Turns to one side from entry speeds (s,): radius (d, s) of draws; magnitudes (s,) of rate and path speed; transient."""
 
     entry: FloatArray
     radius: FloatArray
@@ -87,32 +87,32 @@ class BlendedTurns:
 def blended_turns(
     source: ParameterSource, entry: FloatArray, rudder: float, surge: SurgeModel | None, draws: int, rng: np.random.Generator
 ) -> dict[str, BlendedTurns]:
-    """Return the settled turns of a source's models with the rudder held at `rudder` rad, to either side by name."""
-    asked = _asked(source, entry, rudder, surge, draws, rng)
+    """Return the settled turns of a source's models with the rudder at `rudder` rad, by side."""
+    cases = _cases(source, entry, rudder, surge, draws, rng)
 
-    def turned(of: _Asked) -> tuple[SteadyTurn, Transient]:
-        turn = steady_turn(of.plant, of.speed_loss, entry[of.used], SIDES[of.side])
-        return turn, turn_transient(of.plant, of.speed_loss, entry[of.used], SIDES[of.side], rudder)
+    def turns_of(case: _Case) -> tuple[SteadyTurn, Transient]:
+        turn = steady_turn(case.plant, case.speed_loss, entry[case.used], SIDES[case.side])
+        return turn, turn_transient(case.plant, case.speed_loss, entry[case.used], SIDES[case.side], rudder)
 
     sums = {side: _Sums(draws, entry.size) for side in SIDES}
-    for of, (turn, after) in zip(asked, parallel_map(turned, asked), strict=True):
-        sums[of.side].add(of.used, of.share, turn, after)
+    for case, (turn, transient) in zip(cases, parallel_map(turns_of, cases), strict=True):
+        sums[case.side].add(case.used, case.share, turn, transient)
     effects = tuple(sorted({e for m in source.models for e in m.effects}))
     return {side: total.turns(entry, effects) for side, total in sums.items()}
 
 
 def blended_radius(source: ParameterSource, entry: FloatArray, rudder: float, surge: SurgeModel | None) -> dict[str, FloatArray]:
-    """Return the estimate's settled radius (s,) m to either side by name: no draws, and not the way into the turn."""
+    """Return the estimate's settled radius (s,) m by side, without draws and without the transient."""
     log_radius = {side: np.zeros(entry.size) for side in SIDES}
-    for of in _asked(source, entry, rudder, surge, 1, np.random.default_rng(0)):
-        turn = steady_turn(of.plant, of.speed_loss, entry[of.used], SIDES[of.side])
-        log_radius[of.side][of.used] += of.share * np.log(turn.radius[0])
+    for case in _cases(source, entry, rudder, surge, 1, np.random.default_rng(0)):
+        turn = steady_turn(case.plant, case.speed_loss, entry[case.used], SIDES[case.side])
+        log_radius[case.side][case.used] += case.share * np.log(turn.radius[0])
     return {side: np.exp(total) for side, total in log_radius.items()}
 
 
 @dataclass(frozen=True, slots=True)
-class _Asked:
-    """Turns of one model to one side: the entry speeds used (k,), the model's share at each, its plant and loss of speed."""
+class _Case:
+    """Turns of one model to one side: places (k,) of its entry speeds, its weights (k,), its plant and its loss of speed."""
 
     side: str
     used: npt.NDArray[np.int_]
@@ -121,40 +121,40 @@ class _Asked:
     speed_loss: SpeedLoss
 
 
-def _asked(
+def _cases(
     source: ParameterSource, entry: FloatArray, rudder: float, surge: SurgeModel | None, draws: int, rng: np.random.Generator
-) -> list[_Asked]:
+) -> list[_Case]:
     weight = np.zeros((len(source.models), entry.size))
     for i, speed in enumerate(entry):
         for index, share in source.near(float(speed)):
             weight[index, i] = share
-    asked = []
+    cases = []
     for index, model in enumerate(source.models):
         used = np.flatnonzero(weight[index])
         if used.size:
             plant, speed_loss = _plant_and_speed_loss(model, rudder, surge, draws, rng, entry[used])
-            asked += [_Asked(side, used, weight[index, used], plant, speed_loss) for side in SIDES]
-    return asked
+            cases += [_Case(side, used, weight[index, used], plant, speed_loss) for side in SIDES]
+    return cases
 
 
 class _Sums:
-    """Weighted sums over neighbouring models: logarithms of what is positive and multiplies, the rest as it is."""
+    """Weighted sums over neighbouring models: of the logarithms of radius, rate and speed, of all else linearly."""
 
     def __init__(self, draws: int, speeds: int) -> None:
         self.log_radius = np.zeros((draws, speeds))
         self.log_rate, self.log_speed = np.zeros(speeds), np.zeros(speeds)
-        self.after = {f.name: np.zeros(speeds) for f in fields(Transient)}
+        self.transient = {f.name: np.zeros(speeds) for f in fields(Transient)}
 
-    def add(self, used: npt.NDArray[np.int_], share: FloatArray, turn: SteadyTurn, after: Transient) -> None:
+    def add(self, used: npt.NDArray[np.int_], share: FloatArray, turn: SteadyTurn, transient: Transient) -> None:
         self.log_radius[:, used] += share * np.log(turn.radius)
         self.log_rate[used] += share * np.log(np.abs(turn.rate[0]))
         self.log_speed[used] += share * np.log(turn.speed[0])
-        for name, total in self.after.items():
-            total[used] += share * getattr(after, name)
+        for name, total in self.transient.items():
+            total[used] += share * getattr(transient, name)
 
     def turns(self, entry: FloatArray, effects: tuple[str, ...]) -> BlendedTurns:
         rate, speed = np.exp(self.log_rate), np.exp(self.log_speed)
-        return BlendedTurns(entry, np.exp(self.log_radius), rate, speed, Transient(**self.after), effects)
+        return BlendedTurns(entry, np.exp(self.log_radius), rate, speed, Transient(**self.transient), effects)
 
 
 def _plant_and_speed_loss(
@@ -162,7 +162,7 @@ def _plant_and_speed_loss(
 ) -> tuple[YawPlant, SpeedLoss]:
     values, exponents = draw_values(model, draws, rng)
     plant = yaw_plant(model, values, rudder, exponents, entry)
-    kept = steady_turn(plant.one(), no_speed_loss(1), entry, 1.0)
+    without_loss = steady_turn(plant.one(), no_speed_loss(1), entry, 1.0)
     middle = int(np.argsort(entry)[entry.size // 2])
-    curvature = float(np.abs(kept.rate[0, middle]) / kept.surge[0, middle])
+    curvature = float(np.abs(without_loss.rate[0, middle]) / without_loss.surge[0, middle])
     return plant, draw_speed_loss(surge, curvature if np.isfinite(curvature) else FALLBACK_CURVATURE, draws, rng)

@@ -1,6 +1,6 @@
-"""The turn before it settles: rudder hard over from a straight run, until the heading has changed by 180 degrees.
+"""The transient of a turn: a rudder step from a straight run, until the heading has changed by 180 degrees.
 
-Tactical diameter, advance and transfer as in the ships' turning test (IMO MSC.137(76)): advance and transfer at 90 degrees,
+Advance, transfer and tactical diameter as in the turning test of ships (IMO MSC.137(76)): advance and transfer at 90 degrees,
 tactical diameter across the approach track at 180 degrees.
 """
 
@@ -27,7 +27,7 @@ LEAST_SURGE_M_S = 0.05
 class Transient:
     """For entry speeds (s,): time to 90 and 180 deg (s), path length to 180 deg, advance, transfer, tactical diameter (m).
 
-    NaN where the turn was not completed in four minutes.
+    NaN where the turn did not reach the angle in the simulated time.
     """
 
     time_90: FloatArray
@@ -38,13 +38,13 @@ class Transient:
     tactical_diameter: FloatArray
 
     def of(self, index: int) -> dict[str, Any]:
-        """Return the lengths (m) of one of the turns by their names in a row of a prediction; that of the path is over pi."""
+        """Return the lengths (m) of one turn by their names in `TurnRow`; `u_turn_radius` is the path to 180 deg over pi."""
         lengths = {name: getattr(self, name)[index] for name in ("advance", "transfer", "tactical_diameter")}
         return {name: float(value) for name, value in {**lengths, "u_turn_radius": self.path_180[index] / np.pi}.items()}
 
 
 class _Vehicle(NamedTuple):
-    """The estimate of a plant and of its loss of speed, and what the thrust keeps: see `YawPlant` and `SpeedLoss`."""
+    """The estimate (draw 0) of a plant and of its loss of speed as numbers for the kernel, see `YawPlant` and `SpeedLoss`."""
 
     core: FloatArray
     powers: FloatArray
@@ -52,7 +52,7 @@ class _Vehicle(NamedTuple):
     reference: float
     damping: float
     damping_exponent: float
-    damping_more: float
+    damping_added: float
     authority: float
     trim: float
     trim_per_authority: float
@@ -63,7 +63,7 @@ class _Vehicle(NamedTuple):
 
 
 def turn_transient(plant: YawPlant, speed_loss: SpeedLoss, entry: FloatArray, side: float, command: float) -> Transient:
-    """Simulate the estimate (draw 0) of a plant through a turn to `side` at a rudder command (rad, magnitude)."""
+    """Return the simulated transient of a plant's estimate (draw 0) for a turn to `side` at a rudder command (rad, magnitude)."""
     one, loss = plant.one(), speed_loss.one()
     middles = (np.arange(round(MAX_TRANSIENT_S / STEP_S)) + 0.5) * STEP_S
     fins = [np.interp(middles, *path) for path in fins_after_step(plant, side, command, entry)]
@@ -76,14 +76,14 @@ def turn_transient(plant: YawPlant, speed_loss: SpeedLoss, entry: FloatArray, si
 
 
 def _vehicle(one: YawPlant, loss: SpeedLoss, entry: int) -> _Vehicle:
-    """Return one draw alone as it enters at one of the plant's speeds, by its place."""
+    """Return the numbers of a plant of one draw at the entry speed with the index `entry`."""
     reference = one.model.law.reference
     known = reference if np.isfinite(reference) and reference > 0.0 else 0.0
     there = one.authority_at(np.full((1, 1), known or 1.0))
     of_fin = one.trim * one.factors[1] / there if one.model.law.trim_of_fin else np.zeros((1, 1))
     trim = np.zeros((1, 1)) if one.model.law.trim_of_fin else one.trim
     numbers = (
-        one.damping * one.factors[0], one.damping_exponent, one.damping_more, one.authority_ratio * one.factors[1], trim, of_fin,
+        one.damping * one.factors[0], one.damping_exponent, one.damping_added, one.authority_ratio * one.factors[1], trim, of_fin,
         loss.drag, loss.fin, loss.turn, loss.drift_per_rate,
     )  # fmt: skip
     return _Vehicle(one.core[0].copy(), one.powers, one.law, known, *(float(n[0, entry % n.shape[1]]) for n in numbers))
@@ -94,11 +94,11 @@ def fly_turn(
     vehicle: _Vehicle, entry: float, pushed: float, fins: FloatArray, own: tuple[FloatArray, FloatArray], step: float,
     track: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill track (n + 1, 4) with heading, north, east and path of a turn under fins (n,) by the midpoint rule.
+    """Fill track (n + 1, 4) with heading, north, east and path of a turn under fins (n,) rad, by the midpoint rule.
 
-    `own` are rates (r,) and the moment there that comes on top, none where they are empty.
-
-    The cross state is a moment -a21 v with a21 ~ u: over the speed's scale it goes with v and stays itself while the speed falls.
+    `pushed` (rad/s^2) is the moment of thrust and other signals. `own` are rates (r,) and the moment (r,) at them of effects outside
+    the core, empty without any. The cross state is the moment -a21 v with a21 ~ u; divided by the scale of the speed it is
+    proportional to v, which does not jump while the speed falls.
     """
     kinds, core = kinds_of(vehicle.core), np.empty(vehicle.core.size)
     heading, rate, surge, north, east, path, cross = 0.0, 0.0, entry, 0.0, 0.0, 0.0, 0.0
@@ -110,7 +110,7 @@ def fly_turn(
             scale = u / vehicle.reference if vehicle.reference > 0.0 else 1.0
             core_at(vehicle.core, vehicle.powers, scale, core)
             authority = vehicle.authority * between(np.log(u), *vehicle.law) * u * u
-            damping = vehicle.damping * power(scale, vehicle.damping_exponent) + vehicle.damping_more
+            damping = vehicle.damping * power(scale, vehicle.damping_exponent) + vehicle.damping_added
             moment = authority * (fins[i] + vehicle.trim_per_authority) + vehicle.trim + pushed + between(r, *own)
             now = slope(named(core), kinds, damping, 0.0, moment, fins[i], 1.0, 0.0, r, scale * (cross + t * to_cross), 0.0)
             sway = -vehicle.drift_per_rate * r
@@ -129,7 +129,7 @@ def fly_turn(
 
 
 def read_off(time: FloatArray, track: FloatArray, side: float) -> Transient:
-    """Return the turn of tracks (n, 4, s) of heading (rad), north, east and path (m) at times (n,) s, toward `side`."""
+    """Return the transients of tracks (n, 4, s), with heading (rad), north, east and path (m) at times (n,) s, toward `side`."""
     columns = [
         _one(time, side * track[:, 0, j], track[:, 1, j], side * track[:, 2, j], track[:, 3, j]) for j in range(track.shape[2])
     ]

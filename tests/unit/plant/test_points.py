@@ -18,7 +18,7 @@ from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.plant.laws.axis_laws import fit_laws, load_laws, save_laws
 from fieldsid.plant.parameter_source import draw_values, load_parameter_source, logs_of, source_of_models
-from fieldsid.plant.points import distinct_speeds, meant_speeds
+from fieldsid.plant.points import distinct_speeds, intended_speeds
 from fieldsid.plant.table import read_table
 from fieldsid.records.named_inputs import inputs_of
 
@@ -350,4 +350,4 @@ def test_a_tables_draws_keep_the_sign_of_damping_and_authority_and_none_lies_on_
     ],
 )
 def test_speeds_that_were_asked_for_are_read_off_those_that_were_flown(flown, meant):
-    assert meant_speeds(np.array(flown)) == meant
+    assert intended_speeds(np.array(flown)) == meant

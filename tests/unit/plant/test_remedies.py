@@ -15,7 +15,7 @@ from fieldsid.logs import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import save_model
 from fieldsid.plant.parameter_source import load_parameter_source
-from fieldsid.plant.remedies import damping_that_holds, refuse_no_fin, wider_fin
+from fieldsid.plant.remedies import fin_limit_hint, limiting_damping_hint, refuse_fin_limit
 from fieldsid.schedule.make import design_schedule
 from fieldsid.turning.radius import turn_radius
 
@@ -46,7 +46,7 @@ def test_the_fin_limit_advised_is_that_of_the_runs_and_serves_at_every_speed(tmp
 
 @pytest.mark.parametrize("fin_max", [0.1, 0.0])
 def test_where_the_runs_do_not_tell_a_limit_the_least_is_said(tmp_path, fin_max):
-    assert wider_fin("--fin-max", 0.12, source(tmp_path, 0.12, fin_max=fin_max)) == (
+    assert fin_limit_hint("--fin-max", 0.12, source(tmp_path, 0.12, fin_max=fin_max)) == (
         "trim the fin: a limit has to be above 0.12 rad, 6.9 deg"
     )
     with pytest.raises(UsageError) as caught:
@@ -59,7 +59,7 @@ def test_where_the_runs_do_not_tell_a_limit_the_least_is_said(tmp_path, fin_max)
 )
 def test_an_angle_that_no_fin_has_is_said_in_both_units(given, said):
     with pytest.raises(UsageError, match="at most at 90 deg") as caught:
-        refuse_no_fin("a fin's limit", given)
+        refuse_fin_limit("a fin's limit", given)
     assert caught.value.hint == f"{said}; write it like `--fin-max 15deg`"
 
 
@@ -82,8 +82,8 @@ def test_a_rate_that_nothing_holds_is_helped_by_what_the_source_has(tmp_path):
     with pytest.raises(ModelError) as caught:
         turn_radius(source(tmp_path, 0.0, a22=-0.1), [1.2], 0.3)
     assert caught.value.hint == f"add the damping that holds it: `sysid extend {tmp_path}/m0.yaml RUN... --add quadratic_damping`"
-    assert "sysid identify RUN... --axis yaw --effects quadratic_damping" in damping_that_holds(table(tmp_path), 1.4)
-    assert "quadratic" not in damping_that_holds(source(tmp_path, 0.0), 1.2, ("quadratic_damping",))
+    assert "sysid identify RUN... --axis yaw --effects quadratic_damping" in limiting_damping_hint(table(tmp_path), 1.4)
+    assert "quadratic" not in limiting_damping_hint(source(tmp_path, 0.0), 1.2, ("quadratic_damping",))
 
 
 def test_a_model_that_grows_is_given_the_damping_it_has_not():
@@ -106,6 +106,6 @@ def test_paths_are_quoted(tmp_path, monkeypatch):
     Path("my models").mkdir()
     log = trial.flown(Path("my models"))
     path = save_model(trial.vehicle(Axis.YAW, a22=-0.1), Path("my models/m.yaml"), inputs=[log])
-    assert damping_that_holds(load_parameter_source([path]), 1.4).endswith(
+    assert limiting_damping_hint(load_parameter_source([path]), 1.4).endswith(
         "`sysid extend 'my models/m.yaml' 'my models/run7.parquet' --add quadratic_damping`"
     )
