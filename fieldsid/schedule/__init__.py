@@ -1,4 +1,4 @@
-"""Gains per speed: designed, verified, flown. A copy of the node of `templates/ros2` takes `load_schedule` from here."""
+"""Gain schedules over speed: design, verification, simulation. Copies of the node of `templates/ros2` import `load_schedule`."""
 
 from fieldsid.schedule.record import load_schedule
 

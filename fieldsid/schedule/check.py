@@ -1,4 +1,4 @@
-"""One speed of a verification: its margins, its steps and what its gains come to."""
+"""One speed of a verification: its margins, its step responses and the outcome of its gains."""
 
 from __future__ import annotations
 
@@ -17,14 +17,13 @@ from fieldsid.schedule.search.objective import Outcome
 
 @dataclass(frozen=True, slots=True, repr=False)
 class StepCheck(Brief):
-    """A step of one size (rad) by the estimate and by 95 % of the draws: overshoot as a share of it, settling in s (5 %).
+    """The response to a step of one size (rad): overshoot as a share of the step, settling time in s (5 %).
 
-    Those of the draws are about where each comes to rest; `off` (rad) is how far that is from what was asked, by 95 % of them:
-    what a trim that is not known to better leaves. `settling_median` and `settling95` (s) are the middle of the draws and the
-    band that holds 95 % of them: settling jumps by half a swing where an overshoot just leaves the corridor. `swing` is what
-    still swings in the last quarter, peak to peak as a share of the step, by 95 % of the draws; `flown` (s) how long they were
-    flown. Overshoot and settling are NaN
-    where what was flown does not say them (`_with_what_is_known`).
+    `..._most` is the worst over 95 % of the draws. Overshoot and settling of a draw are relative to its steady state; `off` (rad)
+    is the steady error, from the error of the trim, worst over 95 % of the draws. `settling_median` and `settling95` (s) are the
+    median and the 95 % band of the draws: settling jumps by half a period where an overshoot just leaves the corridor. `swing` is
+    the peak-to-peak oscillation in the last quarter of the flight as a share of the step, worst over 95 % of the draws; `flown`
+    (s) is the simulated time. Overshoot and settling are NaN where the data do not support them (`_without_unsupported`).
     """
 
     size: Annotated[float, Key("Its size.", "step_rad")]
@@ -55,11 +54,12 @@ class StepCheck(Brief):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Check(Displayed):
-    """One speed under one set of gains: margins at the estimate and the least over 95 % of the draws; steps.
+    """One speed with one set of gains: margins of the estimate and the least over 95 % of the draws; step responses.
 
-    `steps` are of the small, the standard and the large size; `unstable` how many of the draws are, `speed_least` (m/s) the
-    least speed in the large step. `bent_error` is the steady error (rad) of a 3 deg fin offset that the feed-forward knows,
-    `bent_error_unknown` one it does not; `leg_rms` and `leg_fin_rms` (rad) are of a straight leg in the models' disturbance.
+    `steps` are the small, the standard and the large step; `unstable` is the number of unstable draws, `speed_least` (m/s) the
+    least speed in the large step. `bent_error` (rad) is the steady error under a fin offset of 3 deg that the feed-forward
+    compensates, `bent_error_unknown` under one that it does not; `leg_rms` and `leg_fin_rms` (rad) are the rms of angle and fin
+    on a straight leg under the models' disturbance.
     """
 
     speed: Annotated[float, Key("The speed.", "speed_m_s")]
@@ -83,7 +83,7 @@ class Check(Displayed):
     depth_settling: Annotated[Number, Key("Its settling time.", "depth_settling_s")]
     depth_flown: Annotated[Number, Key("How long it was flown.", "depth_flown_s")]
     outcome: Annotated[Outcome, INLINE]
-    """What the gains come to by the objective that rows are designed for."""
+    """The outcome of the gains by the objective that rows are designed for."""
 
     @property
     def overshoot(self) -> Annotated[Number, Key(name="overshoot_percent", times=100.0)]:
@@ -107,7 +107,7 @@ class Check(Displayed):
 
     @property
     def hunts(self) -> StepCheck | None:
-        """The first step after which the loop goes on swinging, a limit cycle; None where all come to rest."""
+        """The smallest step after which a limit cycle remains; None without one."""
         return next((s for s in self.steps if s.swing > LIMIT_CYCLE_SHARE), None)
 
 
@@ -119,4 +119,4 @@ READ_OFF: Mapping[str, tuple[float, Callable[[Check], float]]] = MappingProxyTyp
         "overshoot_percent": (-1.0, lambda c: 100.0 * c.overshoot_most),
     }
 )
-"""The numbers a gate may ask for: 1 where more is better, -1 where less is, and how each is read off a check."""
+"""The numbers that a gate can limit: 1 where more is better, -1 where less is, and the function that reads each from a check."""

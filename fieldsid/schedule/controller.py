@@ -2,7 +2,7 @@
 
 fin = limit(kp (reference - angle) + ki integral - kd rate + forward + k_ref reference).
 
-`forward` cancels the trim offset of the fin, k_ref the stiffness (pitch): then the loop has nothing steady left to do.
+`forward` cancels the trim offset of the fin and k_ref the stiffness (pitch), so that the feedback has no steady error to correct.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ class Gains:
     kd: Annotated[float, Key("rad of fin per rad/s.")] = 0.0
 
     def times(self, factor: float) -> Gains:
-        """Return all gains multiplied."""
+        """Return the gains, each multiplied by a factor."""
         return Gains(self.kp * factor, self.ki * factor, self.kd * factor)
 
     def response(self, omega: FloatArray) -> ComplexArray:
-        """Return fin over angle error at frequencies (w,), the rate taken as the angle's own."""
+        """Return fin over angle error at frequencies (w,) rad/s, with the rate as the derivative of the angle."""
         s = 1j * omega
         return np.asarray(self.kp + self.ki / s + self.kd * s)
 
     def blended(self, other: Gains, share: float) -> Gains:
-        """Return (1 - share) of these and share of the others."""
+        """Return the gains interpolated linearly: these at share 0, the other ones at 1."""
         return Gains(*(a + share * (b - a) for a, b in ((self.kp, other.kp), (self.ki, other.ki), (self.kd, other.kd))))
 
 
@@ -60,9 +60,9 @@ def closed_poles(plant: LinearPlant, gains: Gains) -> ComplexArray:
     if gains.ki != 0.0:
         control, denominator = [*control, gains.ki], np.pad(denominator, ((0, 0), (0, 1)))
     forward = products(numerator, np.tile(np.array(control), (plant.count, 1)))
-    whole = denominator.copy()
-    whole[:, -forward.shape[1] :] += forward
-    return roots_of(whole)
+    characteristic = denominator.copy()
+    characteristic[:, -forward.shape[1] :] += forward
+    return roots_of(characteristic)
 
 
 def least_damping(plant: LinearPlant, gains: Gains) -> FloatArray:
@@ -74,12 +74,12 @@ def least_damping(plant: LinearPlant, gains: Gains) -> FloatArray:
 
 FREQUENCY_GRID_RAD_S = np.geomspace(1e-3, 200.0, 1500)
 HELD_SHARE = CONFIDENCE_LEVEL
-"""Share of the draws that a number of the identified set speaks for."""
+"""Share of the draws over which the worst value is reported for the identified set."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlantResponse:
-    """What of every draw's loop on a grid is the plant's, whatever the gains: log size and unwrapped phase (d, w), rad/s (w,)."""
+    """The frequency response of every draw of a plant: log magnitude and unwrapped phase (d, w) at omega (w,) rad/s."""
 
     plant: LinearPlant
     omega: FloatArray
@@ -91,8 +91,8 @@ class PlantResponse:
 class Margins:
     """Smallest margins (d,): phase deg, gain dB (up), delay s, at crossover rad/s; inf where the loop never crosses.
 
-    An unstable closed loop has a phase margin below zero, whatever its crossings are, and no other margin. `damping` is the least
-    damping ratio of the closed loop's poles.
+    An unstable closed loop has a negative phase margin, whatever its crossings are, and zero gain and delay margins. `damping` is
+    the least damping ratio of the closed loop's poles.
     """
 
     phase_deg: FloatArray
@@ -108,7 +108,7 @@ class Margins:
 
 
 def worst_of(values: FloatArray, *, most: bool) -> float:
-    """Return the worst of a number over 95 % of the draws (d,): the largest where `most`, else the least; NaN is worse."""
+    """Return the worst value over 95 % of the draws (d,): the largest if `most`, else the least; NaN counts as worst."""
     ordered = np.sort(np.where(np.isnan(values), np.inf, values if most else -values))
     return float(ordered[int(np.ceil(HELD_SHARE * ordered.size - 1e-9)) - 1]) * (1.0 if most else -1.0)
 
@@ -120,18 +120,18 @@ def plant_response(plant: LinearPlant, omega: FloatArray = FREQUENCY_GRID_RAD_S)
 
 
 def margins(plant: LinearPlant, gains: Gains) -> Margins:
-    """Return the margins of every draw, from the whole grid by interpolation at each crossing."""
+    """Return the margins of every draw, by interpolation at each crossing on the full frequency grid."""
     return margins_of(plant_response(plant), gains)
 
 
-def margins_of(known: PlantResponse, gains: Gains) -> Margins:
-    """Return the margins of every draw with gains, from a plant's response on a grid by interpolation at each crossing."""
-    controller = gains.response(known.omega)
-    size = known.log_size + np.log(np.abs(controller))
-    phase = known.phase + np.unwrap(np.angle(controller))
-    # an unwrapped phase may sit a turn off: a loop with positive gain starts between -360 and 0
+def margins_of(response: PlantResponse, gains: Gains) -> Margins:
+    """Return the margins of every draw with gains, by interpolation at each crossing of a plant's frequency response."""
+    controller = gains.response(response.omega)
+    size = response.log_size + np.log(np.abs(controller))
+    phase = response.phase + np.unwrap(np.angle(controller))
+    # an unwrapped phase may be off by a full turn: a loop with positive gain starts between -360 and 0 deg
     phase -= 2 * np.pi * np.ceil(phase[:, :1] / (2 * np.pi) - 1e-9)
-    return _read_off(size, phase, np.log(known.omega), least_damping(known.plant, gains))
+    return _read_off(size, phase, np.log(response.omega), least_damping(response.plant, gains))
 
 
 def _read_off(size: FloatArray, phase: FloatArray, log_omega: FloatArray, damping: FloatArray) -> Margins:
@@ -150,7 +150,7 @@ def _read_off(size: FloatArray, phase: FloatArray, log_omega: FloatArray, dampin
     line = 2 * np.pi * np.maximum(turns[i, j], turns[i, j + 1]) - np.pi
     share = (line - phase[i, j]) / (phase[i, j + 1] - phase[i, j])
     log_size = size[i, j] + share * (size[i, j + 1] - size[i, j])
-    # a crossing above one is a gain that may not fall below it; whether the loop is stable there, the phase margin says
+    # a phase crossing at a gain above one limits the gain from below; the phase margin shows whether the loop is stable
     np.minimum.at(gain_margin, i, np.where(log_size < 0, -20 / np.log(10) * log_size, np.inf))
     unstable = damping < 0.0
     return Margins(

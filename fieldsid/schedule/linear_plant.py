@@ -1,6 +1,6 @@
-"""The linear plant a controller meets at one speed: fin command to angle, over draws of the identified parameters.
+"""The linear plant at one speed, from fin command to angle, over draws of the identified parameters.
 
-It is the derivative of the equations of motion (models/hull.py) on a straight run, of which flights are,
+It is the linearisation of the equations of motion (models/hull.py) on a straight run; simulations use the equations themselves.
 y'' = -a y' - k y + b delta + m x,   x' = -c x - c_r y' + c_f delta
 angle/fin = (b (s + c) + m c_f) / ((s^2 + a s + k)(s + c) + m c_r s),   fin/command = exp(-T s) / (lag s + 1)
 """
@@ -28,23 +28,23 @@ from fieldsid.records.keys import Key
 
 PARTS = ("damping", "stiffness", "authority", "offset", "core", "lag", "delay", "fin_rate", "powers", "speed_loss")
 WITHOUT_EFFECTS = np.array(Core(cross_damping=1.0))
-"""The constants of a plant without effects: of a cross state that nothing moves, which comes back to rest."""
+"""The constants of a plant without effects: its cross state has no input and is stable."""
 ACTUATOR = ("lag", "delay", "max_rate")
-"""Coefficients of the actuator's effects that the plant holds."""
+"""Coefficients of actuator effects that are part of the plant."""
 LONGEST_LAG_S = 10.0
-"""No fin, link or autopilot that steers takes longer: what is above was meant in ms."""
+"""Largest time constant or delay of a fin, link or autopilot that is accepted: a larger number was meant in ms."""
 
 
 @dataclass(frozen=True)
 class LinearPlant:
     """Coefficients (d,) over draws at one speed, the estimate first.
 
-    `core` (d, C) are the constants of the equations of motion; what of them is of a second order, `powers` and `speed_loss` act
-    in time simulations only. `offset` is the fin's trim offset (rad): the fin acts as fin + offset. `fin_rate` is inf where not
-    limited. `powers` (d, 2 + C) are the exponents of the speed of damping, authority and the constants; `speed_loss` (d, 3) is
-    drag a_u (1/m), the fin's and the turn's loss over it.
-    Where the draws are those of a vehicle in surge, sway and yaw, `hull` (d, 22) are its coefficients
-    (`turning/maneuvering/equations.py`): flights are of these, and the rest is what they are about a straight run.
+    `core` (d, C) are the constants of the equations of motion; their nonlinear terms, `powers` and `speed_loss` act in time
+    simulations only. `offset` is the trim offset of the fin (rad): the fin acts as fin + offset. `fin_rate` is inf where it is
+    not limited. `powers` (d, 2 + C) are the exponents of the speed for damping, authority and the constants; `speed_loss` (d, 3)
+    is the drag a_u (1/m) and the losses by fin and turn over it. Where the draws are of a vehicle in surge, sway and yaw, `hull`
+    (d, 22) are its coefficients (`turning/maneuvering/equations.py`): simulations use these, and the other fields are the
+    linearisation.
     """
 
     axis: Axis
@@ -67,7 +67,7 @@ class LinearPlant:
         return int(self.damping.size)
 
     def one(self, index: int = 0) -> LinearPlant:
-        """Return one draw alone."""
+        """Return a single draw."""
         parts: dict[str, Any] = {n: getattr(self, n)[[index]] for n in PARTS}
         return replace(self, **parts, hull=None if self.hull is None else self.hull[[index]])
 
@@ -77,7 +77,7 @@ class LinearPlant:
         return replace(self, **parts)
 
     def distinct(self) -> LinearPlant:
-        """Return the estimate alone where all draws are alike, else all of them."""
+        """Return the estimate only where all draws are equal, else the plant itself."""
         same = self.hull is None and all(bool((getattr(self, n) == getattr(self, n)[:1]).all()) for n in PARTS)
         return self.one() if same else self
 
@@ -107,17 +107,17 @@ class LinearPlant:
 
     @property
     def growth(self) -> FloatArray:
-        """Return how fast the hull's least stable motion grows without a pilot, (d,) 1/s; a free heading is not one."""
+        """Return the largest real part (d,) 1/s of the open-loop poles of the hull, without the integrator of the heading."""
         a, k, c, c_r, c_f = self.straight
         coupled = bool(c_r.any() or c_f.any())
-        own = np.column_stack([np.ones_like(a), a + c, k + a * c + c_r] if coupled else [np.ones_like(a), a])
+        polynomial = np.column_stack([np.ones_like(a), a + c, k + a * c + c_r] if coupled else [np.ones_like(a), a])
         if k.any():
-            own = np.column_stack([np.ones_like(a), a + c, k + a * c + c_r, k * c] if coupled else [np.ones_like(a), a, k])
-        return np.asarray(roots_of(own).real.max(axis=1))
+            polynomial = np.column_stack([np.ones_like(a), a + c, k + a * c + c_r, k * c] if coupled else [np.ones_like(a), a, k])
+        return np.asarray(roots_of(polynomial).real.max(axis=1))
 
     @cached_property
     def straight(self) -> FloatArray:
-        """Return a, k, c, m c_r and m c_f of the equations above, (5, d): the derivative of the equations of motion."""
+        """Return a, k, c, m c_r and m c_f of the equations above, (5, d): the linearised equations of motion."""
         out = straight_slopes(np.ascontiguousarray(self.core))
         out[0] += self.damping
         out[1] += self.stiffness
@@ -125,13 +125,13 @@ class LinearPlant:
 
     @property
     def slow_damping(self) -> FloatArray:
-        """Return the damping of the yaw or pitch rate (d,) 1/s once sway or heave has followed."""
+        """Return the damping of the yaw or pitch rate (d,) 1/s with the cross state in equilibrium."""
         a, _, c, c_r, _ = self.straight
         return np.asarray(a + c_r / c)
 
     @property
     def slow_authority(self) -> FloatArray:
-        """Return the authority (d,) 1/s^2 as the slow loop feels it: the fin's own and that through sway or heave."""
+        """Return the authority (d,) 1/s^2 with the cross state in equilibrium: that of the fin and that through sway or heave."""
         _, _, c, _, c_f = self.straight
         return np.asarray(self.authority + c_f / c)
 
@@ -152,7 +152,7 @@ def products(left: FloatArray, right: FloatArray) -> FloatArray:
 def roots_of(polynomials: FloatArray) -> ComplexArray:
     """Return the roots (d, n) of polynomials (d, n + 1), as eigenvalues of their companion matrices.
 
-    A leading coefficient of zero, as of a draw whose fin does not lag, is a root at -infinity: very fast.
+    A leading coefficient of zero, as of a draw whose fin has no lag, is replaced by a small one: the root is fast.
     """
     first = polynomials[:, :1]
     least = 1e-9 * np.max(np.abs(polynomials), axis=1, keepdims=True)
@@ -166,10 +166,10 @@ def roots_of(polynomials: FloatArray) -> ComplexArray:
 
 @dataclass(frozen=True, slots=True)
 class FinLimits:
-    """What the fin can do, where the vehicle or the user says so (s, rad/s); None leaves it to the model's effects.
+    """Lag, delay (s) and rate limit (rad/s) of the fin as stated by vehicle or user; None leaves them to the model's effects.
 
-    `latency` (s) is the autopilot's own, from sensor to command with half its period: no log of commands holds it, so it
-    comes on top of the delay.
+    `latency` (s) is that of the autopilot, from sensor to command plus half its period: a log of commands does not contain it,
+    and it is added to the delay.
     """
 
     lag: Annotated[float | None, Key("Time constant.", "lag_s")] = None
@@ -197,16 +197,16 @@ class FinLimits:
 
 
 def plants_at(source: ParameterSource, speed: float, limits: FinLimits, draws: int, seed: int) -> list[tuple[LinearPlant, float]]:
-    """Return the plants next to a speed, scaled to it, with weights that sum to one: one per neighbouring model."""
+    """Return the plants of the models next to a speed, scaled to it, with weights that sum to one."""
     if not source.models:
         return [(_plant_of_points(source, speed, limits, draws, seed), 1.0)]
     centre = source.centred_at(speed)
     near = [(source.models[i], seed + i, share) for i, share in source.near(speed)]
-    return [(_plant_of_model(model, speed, limits, draws, own_seed, centre), share) for model, own_seed, share in near]
+    return [(_plant_of_model(model, speed, limits, draws, model_seed, centre), share) for model, model_seed, share in near]
 
 
 def between(near: Sequence[tuple[LinearPlant, float]]) -> LinearPlant:
-    """Return the plant that lies between some by their weights, draw by draw."""
+    """Return the weighted mean of plants, draw by draw."""
     first = near[0][0]
     if len(near) == 1:
         return first
@@ -215,7 +215,7 @@ def between(near: Sequence[tuple[LinearPlant, float]]) -> LinearPlant:
 
 
 def family_at(source: ParameterSource, speed: float, limits: FinLimits, draws: int, seed: int) -> LinearPlant:
-    """Return the whole uncertainty set at a speed: the draws of every neighbouring model."""
+    """Return the uncertainty set at a speed: the draws of all neighbouring models."""
     plants = [p for p, _ in plants_at(source, speed, limits, draws, seed)]
     family = plants[0]
     for other in plants[1:]:
@@ -239,7 +239,7 @@ def _plant_of_points(source: ParameterSource, speed: float, limits: FinLimits, d
 def _plant_of_model(
     model: Model, speed: float, limits: FinLimits, draws: int, seed: int, centre: Mapping[str, float]
 ) -> LinearPlant:
-    """Return the plant of a model at a speed, its base parameters moved, draws and all, to where laws have them (`centre`)."""
+    """Return the plant of a model at a speed; the draws of its base parameters are shifted to have `centre` as the estimate."""
     names = NAMES[model.axis]
     values, exponents = draw_values(model, draws, np.random.default_rng(seed))
     scale = model.law.scale(speed)
@@ -252,9 +252,9 @@ def _plant_of_model(
             hint="leave that speed out of `--speeds`, or give a law: `--law "
             f"{names.authority}=0,{at[names.authority] / speed**2:.3g}`",
         )
-    moved = {n: value - at[n] for n, value in centre.items()}
+    shift = {n: value - at[n] for n, value in centre.items()}
     parts = effects_of(model)
-    cores, own = scaled_cores(parts, [{EXPONENT: float(e)} | v for v, e in zip(values, exponents, strict=True)], scale)
+    cores, core_powers = scaled_cores(parts, [{EXPONENT: float(e)} | v for v, e in zip(values, exponents, strict=True)], scale)
 
     def column(name: str) -> FloatArray:
         return np.array([v[name] for v in values])
@@ -264,55 +264,55 @@ def _plant_of_model(
     cores[:, CROSS_DAMPING] = np.where(cores[:, CROSS_DAMPING] > 0.0, cores[:, CROSS_DAMPING], 1.0)
     following = {c.name for e in parts if follows_the_run(e) for c in e.shared}
     shared = {n: column(n) for n in ACTUATOR if n in model.values and n not in following}
-    trim = column(names.trim) * model.law.trim_factor(speed) + moved.get(names.trim, 0.0)
+    trim = column(names.trim) * model.law.trim_factor(speed) + shift.get(names.trim, 0.0)
     trim = trim + followed.moment[:, 0]
-    damping = column(names.damping) * scale**exponents + moved.get(names.damping, 0.0)
+    damping = column(names.damping) * scale**exponents + shift.get(names.damping, 0.0)
     return LinearPlant(
         axis=model.axis,
         speed=speed,
         damping=damping * followed.damping_factor[:, 0] + followed.damping[:, 0],
-        stiffness=np.zeros(draws) if names.stiffness is None else column(names.stiffness) + moved.get(names.stiffness, 0.0),
+        stiffness=np.zeros(draws) if names.stiffness is None else column(names.stiffness) + shift.get(names.stiffness, 0.0),
         authority=authority,
         offset=trim / authority,
         core=cores,
         **dict(zip(("lag", "delay", "fin_rate"), _actuator(shared, limits, draws), strict=True)),
-        powers=_powers(exponents, own),
+        powers=_powers(exponents, core_powers),
         speed_loss=np.zeros((draws, 3)),
     )
 
 
-def _powers(damping: FloatArray, own: FloatArray) -> FloatArray:
-    """Return the exponents (d, 2 + C) of the speed: damping's, two of the fin's lift, and the constants' own (d, C)."""
-    return np.column_stack([damping, np.full_like(damping, 2.0), own])
+def _powers(damping: FloatArray, core: FloatArray) -> FloatArray:
+    """Return the exponents (d, 2 + C) of the speed: of damping (d,), of authority, which is 2, and of the constants (d, C)."""
+    return np.column_stack([damping, np.full_like(damping, 2.0), core])
 
 
 def _actuator(shared: Mapping[str, FloatArray], limits: FinLimits, draws: int) -> Sequence[FloatArray]:
     stated = (limits.lag, limits.delay, limits.rate)
     absent = (0.0, 0.0, np.inf)
     out = []
-    for name, said, none in zip(ACTUATOR, stated, absent, strict=True):
-        out.append(np.full(draws, said) if said is not None else shared.get(name, np.full(draws, none)))
+    for name, value, default in zip(ACTUATOR, stated, absent, strict=True):
+        out.append(np.full(draws, value) if value is not None else shared.get(name, np.full(draws, default)))
     out[1] = out[1] + (limits.latency or 0.0)
     return out
 
 
 def not_counted(models: Sequence[Model]) -> dict[str, tuple[str, ...]]:
-    """Return what of the path from fin to motion a linear plant does not hold: by effect, the coefficients left out."""
-    left: dict[str, set[str]] = {}
+    """Return by effect the coefficients between fin and motion that are not part of a linear plant."""
+    by_effect: dict[str, set[str]] = {}
     for model in models:
         for effect in effects_of(model):
-            if out := _left_out(effect, model):
-                left.setdefault(effect.name, set()).update(out)
-    return {name: tuple(sorted(left[name])) for name in sorted(left)}
+            if names := _left_out(effect, model):
+                by_effect.setdefault(effect.name, set()).update(names)
+    return {name: tuple(sorted(by_effect[name])) for name in sorted(by_effect)}
 
 
 def _left_out(effect: Effect, model: Model) -> set[str]:
     if effect.stage is Stage.SENSOR:
         return set()
-    own = {c.name for c in effect.all_coefficients if c.name in model.values}
+    names = {c.name for c in effect.all_coefficients if c.name in model.values}
     if effect.core is not None:
         core = effect.core({EXPONENT: model.law.damping_exponent} | dict(model.values), 1.0)
-        return own if any(core[place] for place in OF_ANGLE) else set()
+        return names if any(core[place] for place in OF_ANGLE) else set()
     if follows_the_run(effect):
-        return set() if effect.terms is not None else own
-    return own - set(ACTUATOR)
+        return set() if effect.terms is not None else names
+    return names - set(ACTUATOR)

@@ -1,4 +1,4 @@
-"""From identified parameters to a schedule: one row of gains per speed, with provenance."""
+"""A schedule from identified parameters: one row of gains per speed, with provenance."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ def design_schedule(
     length: float | None = None,
     fins: PlaneFins | None = None,
 ) -> Schedule:
-    """Return the schedule of a source's axis at its speeds (or those given, m/s), fin limited to +/-fin_limit rad.
+    """Return the schedule of a source's axis at its speeds (or at `speeds`, m/s), with the fin limited to +/-fin_limit rad.
 
-    runs are those the models came from: the vehicle in surge, sway and yaw, `length` m long where that is known, is identified
-    from them. fins: those that the axis' command is made of, for who writes the gains to the vehicle. Raises UsageError for what
-    cannot be meant and ModelError where no gain holds the loop.
+    runs are those the models were fitted to: the vehicle in surge, sway and yaw, `length` m long where that is known, is
+    identified from them. fins: the fins over which the command is allocated, for the export of the gains. Raises UsageError for
+    an impossible request and ModelError where no gain stabilises the loop.
     """
     wish, limits = wish or Wish(), limits or FinLimits()
     check_wish(wish)
@@ -69,9 +69,9 @@ def design_schedule(
         rows, answer = design_rows(plants, knots, wish, fin_limit, depth=depth)
     except ModelError as error:
         if plants.belief is None or wish.kind in PROPORTIONAL:
-            raise  # nothing but a rate holds what may be unstable
-        # what pulses say of an unstable hull's sway may be further off than each speed's own model, which holds near its pulses
-        plants, refused = models_plants(source, limits, runs, _took_no_gains(error)), True
+            raise  # only a rate feedback stabilises a hull that may be unstable
+        # the sway of an unstable hull from pulses may be further off than the model of each speed, which is valid near its pulses
+        plants, refused = models_plants(source, limits, runs, _refusal_note(error)), True
         rows, answer = design_rows(plants, knots, wish, fin_limit, depth=depth)
     return Schedule(
         axis=source.axis,
@@ -81,18 +81,19 @@ def design_schedule(
         depth=depth,
         rows=rows,
         actuator=plants.actuator,
-        provenance=_provenance(plants, wish, knots) | {"belief_refused": refused, "length_m": length} | _told(fins),
+        provenance=_provenance(plants, wish, knots) | {"belief_refused": refused, "length_m": length} | _fins_entry(fins),
         stated=body_of(limits),
         notes=() if plants.note is None else (plants.note,),
         answer=Answer(answer, wish.step_of(source.axis), wish.settling, wish.bandwidth, wish.overshoot, wish.fin_use),
     )
 
 
-def _told(fins: PlaneFins | None) -> dict[str, Any]:
+def _fins_entry(fins: PlaneFins | None) -> dict[str, Any]:
     return {} if fins is None else {"fins": body_of(fins)}
 
 
-def _took_no_gains(error: ModelError) -> Note:
+def _refusal_note(error: ModelError) -> Note:
+    """Return the note for a vehicle fitted to all runs for which there are no gains."""
     words = (
         f"the vehicle that all runs together make believe in takes no gains ({error.what}: {error.found}); they are for each "
         "speed's own model: fly a zig-zag, which tells the sway, and identify again"
@@ -108,7 +109,7 @@ def _knots(source: ParameterSource, speeds: Sequence[float]) -> list[float]:
 
 
 def _refuse_offsets(source: ParameterSource, knots: Sequence[float], fin_limit: float, limits: FinLimits) -> None:
-    """Refuse a fin limit below the offset, at the speed where it is worst."""
+    """Raise UsageError where the fin limit is below the largest offset over the speeds."""
     plants = {speed: plants_at(source, speed, limits, 1, 0) for speed in knots}
     offsets = {speed: sum(share * float(plant.offset[0]) for plant, share in at) for speed, at in plants.items()}
     speed = max(offsets, key=lambda s: abs(offsets[s]))
@@ -148,6 +149,6 @@ def _provenance(plants: Plants, wish: Wish, knots: Sequence[float]) -> dict[str,
 
 
 def usual_controller(source: ParameterSource) -> str:
-    """Return the controller where none is asked for: with the rate where the models' runs have logged one, else P."""
+    """Return the default controller: PD where the models' runs have a measured rate, else P."""
     logged = source.models and all(np.isfinite(m.trained.get("rate_max", np.nan)) for m in source.models)
     return "pd" if logged else "p"

@@ -1,4 +1,4 @@
-"""What a schedule is made for and tried on: the plants at any speed, by the belief of all runs where they allow one."""
+"""The plants at any speed for which a schedule is designed and verified: of the posterior of all runs, or of the models."""
 
 from __future__ import annotations
 
@@ -24,27 +24,27 @@ LAG, RATE = NAMES.index("lag"), NAMES.index("rate_limit")
 
 
 def believed_plant(belief: Belief, near: LinearPlant, limits: FinLimits, draws: int) -> LinearPlant:
-    """Return a belief's plant at the speed of `near`, the plant of the models there: `draws` of it, the likeliest first.
+    """Return the plant of a posterior at the speed of `near`, the plant of the models there; the first draw is the maximum.
 
-    Which way the fin turns, its trim and its delay are the models': a trim is the speed's own, and a delay is one of the path
-    that the belief has been given. Lag and rate are the belief's, unless they are stated.
+    The sign of the fin, its trim and its delay are those of the models: the trim depends on the speed, and the delay is part of
+    the fin path that the fit of the posterior was given. Lag and rate limit are those of the posterior unless they are stated.
     """
-    drawn = belief.posterior.vectors
-    taken = drawn[np.linspace(0, drawn.shape[0] - 1, draws - 1).round().astype(int)] if draws > 1 else drawn[:0]
-    hull = np.array([coefficients(v) for v in (belief.fitted.vector, *taken)])
+    vectors = belief.posterior.vectors
+    chosen = vectors[np.linspace(0, vectors.shape[0] - 1, draws - 1).round().astype(int)] if draws > 1 else vectors[:0]
+    hull = np.array([coefficients(v) for v in (belief.fitted.vector, *chosen)])
     which = np.arange(draws) % near.count
     zero = np.zeros(draws)
-    way = -float(np.sign(near.authority[0]))  # as the runs were read: what a model's sway makes of it in the end may differ
+    sign = -float(np.sign(near.authority[0]))  # as in the fit; the steady sign of a model with sway may differ
     (sway, sway_by_rate, sway_by_fin), (by_sway, by_rate, by_fin) = about_straight(hull, near.speed).transpose(1, 2, 0)
-    # the cross state is the moment that sway makes
-    states = zip(-sway, -by_sway * sway_by_rate, way * by_sway * sway_by_fin, strict=True)
+    # the cross state is the yaw moment of the sway
+    states = zip(-sway, -by_sway * sway_by_rate, sign * by_sway * sway_by_fin, strict=True)
     core = np.array([Core(cross_damping=c, cross_rate=r, cross_fin=f) for c, r, f in states])
     return LinearPlant(
         axis=Axis.YAW,
         speed=near.speed,
         damping=-by_rate,
         stiffness=zero,
-        authority=way * by_fin,
+        authority=sign * by_fin,
         offset=near.offset[which],
         core=core,
         lag=hull[:, LAG] if limits.lag is None else zero + limits.lag,
@@ -56,8 +56,8 @@ def believed_plant(belief: Belief, near: LinearPlant, limits: FinLimits, draws: 
     )
 
 
-def slowing(plant: LinearPlant, surge: SurgeModel | None, fin_limit: float, seed: int) -> LinearPlant:
-    """Return a yaw plant that loses speed in its turns, a draw of the loss for each of its own; a pitch plant as it is."""
+def with_speed_loss(plant: LinearPlant, surge: SurgeModel | None, fin_limit: float, seed: int) -> LinearPlant:
+    """Return a yaw plant with the loss of speed in its turns, one draw of it for each of the plant; a pitch plant unchanged."""
     if plant.axis is not Axis.YAW:
         return plant
     curvature = abs(_full_rate(plant.one(), fin_limit)) / plant.speed
@@ -66,7 +66,7 @@ def slowing(plant: LinearPlant, surge: SurgeModel | None, fin_limit: float, seed
 
 
 def _full_rate(one: LinearPlant, fin_limit: float) -> float:
-    """Return the steady rate (rad/s) of a fin at its limit, the root of the equations; by the damping where nothing holds one."""
+    """Return the steady rate (rad/s) with the fin at its limit; without an equilibrium by the authority over a least damping."""
     core, push, rate = one.core.copy(), np.abs(one.authority) * fin_limit, np.empty(1)
     core[:, OF_ANGLE] = 0.0
     settled_rates(core, one.damping, push, np.sign(one.authority) * fin_limit, 1.0, np.zeros(0), np.zeros((1, 0)), rate)
@@ -75,8 +75,8 @@ def _full_rate(one: LinearPlant, fin_limit: float) -> float:
     return abs(float(one.slow_authority[0])) * fin_limit / max(float(one.slow_damping[0]), 0.05)
 
 
-def speed_kept_said(axis: Axis, surge: SurgeModel | None) -> str:
-    """Return where the loss of speed comes from, in words."""
+def speed_loss_words(axis: Axis, surge: SurgeModel | None) -> str:
+    """Return the source of the loss of speed, in words."""
     if axis is not Axis.YAW:
         return "speed held"
     if surge is not None and surge.surge_measured:
@@ -89,9 +89,9 @@ BELIEVED = "speed lost in the turn, sway and drag as all runs together have them
 
 @dataclass(frozen=True, slots=True)
 class Plants:
-    """A source's plants, their fin's limits, and how a vehicle loses speed: by a belief, else as `surge` has it.
+    """The plants of a source with the limits of the fin and the loss of speed: by a posterior (`belief`), else by `surge`.
 
-    `note` says why the belief is not taken where one was asked for.
+    `note` says why no posterior is used although the runs would allow one.
     """
 
     source: ParameterSource
@@ -101,22 +101,23 @@ class Plants:
     note: Note | None = None
 
     def at(self, speed: float, fin_limit: float, draws: int, seed: int) -> LinearPlant:
-        """Return the plant at a speed (m/s), `draws` of its errors: between two models' speeds what lies between them."""
+        """Return the plant at a speed (m/s) with `draws` of its errors, interpolated between the models."""
         near = plants_at(self.source, speed, self.limits, draws, seed)
         if self.belief is None:
-            return slowing(between(near), self.surge, fin_limit, seed)
+            return with_speed_loss(between(near), self.surge, fin_limit, seed)
         first = near[0][0]
         offset = np.sum([share * plant.offset for plant, share in near], axis=0)
         return believed_plant(self.belief, replace(first, offset=offset), self.limits, draws)
 
     def family_at(self, speed: float, fin_limit: float, draws: int, seed: int) -> LinearPlant:
-        """Return the whole uncertainty set at a speed (m/s)."""
+        """Return the uncertainty set at a speed (m/s): the draws of all neighbouring models, or of the posterior."""
         if self.belief is None:
-            return slowing(family_at(self.source, speed, self.limits, draws, seed), self.surge, fin_limit, seed)
+            family = family_at(self.source, speed, self.limits, draws, seed)
+            return with_speed_loss(family, self.surge, fin_limit, seed)
         return self.at(speed, fin_limit, draws, seed)
 
     def noise_at(self, speed: float) -> Noise | None:
-        """Return the noise of the model that counts most at a speed (m/s), None for a table."""
+        """Return the noise of the model with the largest weight at a speed (m/s), None for a table."""
         if not self.source.models:
             return None
         nearest, _ = max(self.source.near(speed), key=lambda at: at[1])
@@ -124,41 +125,41 @@ class Plants:
 
     @property
     def actuator(self) -> dict[str, float | None]:
-        """Lag, delay and rate limit that are counted with: stated ones, else the likeliest of the belief or the models' worst."""
+        """Lag, delay and rate limit in the design: as stated, else those of the posterior's maximum or the models' worst."""
         values = [m.values for m in self.source.models]
         lag, delay = (max((v.get(n, 0.0) for v in values), default=0.0) for n in ("lag", "delay"))
         rate = min((v["max_rate"] for v in values if "max_rate" in v), default=None)
         if self.belief is not None:
-            likeliest = coefficients(self.belief.fitted.vector)
-            lag, rate = float(likeliest[LAG]), float(likeliest[RATE])
-        own = {"lag_s": lag, "delay_s": delay, "fin_rate_rad_s": rate, "latency_s": 0.0}
-        return own | {name: value for name, value in body_of(self.limits).items() if value is not None}
+            best = coefficients(self.belief.fitted.vector)
+            lag, rate = float(best[LAG]), float(best[RATE])
+        identified = {"lag_s": lag, "delay_s": delay, "fin_rate_rad_s": rate, "latency_s": 0.0}
+        return identified | {name: value for name, value in body_of(self.limits).items() if value is not None}
 
     @property
     def tightest_flown(self) -> float:
-        """The largest curvature (1/m) that a run of the belief held; NaN where the plants are the models' own."""
+        """The largest curvature (1/m) in the runs of the posterior; NaN without a posterior."""
         return self.belief.largest_curvature if self.belief is not None else float("nan")
 
     @property
     def draws_of(self) -> str:
-        """What the draws are of, in words."""
+        """The distribution that the draws are from, in words."""
         return "what all runs together allow" if self.belief is not None else "the models' errors"
 
     def share_rejected(self, speed: float, count: int, seed: int) -> float:
-        """Return the share of the draws at a speed that are rejected as not physical: a belief's are none of them."""
+        """Return the share of the draws at a speed that are rejected as unphysical; none of a posterior is."""
         return 0.0 if self.belief is not None else self.source.share_rejected(speed, count, seed)
 
     @property
     def says(self) -> str:
-        """Where the loss of speed comes from, in words."""
-        return BELIEVED if self.belief is not None else speed_kept_said(self.source.axis, self.surge)
+        """The source of the loss of speed, in words."""
+        return BELIEVED if self.belief is not None else speed_loss_words(self.source.axis, self.surge)
 
 
 def plants_of(source: ParameterSource, limits: FinLimits, runs: Sequence[Run], length: float | None) -> Plants:
-    """Return the plants of a source; runs are those its models came from, `length` the vehicle's in m where it is known.
+    """Return the plants of a source; runs are those its models were fitted to, `length` the vehicle's in m where it is known.
 
-    A belief is formed of yaw models with effects whose runs have a fin, a turn and a speed, as a turning radius is; where the
-    fit of it fails, or lies where no vehicle does, the models' own plants are taken, one for each of their speeds, with a note.
+    As for a turning radius, the posterior of all runs is used for yaw models with effects whose runs have a fin, a turn and a
+    speed. Where its fit fails or is too far from the prior, the plants of the models are used, one for each speed, with a note.
     """
     if source.axis is not Axis.YAW or not any(model.effects for model in source.models):
         return models_plants(source, limits, runs)
@@ -175,5 +176,5 @@ def plants_of(source: ParameterSource, limits: FinLimits, runs: Sequence[Run], l
 
 
 def models_plants(source: ParameterSource, limits: FinLimits, runs: Sequence[Run], note: Note | None = None) -> Plants:
-    """Return the models' own plants, one for each of their speeds; `note` says why they are taken and no belief."""
+    """Return the plants of the models, one for each of their speeds; `note` says why no posterior is used."""
     return Plants(source, limits, fit_surge(runs) if source.axis is Axis.YAW else None, None, note)

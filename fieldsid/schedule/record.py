@@ -1,4 +1,4 @@
-"""A gain schedule: rows over speed, what it refers to and where it came from; saved and loaded as `fieldsid/schedule/1`."""
+"""A gain schedule: rows over speed, conventions and provenance; saved and loaded as `fieldsid/schedule/1`."""
 
 from __future__ import annotations
 
@@ -27,16 +27,17 @@ from fieldsid.schedule.wish import PROPORTIONAL, QUICKEST, Wish
 
 KIND = "fieldsid/schedule"
 COLUMNS = ("speed_m_s", "kp", "ki", "kd", "feed_forward_rad", "reference_gain", "fin_limit_rad", "depth_gain", "supported")
-"""What every export writes, in this order; depth_gain in pitch only."""
+"""The columns of every export, in this order; depth_gain with a depth loop only."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Row(Displayed):
     """Gains at one speed: fin = kp e + ki int e - kd rate + feed_forward + reference_gain ref, limited to fin_limit.
 
-    depth_gain (pitch): pitch reference = depth_gain (depth - depth wanted), rad/m, nose up positive. Margins are the least over
-    95 % of the draws; `draws_held` is the share of them that come to rest from the step, within `settling`. `binds` says what
-    keeps the gains from more bandwidth, `fin_use` which share of the fin's limit the step asks for.
+    depth_gain (pitch): pitch reference = depth_gain (depth - reference depth), rad/m, nose up positive. Margins are the least
+    over 95 % of the draws; `draws_held` is the share of draws with the required margin that settle after the step, `settling` (s)
+    the settling time of 95 % of the draws. `binds` names the requirement that limits the bandwidth, `fin_use` is the share of the
+    fin limit that the step uses.
     """
 
     speed: Annotated[float, Key("Speed through the water.", "speed_m_s")]
@@ -62,9 +63,9 @@ class Row(Displayed):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Answer(Brief):
-    """The answer that rows were designed for: all settle from `step` (rad) within `settling` s, 0 where each has its own.
+    """The step response that rows were designed for: all settle after `step` (rad) within `settling` s, 0 where each differs.
 
-    The rest is what was asked: settling (s), bandwidth (rad/s), overshoot and fin as shares, None where it was not.
+    The other fields are the user's requirements: settling (s), bandwidth (rad/s), overshoot and fin use as shares; None without.
     """
 
     settling: Annotated[float, Key("The time in which all rows settle; zero where each has its own.", "settling_s")] = QUICKEST
@@ -77,10 +78,10 @@ class Answer(Brief):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Schedule(InControl, Plotted):
-    """Rows at rising speeds, the controller's kind and wishes, and provenance (models, runs, conventions).
+    """Rows at rising speeds, the kind of controller with its requirements, and provenance (models, runs, conventions).
 
-    actuator is the fin's lag, delay and rate that the design counted with, stated those of them that were said, not modelled;
-    notes are what was said of the vehicle it was designed for.
+    `actuator` is lag, delay and rate limit of the fin in the design, `stated` those of them that were stated and not identified;
+    `notes` are warnings on the plants of the design.
     """
 
     axis: Annotated[Axis, Key("The plane.")]
@@ -107,14 +108,14 @@ class Schedule(InControl, Plotted):
 
     @property
     def wish(self) -> Wish:
-        """What was asked, as it is asked again: of a file without an answer the quickest gains of each speed."""
+        """The requirements of the design; for a file without `answer` those of the quickest gains at each speed."""
         a = self.answer
         settling = QUICKEST if a.step is None and self.kind not in PROPORTIONAL else a.asked_settling
         return Wish(self.kind, self.damping, self.phase_margin_deg, a.step, a.bandwidth, settling, a.overshoot, a.fin_use)
 
     @property
     def stated_limits(self) -> FinLimits:
-        """What was said of the fin: what was not is that of the models that the schedule is tried on, varied over their draws."""
+        """The stated limits of the fin; the others are those of the models in the verification, with their errors."""
         return FinLimits(*(self.stated.get(name) for name in body_of(FinLimits())))
 
     @property
@@ -124,13 +125,13 @@ class Schedule(InControl, Plotted):
 
     @property
     def fins(self) -> PlaneFins | None:
-        """The fins that the command is made of; None where it is one."""
+        """The fins over which the command is allocated; None for a single fin."""
         body = self.provenance.get("fins")
         return None if body is None else plane_fins_of(body)
 
     @property
     def fins_said(self) -> list[str]:
-        """What each of them is told, in words; nothing where the command is one fin."""
+        """The command of each of these fins, in words; empty for a single fin."""
         return [] if self.fins is None else self.fins.says(NAMES[self.axis].fin.removesuffix("_rad"))
 
     @property
@@ -143,7 +144,7 @@ class Schedule(InControl, Plotted):
         return [body_of(row)[name] for row in self.rows]
 
     def at(self, speed: float) -> Row:
-        """Return the row at a speed, linear in speed between knots and held beyond them."""
+        """Return the row at a speed, linear in speed between the rows and constant beyond them."""
         knots = np.array(self.speeds)
         place = float(np.interp(speed, knots, np.arange(knots.size)))
         below = min(int(place), knots.size - 1)
@@ -196,7 +197,7 @@ def load_schedule(path: Path) -> Schedule:
 
 
 def _check_rows(rows: Sequence[Row]) -> None:
-    """Raise ShapeError where there is no row, their speeds do not rise, or the fin would turn one way here, the other there."""
+    """Raise ShapeError where there is no row, the speeds do not rise, or kp is zero or has different signs."""
     if not rows:
         raise ShapeError("`rows` is empty: no gains at any speed")
     if any(b.speed <= a.speed for a, b in pairwise(rows)):
@@ -218,5 +219,5 @@ def _row(r: Mapping[str, Any]) -> Row:
 
 
 def _answer(body: Mapping[str, Any]) -> Answer:
-    """Return the answer of a file, of one from before there were any an empty one."""
+    """Return the `answer` of a file; an empty one for a file of an older version, which has none."""
     return Answer(body.get("settling_s") or QUICKEST, *(body.get(name) for name in list(body_of(Answer()))[1:]))

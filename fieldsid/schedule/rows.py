@@ -1,4 +1,4 @@
-"""The rows of a schedule: the quickest gains of each speed, slowed to one answer, and never worse than the best constant gain."""
+"""The rows of a schedule: the quickest gains of each speed, slowed to a common settling time, not worse than a constant gain."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ AS_THE_CONSTANT = "the best constant gain, from which it was sought"
 def design_rows(
     plants: Plants, knots: Sequence[float], wish: Wish, limit: float, *, depth: bool
 ) -> tuple[tuple[Row, ...], float]:
-    """Return a row for each speed, and the time (s) that all of them settle in, QUICKEST where each has its own.
+    """Return a row for each speed, and the common settling time (s), QUICKEST where each has its own.
 
-    The fin is limited to +/-limit rad; `depth` adds the depth loop. Raises ModelError where no gains hold a
-    loop and UsageError where they do, but none as quick as asked.
+    The fin is limited to +/-limit rad; `depth` adds the depth loop. Raises ModelError where no gains stabilise a loop, and
+    UsageError where none are as quick as required.
     """
     quick = parallel_map(lambda speed: quickest(plants.at(speed, limit, DESIGN_DRAWS, SEED), wish, limit), knots)
     answer = _answer(quick, wish)
@@ -43,14 +43,14 @@ def design_rows(
 
 
 def place_of(plant: LinearPlant, wish: Wish, fin_limit: float, answer: float) -> Place:
-    """Return where the gains of one speed are tried: its plant with what is asked there."""
+    """Return the plant of one speed with the requirements there, on which gains are evaluated."""
     family = plant.distinct()
     place = Place(family, demand_of(family, wish, fin_limit, answer))
     return place if wish.bandwidth is None else place.with_bandwidth(wish.bandwidth)
 
 
 def _answer(quick: Sequence[Sought], wish: Wish) -> float:
-    """Return the time (s) in which all speeds are to settle: that asked, else that of the slowest."""
+    """Return the common settling time (s): the required one, else that of the slowest speed."""
     if wish.is_formula or wish.bandwidth is not None or wish.settling == QUICKEST:
         return QUICKEST
     slowest = _slowest(quick)
@@ -60,7 +60,7 @@ def _answer(quick: Sequence[Sought], wish: Wish) -> float:
 
 
 def _slowest(quick: Sequence[Sought]) -> Sought:
-    """Return what settles last of what serves its draws: what does not has no time to settle that others could keep to."""
+    """Return the speed with the longest settling time among those whose gains meet all requirements, else the first speed."""
     return max((s for s in quick if s.found.outcome.serves), key=lambda s: s.settled, default=quick[0])
 
 
@@ -74,7 +74,7 @@ def _too_quick(slowest: Sought, settling: float) -> UsageError:
 
 
 def _path(sought: Sought) -> str:
-    """Return the fin's lag and delay in words: they are what a margin is lost to."""
+    """Return the lag and delay of the fin in words, which cost phase margin."""
     return f"fin lag {sought.plant.lag[0]:.3g} s, delay {sought.plant.delay[0]:.3g} s"
 
 
@@ -92,12 +92,12 @@ def _with_bandwidth(quick: Sequence[Sought], bandwidth: float) -> list[Sought]:
 
 
 def _no_worse_than_one(rows: Sequence[Sought], places: Sequence[Place]) -> list[Sought]:
-    """Return what was sought, where the best constant gain is better at a speed what is sought from it."""
+    """Return the rows; where the best constant gain is better at a speed, the gains come from a search that starts at it."""
     if len(rows) == 1 or places[0].demand.largest:
         return list(rows)
     one = best_constant(multiples_of([s.found.gains for s in rows]), places)
 
-    def kept(i: int) -> Sought:
+    def better_of(i: int) -> Sought:
         place, found = places[i], places[i].outcome(one)
         if not place.outcome(rows[i].found.gains).worse_than(found, place.demand):
             return rows[i]
@@ -105,4 +105,4 @@ def _no_worse_than_one(rows: Sequence[Sought], places: Sequence[Place]) -> list[
         gains = one if place.outcome(better).worse_than(found, place.demand) else better
         return replace(rows[i], found=replace(rows[i].found, gains=gains), binds=AS_THE_CONSTANT)
 
-    return parallel_map(kept, range(len(rows)))
+    return parallel_map(better_of, range(len(rows)))

@@ -1,4 +1,4 @@
-"""What a verification comes to: the gates that were asked for, the verdict with its number, and what it rests on."""
+"""The result of a verification in words: gates, the verdict with its number, and the data and assumptions behind it."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ MOST_NAMED = 3
 
 
 UNSTABLE = "the hull alone is unstable: it may take up to twice as long to settle"
-"""Flown on the hulls of `tests/truth/gain_table.py`: 9.7 s said and 19.3 s flown at worst."""
+"""The worst of the hulls of `tests/truth/gain_table.py` settled in 19.3 s where 9.7 s were predicted."""
 
 
 @dataclass(frozen=True, slots=True)
 class Gate:
-    """One number that was asked for: its name with unit, the limit, what was found and at which speed (m/s)."""
+    """A required limit of one number: its name with unit, the limit, the number found and its speed (m/s)."""
 
     name: Annotated[str, Key("Its name.", "gate")]
     wanted: Annotated[float, Key("The limit.")]
@@ -57,7 +57,7 @@ def gates_of(checked: Verification, wanted: Mapping[str, float | None]) -> tuple
 
 
 def verdict_of(checked: Verification, schedule: Schedule, gates: tuple[Gate, ...]) -> tuple[str, str]:
-    """Return the verdict, `passed` or FAILED by the gates, `holds` or `does not hold` without, and its numbers in words."""
+    """Return the verdict and its numbers in words: `passed` or FAILED with gates, `holds` or `does not hold` without."""
     faults = _faults(checked, schedule)
     failed = [g.says for g in gates if not g.passed]
     if failed:
@@ -72,7 +72,7 @@ def verdict_of(checked: Verification, schedule: Schedule, gates: tuple[Gate, ...
 
 
 def _settles(checked: Verification, step: float) -> str:
-    """Return how long a step (deg) takes to settle where it takes longest, by the estimate and over the draws."""
+    """Return the longest settling time of a step (deg) over the speeds in words, of the estimate and of the draws."""
     slowest, latest = max(c.settling for c in checked.scheduled), max(c.settling_most for c in checked.scheduled)
     most, longest = f"{100 * HELD_SHARE:.0f} % of the draws", f"{_longest(checked):.0f} s"
     by_draws = f"within {latest:.1f} s by {most}" if isfinite(latest) else f"by fewer than {most} within {longest}"
@@ -80,7 +80,7 @@ def _settles(checked: Verification, step: float) -> str:
 
 
 def _faults(checked: Verification, schedule: Schedule) -> list[str]:
-    """Return why the loop does not hold, whatever was asked for."""
+    """Return why the loop does not hold, in words, independent of the gates."""
     weakest, found = checked.weakest("phase_margin_deg"), []
     if weakest.phase_least_deg <= 0.0:
         of = f" by {weakest.unstable} of the draws" if checked.spread else ""
@@ -89,9 +89,9 @@ def _faults(checked: Verification, schedule: Schedule) -> list[str]:
         words = "diverges" if not isfinite(after.swing) else f"still swings by {degrees(after.swing * after.size):.1f} deg"
         drawn = " by some draws of the models' errors, not by the estimate" if checked.spread and isfinite(after.settling) else ""
         found.append(f"at {number(hunting.speed, 3)} m/s the loop {words} after a {degrees(after.size):.0f} deg step{drawn}")
-    unheld = min(schedule.rows, key=lambda r: r.draws_held)
-    if unheld.draws_held < HELD_SHARE and not found and checked.spread:
-        found.append(f"at {number(unheld.speed, 3)} m/s it holds {100 * unheld.draws_held:.0f} % of the draws it was designed on")
+    worst = min(schedule.rows, key=lambda r: r.draws_held)
+    if worst.draws_held < HELD_SHARE and not found and checked.spread:
+        found.append(f"at {number(worst.speed, 3)} m/s it holds {100 * worst.draws_held:.0f} % of the draws it was designed on")
     found.extend(_unsettled(checked))
     deepest = max((c for c in checked.scheduled if schedule.depth), key=lambda c: c.depth_settling, default=None)
     if deepest is not None and not isfinite(deepest.depth_settling):
@@ -101,15 +101,15 @@ def _faults(checked: Verification, schedule: Schedule) -> list[str]:
 
 
 def _unsettled(checked: Verification) -> Iterator[str]:
-    """Yield of the smallest step that the estimate does not settle from at which speed it is furthest off, and by how much."""
+    """Yield a sentence on the smallest step after which the estimate does not settle: at the speed of the largest error."""
     for i in range(3):
-        lost = [
+        unsettled = [
             (abs(float(steady_error(flown.scheduled[i].angle, check.steps[i].size)[0])), check, flown.scheduled[i])
             for check, flown in zip(checked.scheduled, checked.flown, strict=True)
             if check.steps[i].settling == inf
         ]
-        if lost:
-            off, check, flight = max(lost, key=lambda at: at[0])
+        if unsettled:
+            off, check, flight = max(unsettled, key=lambda at: at[0])
             step = check.steps[i]
             rests = float(swing(flight.angle, step.size)[0]) <= AT_REST_SHARE
             where = f": it is still {number(degrees(off), 2)} deg off" if rests else ""
@@ -119,20 +119,20 @@ def _unsettled(checked: Verification) -> Iterator[str]:
 
 
 def against_constant(checked: Verification) -> str:
-    """Return how the schedule compares with the best one gain for all speeds, by the objective that its rows are designed for.
+    """Return in words how the schedule compares with the best constant gain, by the objective of the design.
 
-    The times are those of the table: the standard step's by the estimate.
+    The times are those of the table: settling of the standard step by the estimate.
     """
     row = checked.constant_row.gains
     named = ", ".join(f"{n} {number(v, 3)}" for n, v in (("kp", row.kp), ("ki", row.ki), ("kd", row.kd)) if v or n == "kp")
-    lacking = next((c for c in checked.constant if not c.outcome.serves), None)
+    failing = next((c for c in checked.constant if not c.outcome.serves), None)
     pairs = list(zip(checked.scheduled, checked.constant, strict=True))
     if checked.worse:
         where = ", ".join(number(speed, 3) for speed in checked.worse)
         own, one = next(pair for pair in pairs if pair[0].speed == checked.worse[0])
         return f"one constant gain, {named}, is better at {where} m/s: {_at(own, one)}"
-    if lacking is not None and all(c.outcome.serves for c in checked.scheduled):
-        return f"no one gain for all speeds keeps what was asked: the best, {named}, does not at {number(lacking.speed, 3)} m/s"
+    if failing is not None and all(c.outcome.serves for c in checked.scheduled):
+        return f"no one gain for all speeds keeps what was asked: the best, {named}, does not at {number(failing.speed, 3)} m/s"
     own, one = max(pairs, key=lambda pair: pair[1].outcome.fin / pair[0].outcome.fin)
     ours, theirs = (max((c.steps[1] for c in part), key=lambda s: s.settling) for part in (checked.scheduled, checked.constant))
     slowest = f"the slowest {degrees(ours.size):.0f} deg step settles {_when(ours)} with the schedule, {_when(theirs)} with it"
@@ -141,7 +141,7 @@ def against_constant(checked: Verification) -> str:
 
 
 def _at(own: Check, one: Check) -> str:
-    """Return what the standard step comes to at one speed with the schedule and with the constant gain, in time and fin."""
+    """Return settling time and fin use of the standard step at one speed, with schedule and constant gain, in words."""
     ours, theirs = (f"{_when(c.steps[1])} for {100.0 * c.outcome.fin:.0f} % of the fin" for c in (own, one))
     short = " and less than was asked" if one.outcome.serves and not own.outcome.serves else ""
     size = f"{degrees(own.steps[1].size):.0f} deg step"
@@ -149,24 +149,24 @@ def _at(own: Check, one: Check) -> str:
 
 
 def _when(step: StepCheck) -> str:
-    """Return when a step settles by the estimate."""
+    """Return the settling time of a step by the estimate, in words."""
     return f"in {step.settling:.1f} s" if isfinite(step.settling) else f"not in {step.flown:.0f} s"
 
 
 def _longest(checked: Verification) -> float:
-    """Return how long the standard steps that did not settle by the draws were flown at least, s."""
+    """Return the least simulated time (s) of the standard steps that 95 % of the draws do not settle from."""
     return min((c.steps[1].flown for c in checked.scheduled if not isfinite(c.settling_most)), default=0.0)
 
 
 def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource) -> str:
-    """Return what a verification rests on: the models, their errors, the speeds, the fin."""
+    """Return what a verification is based on, in words: models, their errors, speeds, fin, disturbance."""
     names = source.names or tuple(p.name for p in source.paths)
     named = ", ".join(names[:MOST_NAMED]) + (f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else "")
     effects = sorted({e for m in source.models for e in m.effects})
     errors = f"{checked.draws} draws of {checked.draws_of}" if checked.spread else "no errors stated, the estimate alone"
     speeds = [c.speed for c in checked.scheduled]
     beyond = sum(not c.supported for c in checked.scheduled)
-    heard = (
+    disturbance = (
         f"disturbance {number(checked.disturbance, 2)} rad/s^2 as in the runs" if checked.disturbance > 0 else "no disturbance"
     )
     limit = number(min(r.fin_limit for r in schedule.rows), 3)
@@ -179,16 +179,16 @@ def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource)
             + (f", {beyond} of them beyond the data" if beyond else ""),
             f"fin {limit} rad, {fin_of(checked.actuator)}",
             checked.speed_lost,
-            heard,
+            disturbance,
             *([UNSTABLE] if checked.unstable else []),
             *_extrapolated(checked),
-            *lost(source),
+            *ignored_effects(source),
         )
     )
 
 
 def _extrapolated(checked: Verification) -> list[str]:
-    """Return which steps turn tighter than the runs did: what such a turn meets was not measured."""
+    """Return a sentence on the steps that turn more tightly than the runs, whose forces were not measured; empty without such."""
     if checked.extrapolated is None:
         return []
     size, held = checked.extrapolated
@@ -209,11 +209,11 @@ def fin_of(actuator: Mapping[str, float | None]) -> str:
     return f"lag {number(lag, 3)} s, delay {number(delay, 3)} s{own}, {fastest}"
 
 
-def lost(source: ParameterSource) -> tuple[str, ...]:
-    """Return what a source knows of the path from fin to motion that gains are not made for, or that it cannot know."""
+def ignored_effects(source: ParameterSource) -> tuple[str, ...]:
+    """Return in words the effects of a source that the design of gains ignores, or that a source cannot have."""
     if not source.models:
         return ("a table carries no effects",)
-    left = not_counted(source.models)
+    ignored = not_counted(source.models)
     unsure = [f"left out, its fin's sign not known: {', '.join(source.left_out)}"] if source.left_out else []
-    parts = ", ".join(f"{effect}'s {' and '.join(names)}" for effect, names in left.items())
-    return (*([f"not counted: {parts}"] if left else []), *unsure)
+    parts = ", ".join(f"{effect}'s {' and '.join(names)}" for effect, names in ignored.items())
+    return (*([f"not counted: {parts}"] if ignored else []), *unsure)

@@ -1,4 +1,4 @@
-"""Is the schedule good: margins and flown steps over the identified set, at the knots and between, against one constant gain."""
+"""Verification of a schedule: margins and simulated steps over the uncertainty set, against the best constant gain."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ STEPS_RAD = {
 }
 """A small, the standard and a large step: 5, 20 and 90 deg of heading, 2, 10 and 20 deg of pitch."""
 FIN_OFFSET_RAD = 0.05235987755982988
-"""3 deg: the fin offset a schedule is tried with."""
+"""3 deg: the fin offset of a verification."""
 AT_REST_SHARE = 0.5 * LIMIT_CYCLE_SHARE
 DEPTH_STEP_M = 2.0
 PITCH_LIMIT_RAD = STEPS_RAD[Axis.PITCH][-1]
@@ -60,7 +60,7 @@ PITCH_LIMIT_RAD = STEPS_RAD[Axis.PITCH][-1]
 
 @dataclass(frozen=True, slots=True, repr=False)
 class FlownSet(Brief):
-    """One speed (m/s) as the estimate flies it, at its pace: steps under the schedule and the constant gain, the straight leg."""
+    """Simulations of the estimate at one speed (m/s): steps with the schedule and with the constant gain, the straight leg."""
 
     speed: float
     pace: Pace
@@ -71,7 +71,7 @@ class FlownSet(Brief):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Verification(Plotted):
-    """Checks of the schedule and of the best constant gain at the same speeds; its row; what the estimate flies."""
+    """Checks of the schedule and of the best constant gain at the same speeds; the constant row; the estimate's simulations."""
 
     schedule: Schedule
     scheduled: tuple[Check, ...]
@@ -80,34 +80,34 @@ class Verification(Plotted):
     flown: tuple[FlownSet, ...]
     draws: int
     spread: bool
-    """Draws of the errors for each model, and whether they differ: a table may state no errors."""
+    """Number of draws for each model, and whether they differ: a table may state no errors."""
     draws_of: str
     speed_lost: str
     disturbance: float
-    """What the draws are of and where the speed lost in the turn comes from, in words; the rms of the models' disturbance moment,
-    rad/s^2, zero for none."""
+    """The distribution of the draws and the source of the loss of speed, in words; the rms of the models' disturbance moment in
+    rad/s^2, zero without one."""
     unstable: bool
-    """Whether the hull alone is unstable at one of the speeds, and each speed has a model of its own: how it settles then hangs
-    on what that leaves out."""
+    """Whether the open-loop hull is unstable at one of the speeds and each speed has its own model: its settling then depends on
+    effects that this model lacks."""
     tightest_flown: float
-    """The largest curvature (1/m) that the runs held, NaN where each speed has a model of its own."""
+    """The largest curvature (1/m) in the runs, NaN where each speed has its own model."""
     actuator: Mapping[str, float | None]
-    """Lag (s), delay (s), rate limit (rad/s) and latency (s) that it was flown with."""
+    """Lag (s), delay (s), rate limit (rad/s) and latency (s) of the simulations."""
     worse: tuple[float, ...]
-    """The speeds (m/s) of rows that the constant gain is better than."""
+    """The speeds (m/s) of rows that are worse than the constant gain."""
 
     @property
     def extrapolated(self) -> tuple[float, float] | None:
-        """The smallest step (rad) that turns tighter than the runs did, and the least share of its curvature that they held."""
+        """The smallest step (rad) with a larger curvature than the runs, and their curvature over it, the least of all speeds."""
         for i, size in enumerate(steps_of(self.schedule)):
-            held = min(self.tightest_flown / max(tightest(flown.scheduled[i]), 1e-9) for flown in self.flown)
-            if held < MIN_COVERED_SHARE:
-                return size, held
+            covered = min(self.tightest_flown / max(tightest(flown.scheduled[i]), 1e-9) for flown in self.flown)
+            if covered < MIN_COVERED_SHARE:
+                return size, covered
         return None
 
     @property
     def unsaid(self) -> bool:
-        """Whether overshoot and settling of the large step are not said at one of the speeds."""
+        """Whether overshoot and settling of the large step are not stated at one of the speeds."""
         return any(np.isnan(c.steps[2].settling) for c in self.scheduled)
 
     @property
@@ -116,7 +116,7 @@ class Verification(Plotted):
         return {name: read(self.weakest(name)) for name, (_, read) in READ_OFF.items()}
 
     def weakest(self, name: str) -> Check:
-        """Return the schedule's check where one of these numbers is worst."""
+        """Return the check of the schedule in which the number `name` of READ_OFF is worst."""
         sign, read = READ_OFF[name]
         return min(self.scheduled, key=lambda c: sign * read(c))
 
@@ -128,34 +128,35 @@ def verify_schedule(
     draws: int = VERIFY_DRAWS,
     runs: Sequence[Run] = (),
 ) -> Verification:
-    """Fly a schedule on the parameters it was made from, with their errors, at its knots and midway between them.
+    """Return the verification of a schedule on the parameters of its source, with their errors, at its rows and midway between.
 
-    runs are those the models came from: the vehicle in surge, sway and yaw is identified from them, unless that took no gains.
+    runs are those the models were fitted to: the vehicle in surge, sway and yaw is identified from them, unless the design found
+    no gains for that vehicle.
     """
     of = plants_behind(schedule, source, runs)
     places = checked_speeds(schedule)
     plants = [of.family_at(speed, schedule.at(speed).fin_limit, draws, SEED + 10 * i) for i, (speed, _) in enumerate(places)]
-    seen, size = of.tightest_flown, schedule.wish.step_of(schedule.axis)
+    curvature, size = of.tightest_flown, schedule.wish.step_of(schedule.axis)
     paces = [pace_of(plant, schedule.at(plant.speed).fin_limit, size) for plant in plants]
-    judged = [_judged(of, schedule, speed) for speed, _ in places]
-    one = best_constant(multiples_of([r.gains for r in schedule.rows]), judged)
+    design_places = [_design_place(of, schedule, speed) for speed, _ in places]
+    one = best_constant(multiples_of([r.gains for r in schedule.rows]), design_places)
     constant = replace(schedule.rows[0], gains=one)
 
     def checked(i: int) -> tuple[Check, Check, FlownSet]:
         speed, knot = places[i]
-        flight = _Flight(plants[i], paces[i], schedule, of.noise_at(speed), seen, judged[i], knot=knot)
+        flight = _Flight(plants[i], paces[i], schedule, of.noise_at(speed), curvature, design_places[i], knot=knot)
         own, steps, leg = _check(flight, schedule.at(speed), schedule.rows, constant=False)
-        held = replace(schedule.at(speed), gains=one)
-        other, theirs, _ = _check(flight, held, (held,), constant=True)
-        return own, other, FlownSet(speed, paces[i], steps, theirs, leg)
+        constant_here = replace(schedule.at(speed), gains=one)
+        other, other_steps, _ = _check(flight, constant_here, (constant_here,), constant=True)
+        return own, other, FlownSet(speed, paces[i], steps, other_steps, leg)
 
     scheduled, compared, flown = zip(*parallel_map(checked, list(range(len(places)))), strict=True)
     spread = any(bool((getattr(plants[0], name) != getattr(plants[0], name)[:1]).any()) for name in PARTS if name != "speed_loss")
-    kept, heard = of.says, max((m.noise.disturbance for m in source.models), default=0.0)
+    disturbance = max((m.noise.disturbance for m in source.models), default=0.0)
     unstable = of.belief is None and any(float(p.growth[0]) > 0.0 for p in plants)
-    demands = [place.demand for place in judged]
-    judgements = zip(scheduled, compared, demands, strict=True)
-    worse = tuple(a.speed for a, b, demand in judgements if a.knot and a.outcome.worse_than(b.outcome, demand))
+    demands = [place.demand for place in design_places]
+    triples = zip(scheduled, compared, demands, strict=True)
+    worse = tuple(a.speed for a, b, demand in triples if a.knot and a.outcome.worse_than(b.outcome, demand))
     return Verification(
         schedule,
         scheduled,
@@ -165,17 +166,17 @@ def verify_schedule(
         draws,
         spread,
         of.draws_of,
-        kept,
-        heard,
+        of.says,
+        disturbance,
         unstable,
-        seen,
+        curvature,
         of.actuator,
         worse,
     )
 
 
 def plants_behind(schedule: Schedule, source: ParameterSource, runs: Sequence[Run]) -> Plants:
-    """Return the plants that a schedule is tried on: as it was designed, the vehicle of the models' runs or the models alone."""
+    """Return the plants for the verification of a schedule, as in its design: of the posterior of the runs, or of the models."""
     limits = schedule.stated_limits
     if schedule.provenance.get("belief_refused", False):
         return models_plants(source, limits, runs)
@@ -183,27 +184,27 @@ def plants_behind(schedule: Schedule, source: ParameterSource, runs: Sequence[Ru
 
 
 def promised_step(schedule: Schedule, of: Plants, speed: float, size: float) -> StepCheck:
-    """Return what a verification says of one step (rad) at one speed (m/s)."""
+    """Return the check of one step (rad) at one speed (m/s), as in a verification."""
     limit = schedule.at(speed).fin_limit
     plant = of.family_at(speed, limit, VERIFY_DRAWS, SEED)
     flown = _flown_to_rest(plant, schedule.rows, size, pace_of(plant, limit, schedule.wish.step_of(schedule.axis)))
-    return _with_what_is_known(_step(flown, size), flown, plant, of.tightest_flown)
+    return _without_unsupported(_step(flown, size), flown, plant, of.tightest_flown)
 
 
 def steps_of(schedule: Schedule) -> tuple[float, float, float]:
-    """Return the steps (rad) that a schedule is tried with: the standard ones, its own in place of the middle one."""
+    """Return the steps (rad) of a verification: small, that of the schedule's wish, and large."""
     small, _, large = STEPS_RAD[schedule.axis]
     return small, schedule.wish.step_of(schedule.axis), large
 
 
-def _judged(of: Plants, schedule: Schedule, speed: float) -> Place:
-    """Return where gains are judged by the objective: on the draws that the rows were designed on."""
+def _design_place(of: Plants, schedule: Schedule, speed: float) -> Place:
+    """Return the place on which gains are evaluated by the objective, with the draws of the design."""
     limit = schedule.at(speed).fin_limit
     return place_of(of.at(speed, limit, DESIGN_DRAWS, DESIGN_SEED), schedule.wish, limit, schedule.answer.settling)
 
 
 def checked_speeds(schedule: Schedule) -> list[tuple[float, bool]]:
-    """Return the knots (True) and the speeds midway between them (False), rising."""
+    """Return the speeds of the rows (True) and those midway between them (False), rising."""
     knots = list(schedule.speeds)
     between = [0.5 * (a + b) for a, b in pairwise(knots)]
     return sorted([(s, True) for s in knots] + [(s, False) for s in between])
@@ -211,13 +212,13 @@ def checked_speeds(schedule: Schedule) -> list[tuple[float, bool]]:
 
 @dataclass(frozen=True, slots=True)
 class _Flight:
-    """What is flown at one speed: its plant and pace, the schedule, the models' noise, the curvature (1/m) that runs held."""
+    """The inputs of a check at one speed: plant and pace, schedule, the models' noise, the runs' largest curvature (1/m)."""
 
     plant: LinearPlant
     pace: Pace
     schedule: Schedule
     noise: Noise | None
-    seen: float
+    curvature: float
     place: Place
     knot: bool
 
@@ -230,10 +231,10 @@ def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) ->
     sizes = steps_of(schedule)
     flights = [_flown_to_rest(plant, rows, size, pace) for size in sizes]
     small, usual, large = (_step(s, size) for s, size in zip(flights, sizes, strict=True))
-    large = _with_what_is_known(large, flights[2], plant, flight.seen)
-    known = [replace(r, feed_forward=r.feed_forward - FIN_OFFSET_RAD) for r in rows]
+    large = _without_unsupported(large, flights[2], plant, flight.curvature)
+    compensated = [replace(r, feed_forward=r.feed_forward - FIN_OFFSET_RAD) for r in rows]
     one = plant.one()
-    bent, unknown = (fly(one, r, Flight(pace.flight, pace.step, offset=FIN_OFFSET_RAD)) for r in (known, rows))
+    bent, unknown = (fly(one, r, Flight(pace.flight, pace.step, offset=FIN_OFFSET_RAD)) for r in (compensated, rows))
     leg = fly(one, rows, Flight(pace.leg, pace.step, push=disturbance_moment(flight.noise, pace)))
     depth_over, depth_settled = _depth(one, rows, pace) if schedule.depth else (float("nan"), float("nan"))
     check = Check(
@@ -248,24 +249,27 @@ def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) ->
 
 
 def _flown_to_rest(plant: LinearPlant, rows: Sequence[Row], size: float, pace: Pace) -> Steps:
-    """Return a step flown longer where it has not come to rest where it should: what is slow does then, what hunts goes on."""
+    """Return the simulation of a step, repeated over a longer time if it has not settled, as a slow loop then does."""
     for times in LONGER:
         flight = fly(plant, rows, Flight(times * pace.flight, pace.step, reference=size))
-        there = np.isfinite(settling(flight.time, flight.angle[:, :1], size)[0])
-        if there and worst_of(swing(flight.angle, size), most=True) <= AT_REST_SHARE:
+        has_settled = np.isfinite(settling(flight.time, flight.angle[:, :1], size)[0])
+        if has_settled and worst_of(swing(flight.angle, size), most=True) <= AT_REST_SHARE:
             break
     return flight
 
 
 def _step(flown: Steps, size: float) -> StepCheck:
-    moved, off = about_rest(flown.angle, size), np.abs(steady_error(flown.angle, size))
-    over, left = overshoot(moved, size), swing(flown.angle, size)
+    about, off = about_rest(flown.angle, size), np.abs(steady_error(flown.angle, size))
+    over, oscillation = overshoot(about, size), swing(flown.angle, size)
     settled, wide, narrow = (
-        np.where(off < size, settling(flown.time, moved, size, band), np.inf)
+        np.where(off < size, settling(flown.time, about, size, band), np.inf)
         for band in (SETTLING_BAND, SETTLING_BAND + FLIGHT_ERROR_SHARE, SETTLING_BAND - FLIGHT_ERROR_SHARE)
     )
-    over[0], settled[0] = overshoot(flown.angle, size)[0], settling(flown.time, flown.angle, size)[0]  # its trim is known
-    most = [worst_of(part, most=True) for part in (over, settled, left, off)]
+    over[0], settled[0] = (
+        overshoot(flown.angle, size)[0],
+        settling(flown.time, flown.angle, size)[0],
+    )  # the estimate's trim is known
+    most = [worst_of(part, most=True) for part in (over, settled, oscillation, off)]
     low, middle, high = (
         float(np.quantile(of, share, method="closest_observation"))
         for of, share in ((wide, 0.025), (settled, 0.5), (narrow, 0.975))
@@ -274,15 +278,16 @@ def _step(flown: Steps, size: float) -> StepCheck:
     return StepCheck(size, float(over[0]), most[0], float(settled[0]), most[1], middle, (low, high), most[2], most[3], seconds)
 
 
-def _with_what_is_known(step: StepCheck, flown: Steps, plant: LinearPlant, seen: float) -> StepCheck:
-    """Return the large step without overshoot and settling where it hangs on forces of a turn that was not flown.
+def _without_unsupported(step: StepCheck, flown: Steps, plant: LinearPlant, curvature: float) -> StepCheck:
+    """Return the check of the large step, with NaN for overshoot and settling where they depend on forces outside the data.
 
-    A stable hull comes out of a turn that is tighter than the runs' of itself; one without stability of course only by what the
-    fin can do against it there. Of such a hull (seed 9, hull 6 of `tests/truth/gain_table.py`) 32 s were said of pulses alone,
-    29 to 36 by the draws, and 55 flown; turns of 17 to 22 % less radius than its median were in none of them.
+    That is the case for an unstable hull in a turn with a larger curvature than the runs' (`curvature`, 1/m): a stable hull
+    leaves such a turn without control, an unstable one only by the moment that the fin has there. For such a hull (seed 9, hull 6
+    of `tests/truth/gain_table.py`) identified from pulses 32 s were predicted, 29 to 36 s by the draws, and 55 s measured; no
+    draw had the turn, of a radius 17 to 22 % below the median.
     """
     unstable = float(np.mean(plant.growth > 0.0)) > 1.0 - HELD_SHARE
-    if not (unstable and seen < MIN_COVERED_SHARE * tightest(flown)):
+    if not (unstable and curvature < MIN_COVERED_SHARE * tightest(flown)):
         return step
     nan = float("nan")
     return replace(

@@ -1,4 +1,4 @@
-"""What is asked of a loop, as control engineers state it, and what of it can be meant at all."""
+"""The requirements on a loop as control engineers state them, and their possible ranges."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ STEP_ANGLE_RAD: Mapping[Axis, float] = MappingProxyType({Axis.YAW: 0.34906585039
 DAMPING, MOST_DAMPING = 0.7071, 3.0
 PROPORTIONAL, RATE_FED = ("p", "pi"), ("pd", "pid")
 QUICKEST = 0.0
-"""The settling time that stands for: at each speed as quick as its fin and its margins let it be."""
+"""The required settling time that means: at each speed as quick as fin and margins allow."""
 
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What is asked of the loop: controller kind, damping ratio, phase margin (deg), and the answer to a step.
+    """The requirements on the loop: kind of controller, damping ratio, phase margin (deg), and the response to a step.
 
-    `step` (rad) is the error that may ask for `fin_use` of the fin's limit, without it the axis' standard step and the whole fin.
-    `settling` (s) is how soon the step has to settle at every speed: without it all speeds settle as the slowest of them can,
-    QUICKEST leaves each its own. `bandwidth` (rad/s) is that of the formula's poles at every speed, in place of a time to settle.
-    `overshoot` is the share by which the step may overshoot; a damping that is not given is that of such a step.
+    `step` (rad) is the error that may use the share `fin_use` of the fin limit; by default the standard step of the axis and the
+    full fin. `settling` (s) is the settling time of the step at every speed; by default that of the slowest speed, with QUICKEST
+    the shortest of each. `bandwidth` (rad/s) is that of the formula's poles at every speed, in place of a settling time. The step
+    may overshoot by the share `overshoot`; without a stated damping the damping ratio follows from it.
     """
 
     kind: str = "p"
@@ -41,38 +41,38 @@ class Wish:
 
     @property
     def damped(self) -> float:
-        """The damping ratio: as asked, else that of the overshoot asked, else DAMPING."""
+        """The damping ratio: as stated, else that of the stated overshoot, else DAMPING."""
         if self.damping is not None:
             return self.damping
         return DAMPING if self.overshoot is None else damping_of(self.overshoot)
 
     @property
     def is_formula(self) -> bool:
-        """Whether the gain is the damping's alone: a proportional gain is one number, and nothing else is asked of it."""
+        """Whether the gain follows from the damping: P or PI without a required settling time or bandwidth."""
         return self.kind in PROPORTIONAL and self.settling is None and self.bandwidth is None
 
     @property
     def most_fin(self) -> float:
-        """The share of the fin that the step may ask for; a formula's gain asks for what it takes."""
+        """The share of the fin limit that the step may use; unlimited for the gain of a formula."""
         return self.fin_use if self.fin_use is not None else inf if self.is_formula else 1.0
 
     def step_of(self, axis: Axis) -> float:
-        """Return the step (rad) that is flown."""
+        """Return the step (rad) for which the loop is designed."""
         return STEP_ANGLE_RAD[axis] if self.step is None else self.step
 
 
 def overshoot_of(damping: float) -> float:
-    """Return the overshoot of a second-order loop as a share; its damping ratio is a hundredth of its phase margin in deg."""
+    """Return the overshoot of a second-order loop as a share; its damping ratio is about its phase margin in deg over 100."""
     return 0.0 if damping >= 1.0 else exp(-pi * damping / sqrt(1.0 - damping**2))
 
 
 def damping_of(overshoot: float) -> float:
-    """Return the damping ratio of a second-order loop that overshoots by a share."""
+    """Return the damping ratio of a second-order loop with an overshoot, as a share."""
     return 1.0 if overshoot <= 0.0 else -log(overshoot) / hypot(pi, log(overshoot))
 
 
 def check_wish(wish: Wish) -> None:
-    """Raise UsageError for a wish that cannot be meant, whatever the vehicle."""
+    """Raise UsageError for requirements outside their possible ranges, independent of the vehicle."""
     if wish.kind not in KINDS:
         raise UsageError(f"there is no controller {wish.kind!r}", found=", ".join(KINDS), hint=near(wish.kind, list(KINDS)))
     if wish.settling is not None and wish.bandwidth is not None:

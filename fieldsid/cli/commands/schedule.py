@@ -106,7 +106,7 @@ def design(
     from fieldsid.schedule.linear_plant import FinLimits
     from fieldsid.schedule.make import design_schedule, usual_controller
     from fieldsid.schedule.record import save_schedule
-    from fieldsid.schedule.verdict import lost
+    from fieldsid.schedule.verdict import ignored_effects
     from fieldsid.schedule.wish import QUICKEST, Wish
 
     refuse_existing(output, force=force)
@@ -140,7 +140,9 @@ def design(
     written_to = None if output is None else str(save_schedule(schedule, output, inputs=inputs, force=force))
     told = Design(schedule, written_to)
     headline = of_design(told, models, caveat(source.models, models))
-    page = Page("", blocks=tuple(design_blocks(schedule, angles(), lost(source))), closing=written(schedule=written_to))
+    page = Page(
+        "", blocks=tuple(design_blocks(schedule, angles(), ignored_effects(source))), closing=written(schedule=written_to)
+    )
     return emit(told, render=page, headline=headline, notes=schedule.notes)
 
 

@@ -1,1 +1,1 @@
-"""A loop flown in time: the compiled closed loop, steps of every draw, the speed a vehicle keeps, a straight leg."""
+"""Time simulations of the closed loop: the compiled kernels, steps of every draw with the loss of speed, a straight leg."""

@@ -1,8 +1,8 @@
-"""The compiled closed loop: fin limited in angle and rate, lagging and delayed; the plant (models/hull.py) by the midpoint rule.
+"""The compiled closed loop: a fin with angle and rate limit, lag and delay; the plant (models/hull.py) by the midpoint rule.
 
-The speed falls in the turn, u' = a_u (u0^2 - u^2 (1 + f delta^2) - t r^2), the plant's coefficients go with powers of u/u0, and
-the gains are those of the schedule at that speed. The integral is held while the fin is at its stop and the error would push it
-on (conditional integration). A loop starts from where it rests under the reference zero.
+The speed falls in the turn, u' = a_u (u0^2 - u^2 (1 + f delta^2) - t r^2), the plant's coefficients follow powers of u/u0, and
+the gains are those of the schedule at that speed. Anti-windup: the integral is constant while the fin is at its limit and the
+error has the sign that would increase it (conditional integration). A loop starts from its steady state under the reference zero.
 """
 
 from __future__ import annotations
@@ -24,10 +24,11 @@ SLOWEST_SHARE = 0.05
 
 
 class Plants(NamedTuple):
-    """Plants at the speed that a flight begins at, (n,) each: damping, stiffness, authority, the fin's offset (rad).
+    """Plants at the initial speed of a flight, (n,) each: damping, stiffness, authority, fin offset (rad).
 
-    Their constants (n, C); the powers of the speed that damping and authority go with, and the constants (n, C); of the fin
-    exp(-step/lag), delay in steps and largest move in a step; the drag, the fin's and the turn's loss of speed.
+    core (n, C) are the constants of models/hull.py; damping_power, authority_power and core_powers (n, C) the exponents of the
+    speed; decay = exp(-step/lag), delay_steps and largest_move (rad a step) belong to the fin; drag, fin_loss and turn_loss to
+    the loss of speed.
     """
 
     damping: FloatArray
@@ -39,8 +40,8 @@ class Plants(NamedTuple):
     authority_power: FloatArray
     core_powers: FloatArray
     decay: FloatArray
-    late: FloatArray
-    most: FloatArray
+    delay_steps: FloatArray
+    largest_move: FloatArray
     drag: FloatArray
     fin_loss: FloatArray
     turn_loss: FloatArray
@@ -48,7 +49,7 @@ class Plants(NamedTuple):
 
 @inner
 def gains_at(table: FloatArray, speed: float, out: FloatArray) -> None:
-    """Fill out (8,) with the gains at a speed: linear between the rows of table (k, 8), held beyond them."""
+    """Fill out (8,) with the gains at a speed: linear between the rows of table (k, 8), constant beyond them."""
     last = table.shape[0] - 1
     below = 0
     while below < last - 1 and speed > table[below + 1, SPEED]:
@@ -61,8 +62,8 @@ def gains_at(table: FloatArray, speed: float, out: FloatArray) -> None:
 
 
 @inner
-def at_rest(stiffness: float, authority: float, offset: float, now: FloatArray) -> tuple[float, float, float]:
-    """Return angle, integral and fin of a loop that rests under the reference zero; those of its start where none can hold it."""
+def steady_state(stiffness: float, authority: float, offset: float, now: FloatArray) -> tuple[float, float, float]:
+    """Return angle, integral and fin of the loop's steady state under the reference zero; angle and integral zero without one."""
     limit, bias, stiff = now[FIN_LIMIT], now[BIAS], stiffness + authority * now[KP]
     if not abs(offset) < limit or stiff == 0.0:
         return 0.0, 0.0, min(max(bias, -limit), limit)
@@ -73,8 +74,8 @@ def at_rest(stiffness: float, authority: float, offset: float, now: FloatArray) 
 
 
 @inner
-def commanded(now: FloatArray, target: float, y: float, p: float, integral: float, step: float) -> tuple[float, float]:
-    """Return the fin's command and the integral after a step: held where the fin is at its stop and the error pushes it on."""
+def fin_command(now: FloatArray, target: float, y: float, p: float, integral: float, step: float) -> tuple[float, float]:
+    """Return the fin command and the integral, which does not change where the fin is at its limit and the error increases it."""
     error = target - y
     wanted = now[KP] * error + now[KI] * integral - now[KD] * p + now[BIAS] + now[REFERENCE_GAIN] * target
     command = min(max(wanted, -now[FIN_LIMIT]), now[FIN_LIMIT])
@@ -84,15 +85,15 @@ def commanded(now: FloatArray, target: float, y: float, p: float, integral: floa
 
 
 @inner
-def moved(
-    k: Core, kinds: Kinds, a: float, stiffness: float, moment: float, held: float, step: float, state: tuple[float, float, float]
+def midpoint_step(
+    k: Core, kinds: Kinds, a: float, stiffness: float, moment: float, fin: float, step: float, state: tuple[float, float, float]
 ) -> tuple[float, float, float, float]:
-    """Return angle, rate and cross state after a step by the midpoint rule, and the rate midway."""
+    """Return angle, rate and cross state after a step by the midpoint rule, and the rate at its midpoint."""
     y, p, x = state
     h = 0.5 * step
-    now = slope(k, kinds, a, stiffness, moment, held, 1.0, y, p, x, 0.0)
+    now = slope(k, kinds, a, stiffness, moment, fin, 1.0, y, p, x, 0.0)
     middle = p + h * now.rate
-    then = slope(k, kinds, a, stiffness, moment, held, 1.0, y + h * p, middle, x + h * now.cross, 0.0)
+    then = slope(k, kinds, a, stiffness, moment, fin, 1.0, y + h * p, middle, x + h * now.cross, 0.0)
     return y + step * middle, p + step * then.rate, x + step * then.cross, middle
 
 
@@ -110,41 +111,43 @@ def close_loop(
 ) -> None:
     """Fill out (n, t, 4) with angle, fin, depth and speed of n plants under the gains of table (k, 8).
 
-    push (t,) is a disturbance moment in rad/s^2. With depth_step other than zero the reference is depth gain (z - depth_step),
-    limited; else `reference` rad. What diverges is inf from there on.
+    push (t,) is a disturbance moment in rad/s^2. With depth_step other than zero (m) the reference is depth gain (z -
+    depth_step), limited to pitch_limit; else it is `reference` rad. From the sample at which a plant diverges on its angle is
+    inf.
     """
     now, core = np.empty(table.shape[1]), np.empty(plants.core.shape[1])
     for case in range(plants.core.shape[0]):
-        stiffness, offset, late, slowing = plants.stiffness[case], plants.offset[case], int(plants.late[case]), plants.drag[case]
+        stiffness, offset, drag = plants.stiffness[case], plants.offset[case], plants.drag[case]
+        late, most = int(plants.delay_steps[case]), plants.largest_move[case]
         kinds, a, b = kinds_of(plants.core[case]), plants.damping[case], plants.authority[case]
         gains_at(table, speed, now)
         core[:] = plants.core[case]
         p = x = z = 0.0
         u = speed
-        y, integral, start = at_rest(stiffness, b, offset, now)
+        y, integral, start = steady_state(stiffness, b, offset, now)
         fin = start
         for i in range(out.shape[1]):
             out[case, i, ANGLE], out[case, i, FIN], out[case, i, DEPTH], out[case, i, SURGE] = y, fin, z, u
             if not abs(p) < DIVERGED_RATE_RAD_S:
                 out[case, i:, ANGLE] = np.inf
                 break
-            if slowing > 0.0:
+            if drag > 0.0:
                 gains_at(table, u, now)
                 core_at(plants.core[case], plants.core_powers[case], u / speed, core)
                 a = plants.damping[case] * power(u / speed, plants.damping_power[case])
                 b = plants.authority[case] * power(u / speed, plants.authority_power[case])
             target = reference if depth_step == 0.0 else min(max(now[DEPTH_GAIN] * (z - depth_step), -pitch_limit), pitch_limit)
-            command, integral = commanded(now, target, y, p, integral, step)
-            # the fin sees the command of `late` steps ago; its own column of out holds what was commanded meanwhile
+            command, integral = fin_command(now, target, y, p, integral, step)
+            # the fin receives the command of `late` steps ago; the fin's column of out stores the commands until then
             if late > 0:
                 out[case, i, FIN] = command
                 command = out[case, i - late, FIN] if i >= late else start
             goal = command + (fin - command) * plants.decay[case]
-            new = fin + min(max(goal - fin, -plants.most[case]), plants.most[case])
-            held, before = 0.5 * (fin + new) + offset, y
-            y, p, x, middle = moved(named(core), kinds, a, stiffness, b * held + push[i], held, step, (y, p, x))
+            new = fin + min(max(goal - fin, -most), most)
+            mean, before = 0.5 * (fin + new) + offset, y
+            y, p, x, middle = midpoint_step(named(core), kinds, a, stiffness, b * mean + push[i], mean, step, (y, p, x))
             z -= u * 0.5 * (before + y) * step
-            if slowing > 0.0:
-                slower = surge_slope(u, speed, slowing, plants.fin_loss[case], plants.turn_loss[case], held, middle)
-                u = max(u + step * slower, SLOWEST_SHARE * speed)
+            if drag > 0.0:
+                to_surge = surge_slope(u, speed, drag, plants.fin_loss[case], plants.turn_loss[case], mean, middle)
+                u = max(u + step * to_surge, SLOWEST_SHARE * speed)
             fin = new

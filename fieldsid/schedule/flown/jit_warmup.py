@@ -1,4 +1,4 @@
-"""The compile warm-up of turning and of flown schedules, left to the worker by a tour; see fitting/jit_warmup.py."""
+"""The compile warm-up of turning and closed-loop kernels, which a tour runs in a worker process; see fitting/jit_warmup.py."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from fieldsid.turning.steady.speed_loss import simulated
 
 
 def compile_loops() -> None:
-    """Call once, on vehicles of which every coefficient is one, what a turn, the gains and their check call."""
+    """Call each kernel of turns, gain design and verification once, on vehicles whose coefficients are all one."""
     none, push, out = np.zeros((1, len(GAINS))), np.zeros(2), np.zeros((1, 2, len(MOTION)))
     p, time = np.ones(len(NAMES)), np.array([0.0, STEP_S])
-    time.setflags(write=False)  # as that of a run is
+    time.setflags(write=False)  # like that of a run
     simulate(p, 1.0, np.ones((1, 3)), np.zeros(1, dtype=np.int64), time, np.zeros((1, 2)), np.ones(2), STEP_S)
     settle(p, 1.0, 0.0)
     simulated(push[1:], push, push, push, 1.0)

@@ -1,8 +1,8 @@
-"""Closed loops in time of every draw of a plant: steps, dives, a straight leg; and what is read off them.
+"""Time simulations of the closed loop for every draw of a plant: steps, dives, a straight leg; and the numbers read from them.
 
-How finely and how long one is flown goes by the time constants of its plant, not by a clock of its own. With the whole fin at
-the largest error a plant answers within 1/w, w^2 = k + |b| delta/e. Loops between the two bandwidths below are flown at one pace,
-for 60 s in steps of 0.02 s; slower and quicker ones for as many steps that are as much longer or shorter.
+Time step and length of a simulation follow the time constants of the plant. With the full fin at the largest error e the
+bandwidth is w, w^2 = k + |b| delta/e. Loops between the two bandwidths below are simulated for 60 s in steps of 0.02 s; for
+slower and faster ones both are longer or shorter in the same proportion.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from fieldsid.turning.steady.transient import LEAST_SURGE_M_S
 
 STEP_S, FLIGHT_S = 0.02, 60.0
 SLOWEST_RAD_S, QUICKEST_RAD_S = 25.0 / FLIGHT_S, 2.0
-"""Bandwidths of the full fin: below the first 60 s are fewer than 25 times 1/w, above the second 0.02 s are coarse."""
+"""Bandwidths of the full fin: below the first 60 s are less than 25/w, above the second a step of 0.02 s is too coarse."""
 LEAST_RAD_S = 1e-4
-"""No fin is so weak."""
+"""Lower limit of the bandwidth, below that of any fin."""
 LARGEST_TURN = 0.2
-"""Of the hull's fastest own motion in one step, rad: the midpoint rule is off by less than a hundredth of it."""
+"""Largest product of time step and fastest eigenvalue of the hull: the midpoint rule is then exact to a hundredth of it."""
 LONGER = (1.0, 2.0, 4.0)
-"""What has not come to rest is flown twice as long, and twice as long again."""
+"""Factors of the simulated time: a response that has not settled is simulated again for a longer time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,17 +43,17 @@ class Pace:
 
     @property
     def longest(self) -> float:
-        """How long a step is flown that does not come to rest, s."""
+        """The simulated time of a step that does not settle, s."""
         return LONGER[-1] * self.flight
 
     @property
     def leg(self) -> float:
-        """How long a straight leg and a step of depth are flown, s."""
+        """The simulated time of a straight leg and of a step of depth, s."""
         return 2.0 * self.flight
 
 
 def full_bandwidth(plant: LinearPlant, fin_limit: float, error: float) -> float:
-    """Return the bandwidth (rad/s) of the estimate that uses the full fin at an error (rad): faster would only saturate."""
+    """Return the bandwidth (rad/s) at which the estimate uses the full fin at an error (rad): a faster loop would saturate."""
     return float(np.sqrt(max(plant.stiffness[0], 0.0) + abs(plant.slow_authority[0]) * fin_limit / error))
 
 
@@ -62,8 +62,8 @@ def pace_of(plant: LinearPlant, fin_limit: float, error: float) -> Pace:
     bandwidth = max(full_bandwidth(plant, fin_limit, error), LEAST_RAD_S)
     times = SLOWEST_RAD_S / min(bandwidth, SLOWEST_RAD_S) * QUICKEST_RAD_S / max(bandwidth, QUICKEST_RAD_S)
     damping, stiffness, crossed, of_rate, of_fin = plant.straight
-    own = (damping, np.sqrt(np.abs(stiffness)), np.where((of_rate != 0.0) | (of_fin != 0.0), crossed, 0.0))
-    fastest = max(float(np.max(np.abs(part))) for part in own)
+    rates = (damping, np.sqrt(np.abs(stiffness)), np.where((of_rate != 0.0) | (of_fin != 0.0), crossed, 0.0))
+    fastest = max(float(np.max(np.abs(part))) for part in rates)
     most = max(LARGEST_TURN / max(fastest, LEAST_RAD_S), STEP_S)
     return Pace(STEP_S * times if times <= 1.0 else min(STEP_S * times, most), FLIGHT_S * times)
 
@@ -72,7 +72,7 @@ LEG_SEED = 5
 
 
 def disturbance_moment(noise: Noise | None, pace: Pace) -> FloatArray:
-    """Return a moment (t,) in rad/s^2, one value for each time step of a pace: zero where no model has measured any."""
+    """Return an AR(1) moment (t,) in rad/s^2, one value for each time step of a leg; zero without a disturbance in the noise."""
     count = round(pace.leg / pace.step) + 1
     if noise is None or not noise.disturbance > 0.0:
         return np.zeros(count)
@@ -82,20 +82,20 @@ def disturbance_moment(noise: Noise | None, pace: Pace) -> FloatArray:
 
 
 HULL_STEPS = 2.0
-"""Steps of a plant in one of a flight in surge, sway and yaw: half of it moves the settling by less than a hundredth."""
+"""Time step of a simulation in surge, sway and yaw over that of a plant: half of it changes the settling by less than 1 %."""
 SETTLING_BAND = 0.05
 FLIGHT_ERROR_SHARE = 0.01
-"""What a flight is off its model's by, over the step: hulls of `tests/truth/gain_table.py` overshot by 0.2 to 0.8 % more or less
-than said, which is half a swing of settling where an overshoot just touches the corridor."""
+"""Error of the predicted overshoot over the step: hulls of `tests/truth/gain_table.py` overshot by 0.2 to 0.8 % more or less than
+predicted, which changes the settling by half a period where an overshoot just touches the corridor."""
 FASTEST_LAG_S = 1e-6
 TAIL_SHARE = 0.25
-"""The last part of a response: what still swings there is a limit cycle."""
+"""Last part of a response in which a remaining oscillation counts as a limit cycle."""
 LIMIT_CYCLE_SHARE = 2.0 * SETTLING_BAND
-"""Peak to peak over the step: what swings through the whole corridor of settling after 45 s does not settle."""
+"""Peak-to-peak oscillation over the step from which on there is a limit cycle: the full width of the settling corridor."""
 
 
 HELD_S = 1.0
-"""A curvature counts where it is held this long, as that of the runs does."""
+"""Duration over which a curvature is averaged, as for that of the runs."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -109,55 +109,55 @@ class Steps(Brief):
     speed: FloatArray
 
     def one(self) -> Steps:
-        """Return the first case alone."""
+        """Return the first case only."""
         return Steps(self.time, self.angle[:, :1], self.fin[:, :1], self.depth[:, :1], self.speed[:, :1])
 
 
 def overshoot(values: FloatArray, size: float) -> FloatArray:
-    """Return the overshoot of steps (t, n) of `size`, (n,), as a share of it; inf for what diverges."""
+    """Return the overshoot (n,) of steps (t, n) of `size`, as a share of it; inf for a response that diverges."""
     return np.asarray(np.maximum(np.max(values / size, axis=0) - 1.0, 0.0))
 
 
 def settling(time: FloatArray, values: FloatArray, size: float, band: float = SETTLING_BAND) -> FloatArray:
-    """Return the time after which steps (t, n) stay within `band` (5 %) of `size`, (n,) s; inf if never."""
+    """Return the time (n,) s after which steps (t, n) of `size` stay within `band` (a share of it) of it; inf if never."""
     off = np.abs(values - size) > band * abs(size)
     last = time.size - 1 - np.argmax(off[::-1], axis=0)
     return np.asarray(np.where(off.any(axis=0), np.where(last >= time.size - 1, np.inf, time[last]), 0.0))
 
 
 def swing(values: FloatArray, size: float) -> FloatArray:
-    """Return what steps (t, n) of `size` still swing in their last quarter, peak to peak, (n,), as a share of it."""
+    """Return the peak-to-peak oscillation (n,) of steps (t, n) of `size` in their last quarter, as a share of it."""
     tail = values[-max(2, round(TAIL_SHARE * values.shape[0])) :]
-    gone: npt.NDArray[np.bool_] = np.asarray(~np.isfinite(tail).all(axis=0))
-    steady = np.where(gone[None, :], 0.0, tail)
-    return np.asarray(np.where(gone, np.inf, np.ptp(steady, axis=0) / abs(size)))
+    diverged: npt.NDArray[np.bool_] = np.asarray(~np.isfinite(tail).all(axis=0))
+    finite = np.where(diverged[None, :], 0.0, tail)
+    return np.asarray(np.where(diverged, np.inf, np.ptp(finite, axis=0) / abs(size)))
 
 
 def tightest(steps: Steps) -> float:
-    """Return the largest curvature (1/m) that the first case holds for HELD_S."""
+    """Return the largest curvature (1/m) of the first case, averaged over HELD_S."""
     width = max(1, round(HELD_S / float(steps.time[1] - steps.time[0])))
     turned = np.abs(steps.angle[width:, 0] - steps.angle[:-width, 0]) / HELD_S
     return float(np.max(turned / np.maximum(steps.speed[width:, 0], LEAST_SURGE_M_S)))
 
 
 def about_rest(values: FloatArray, size: float) -> FloatArray:
-    """Return steps (t, n) of `size` moved to where each comes to rest: what a trim that is not known leaves is no motion."""
-    rest = size - steady_error(values, size)
-    return np.asarray(values + np.where(np.isfinite(rest), size - rest, 0.0))
+    """Return steps (t, n) of `size` shifted by their steady errors, so that an error of the trim does not count as motion."""
+    final = size - steady_error(values, size)
+    return np.asarray(values + np.where(np.isfinite(final), size - final, 0.0))
 
 
 def steady_error(values: FloatArray, wanted: float) -> FloatArray:
-    """Return wanted less the mean of the last twentieth of (t, n), (n,)."""
+    """Return `wanted` less the mean of the last twentieth of values (t, n), (n,)."""
     tail = max(1, values.shape[0] // 20)
     return np.asarray(wanted - values[-tail:].mean(axis=0))
 
 
 @dataclass(frozen=True, slots=True)
 class Flight:
-    """What is flown for `seconds` in steps of `step` s: a step of the reference (rad) at time 0, or of the depth that is wanted.
+    """A simulation of `seconds` s in steps of `step` s: a step at time 0 of the reference (rad), or of the depth (m).
 
-    The depth (m) goes through pitch, z' = -u theta, which is asked within `pitch_limit` rad. `offset` (rad) is added to the fin:
-    a bent fin, on top of the plant's own trim. `push` (t,) is a disturbance moment in rad/s^2, a value for each step.
+    The depth follows z' = -u theta, with a pitch reference within `pitch_limit` rad. `offset` (rad) is a fin offset in addition
+    to the plant's trim. `push` (t,) is a disturbance moment in rad/s^2, a value for each step.
     """
 
     seconds: float
@@ -169,16 +169,16 @@ class Flight:
     push: FloatArray | None = None
 
     def times(self, steps: float = 1.0) -> FloatArray:
-        """Return the times (t,) s of a flight in steps of so many of its own."""
-        whole = steps * self.step
-        return whole * np.arange(round(self.seconds / whole) + 1, dtype=np.float64)
+        """Return the times (t,) s of the simulation in steps of `steps` times its step."""
+        length = steps * self.step
+        return length * np.arange(round(self.seconds / length) + 1, dtype=np.float64)
 
 
 def fly(plant: LinearPlant, rows: Sequence[Row], flight: Flight) -> Steps:
-    """Return a flight of every draw of a plant under the gains of rows; where the draws are of hulls, of these."""
+    """Return the responses of every draw of a plant under the gains of rows; with `plant.hull` in surge, sway and yaw."""
     coarser = 1.0 if plant.hull is None else HULL_STEPS
-    time, step, own = flight.times(coarser), coarser * flight.step, flight.times()
-    pushed = np.interp(time, own, np.zeros(own.size) if flight.push is None else flight.push)
+    time, step, push_time = flight.times(coarser), coarser * flight.step, flight.times()
+    push = np.interp(time, push_time, np.zeros(push_time.size) if flight.push is None else flight.push)
     out = np.zeros((plant.count, time.size, len(MOTION)))
     table = np.array([_gains(row) for row in rows])
     lag, fin_rate = np.maximum(plant.lag, FASTEST_LAG_S), np.minimum(plant.fin_rate, 1e6)
@@ -191,12 +191,12 @@ def fly(plant: LinearPlant, rows: Sequence[Row], flight: Flight) -> Steps:
             plant.damping, plant.stiffness, plant.authority, offset, np.ascontiguousarray(plant.core), of_damping, of_authority,
             of_core, np.exp(-step / lag), np.round(plant.delay / step), fin_rate * step, drag, fin_loss, turn_loss,
         )  # fmt: skip
-        asked = (flight.reference, flight.depth, flight.pitch_limit)
-        close_loop(plants, table, *asked, plant.speed, step, pushed, out)
+        references = (flight.reference, flight.depth, flight.pitch_limit)
+        close_loop(plants, table, *references, plant.speed, step, push, out)
     else:
-        way = np.where(plant.authority < 0.0, 1.0, -1.0)
-        settings = np.column_stack([way, offset, lag, fin_rate, plant.delay])
-        close_hull_loop(np.ascontiguousarray(plant.hull), settings, table, flight.reference, plant.speed, step, pushed, out)
+        sign = np.where(plant.authority < 0.0, 1.0, -1.0)
+        settings = np.column_stack([sign, offset, lag, fin_rate, plant.delay])
+        close_hull_loop(np.ascontiguousarray(plant.hull), settings, table, flight.reference, plant.speed, step, push, out)
     return Steps(time, *(np.ascontiguousarray(out[:, :, j].T) for j in MOTION))
 
 

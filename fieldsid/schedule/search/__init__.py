@@ -1,1 +1,1 @@
-"""Gains sought at one speed and for all speeds at once: formulas with two free numbers, one objective, what binds them."""
+"""The search for gains at one speed and for all speeds: formulas with two free numbers, and one objective."""

@@ -1,9 +1,10 @@
 """Gains at one speed for a chosen controller: by formula, with the bandwidth and damping that `search` finds.
 
-The estimate has the damping and phase margin asked; 95 % of the draws of its errors leave half of the margin and fly the step,
-with the fin's limits, the speed lost in the turn and the drag of the turning hull. P and PI have the largest gain that lets them,
-unless a time to settle or a bandwidth is asked. What binds them is the fin, the answer asked, or the requirement that a little
-more bandwidth would not keep. Feed-forward is -delta_r0 (-delta_s0 in pitch, plus c23/d2 of the reference).
+The estimate has the required damping and phase margin; 95 % of the draws of its errors have at least half of the margin and
+settle after the step, simulated with the limits of the fin, the loss of speed and the nonlinear damping. P and PI have the
+largest gain that meets these requirements, unless a settling time or a bandwidth is required. The limit of the bandwidth
+(`binds`) is the fin, the required response, or the requirement that a slightly larger bandwidth would violate. The feed-forward
+is -delta_r0 (-delta_s0 in pitch, plus c23/d2 of the reference).
 """
 
 from __future__ import annotations
@@ -24,18 +25,18 @@ from fieldsid.schedule.search.optimum import Found, Search
 from fieldsid.schedule.wish import PROPORTIONAL, QUICKEST, Wish
 
 LEAST_HELD = 0.5
-"""P and PI that hold fewer of the draws are refused: no proportional gain holds an unstable hull."""
+"""P and PI that serve a smaller share of the draws are refused: no proportional gain stabilises an unstable hull."""
 OPTIONS = {"kind": "--controller {}", "damping": "--damping {:g}", "phase_margin_deg": "--phase-margin {:g}"}
 DEPTH_PHASE_MARGIN_DEG = 60.0
-"""Phase margin of the depth loop around the pitch loop: no overshoot to speak of beside what the pitch limit does."""
+"""Phase margin of the depth loop around the pitch loop, for hardly any overshoot but that by the pitch limit."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sought:
-    """Gains found for a plant, by its draws or, where these allow none, by its estimate alone.
+    """Gains found for a plant by its draws, or by its estimate only where no gains serve the draws.
 
-    `binds` says what keeps them from more bandwidth; `slowed` is the bandwidth over that which the fin allows where it is lag,
-    delay, margin or the draws that do.
+    `binds` names the limit of the bandwidth; `slowed` is the bandwidth over that which the fin allows, below one where lag,
+    delay, margin or the draws are the limit.
     """
 
     plant: LinearPlant
@@ -46,7 +47,7 @@ class Sought:
 
     @property
     def settled(self) -> float:
-        """The time (s) in which the step settles, by the estimate and by 95 % of the draws it was sought by."""
+        """The settling time (s) of the step, the longer of the estimate's and that of 95 % of the draws."""
         return self.found.outcome.settled
 
     @property
@@ -56,12 +57,12 @@ class Sought:
 
     @property
     def step(self) -> float:
-        """The step (rad) that was flown."""
+        """The simulated step (rad)."""
         return self.search.place.demand.step
 
 
 def design_gains(plant: LinearPlant, wish: Wish, fin_limit: float, answer: float = QUICKEST) -> Sought:
-    """Return the gains of one speed alone: of a bandwidth or an answer (s) that is asked, as quick as may be where none serve."""
+    """Return the gains of one speed for the required bandwidth or settling time `answer` (s), the quickest where none serve."""
     quick = quickest(plant, wish, fin_limit)
     if wish.bandwidth is not None:
         return with_bandwidth(quick, wish.bandwidth) or quick
@@ -69,10 +70,10 @@ def design_gains(plant: LinearPlant, wish: Wish, fin_limit: float, answer: float
 
 
 def quickest(plant: LinearPlant, wish: Wish, fin_limit: float) -> Sought:
-    """Return the quickest gains that serve most of a plant's draws; raises ModelError where the estimate is not served.
+    """Return the quickest gains that serve 95 % of a plant's draws; raises ModelError where none serve the estimate.
 
-    P and PI that serve fewer than half of the draws are refused as well; with a rate, where no gains serve as many draws as they
-    have to, they are the estimate's: half-way between serves neither.
+    P and PI that serve fewer than half of the draws are refused as well. With a rate feedback, where no gains serve 95 % of the
+    draws, the gains are those for the estimate: a compromise would serve neither.
     """
     family = plant.distinct()
     if wish.kind in PROPORTIONAL and family.slow_damping[0] <= 0:
@@ -80,13 +81,13 @@ def quickest(plant: LinearPlant, wish: Wish, fin_limit: float) -> Sought:
     found, search = _found(family, wish, fin_limit), _search(family, wish, fin_limit)
     if found is None:
         raise _refusal(family, wish, fin_limit)
-    if search.place.held(found.gains)[0] < HELD_SHARE and (alone := _found(family.one(), wish, fin_limit)) is not None:
+    if search.place.draws_served(found.gains)[0] < HELD_SHARE and (alone := _found(family.one(), wish, fin_limit)) is not None:
         found, search = alone, _search(family.one(), wish, fin_limit)
     return Sought(plant, search, found, bound_by(search, found), found.share)
 
 
 def answering(quick: Sought, answer: float, says: str) -> Sought:
-    """Return the gains of least fin that settle within `answer` s, bound by what `says`; the quickest where these hardly do."""
+    """Return the gains of least fin that settle within `answer` s, with `says` as their limit; the quickest if nearly as slow."""
     if quick.settled >= (1.0 - BETTER_SHARE) * answer:
         return quick
     search = replace(quick.search, place=quick.search.place.settled_within(answer))
@@ -95,7 +96,7 @@ def answering(quick: Sought, answer: float, says: str) -> Sought:
 
 
 def with_bandwidth(quick: Sought, bandwidth: float) -> Sought | None:
-    """Return the gains of a bandwidth (rad/s) with the damping that suits it best, None where they do not serve."""
+    """Return the gains of a bandwidth (rad/s) with the best damping, None where they violate a requirement."""
     search = replace(quick.search, place=quick.search.place.with_bandwidth(bandwidth))
     found = search.damped(quick.found.share * bandwidth / quick.bandwidth)
     if not found.outcome.serves:
@@ -104,30 +105,30 @@ def with_bandwidth(quick: Sought, bandwidth: float) -> Sought | None:
 
 
 def row_of(sought: Sought, *, depth: bool, supported: bool) -> Row:
-    """Return the row of gains that were sought: its margins over the draws, and what these do with it.
+    """Return the row of found gains with the margins and the settling time over the draws.
 
-    `depth` adds the depth loop; `supported` says whether data were taken at this speed.
+    `depth` adds the depth loop; `supported` says whether the data contain this speed.
     """
     plant, gains, demand = sought.plant, sought.found.gains, sought.search.place.demand
     family = plant.distinct()
-    held, settling = Place(family, demand).held(gains)
+    served, settling = Place(family, demand).draws_served(gains)
     phase, gain, delay = margins(plant, gains).worst()
     return Row(
         plant.speed, gains, -float(plant.offset[0]), plant.reference_gain, demand.fin_limit,
         _depth_gain(family, gains) if depth else 0.0, supported, sought.slowed,
-        phase, gain, delay, held, settling, sought.binds, demand.fin_of(gains),
+        phase, gain, delay, served, settling, sought.binds, demand.fin_of(gains),
     )  # fmt: skip
 
 
 def _depth_gain(family: LinearPlant, gains: Gains) -> float:
-    """Return the gain from depth to pitch, rad/m: the cascade u k T/s keeps its phase margin with 95 % of the draws.
+    """Return the gain from depth to pitch, rad/m, with which the cascade u k T/s has its phase margin for 95 % of the draws.
 
-    T is the closed pitch loop from its reference, so the crossover is where T lags by 90 deg less the margin.
+    T is the closed pitch loop from its reference; the crossover is where T lags by 90 deg less the margin.
     """
     omega = FREQUENCY_GRID_RAD_S
-    asked = gains.kp + gains.ki / (1j * omega) + family.reference_gain
+    by_reference = gains.kp + gains.ki / (1j * omega) + family.reference_gain
     hull = family.response(omega)
-    closed = hull * asked[None, :] / (1.0 + hull * gains.response(omega)[None, :])
+    closed = hull * by_reference[None, :] / (1.0 + hull * gains.response(omega)[None, :])
     phase = np.degrees(np.unwrap(np.angle(closed), axis=1))
     first = np.argmax(phase <= DEPTH_PHASE_MARGIN_DEG - 90.0, axis=1)
     reached = np.take_along_axis(np.abs(closed), first[:, None], axis=1)[:, 0]
@@ -139,12 +140,12 @@ def _search(family: LinearPlant, wish: Wish, fin_limit: float) -> Search:
 
 
 def _found(family: LinearPlant, wish: Wish, fin_limit: float) -> Found | None:
-    """Return the quickest gains; None where they do not serve the estimate, or with P and PI not half of the draws."""
+    """Return the quickest gains; None where they do not serve the estimate, or with P and PI fewer than half of the draws."""
     search = _search(family, wish, fin_limit)
     found = search.quickest()
     if sum(found.outcome.own) > ROUNDING:
         return None
-    return None if wish.kind in PROPORTIONAL and search.place.held(found.gains)[0] < LEAST_HELD else found
+    return None if wish.kind in PROPORTIONAL and search.place.draws_served(found.gains)[0] < LEAST_HELD else found
 
 
 def _unstable(family: LinearPlant, wish: Wish, fin_limit: float) -> ModelError:
@@ -174,9 +175,10 @@ def _refusal(family: LinearPlant, wish: Wish, fin_limit: float) -> ModelError:
 
 
 def _remedy(family: LinearPlant, wish: Wish, fin_limit: float) -> str:
-    """Return the option with which a gain is found at this speed after all; nothing where none of the usual ones does.
+    """Return the hint with command-line options for which there are gains at this speed; empty if none of the usual ones helps.
 
-    All other gains are PD's, or lose phase to an integral: where PD has none at the loosest, none has.
+    Every other controller is a special case of PD or loses phase by an integral: without PD gains for the loosest requirements
+    there are none.
     """
     damping, margin = wish.damped, wish.phase_margin_deg
     loosest, *others = (
@@ -191,7 +193,7 @@ def _remedy(family: LinearPlant, wish: Wish, fin_limit: float) -> str:
     for other in others:
         if other == wish or (other.kind in PROPORTIONAL and family.slow_damping[0] <= 0):
             continue
-        # with a rate they are refused for what the estimate lacks alone
+        # with a rate feedback gains are refused only where they do not serve the estimate
         if _found(family if other.kind in PROPORTIONAL else family.one(), other, fin_limit) is not None:
             changed = (option.format(getattr(other, n)) for n, option in OPTIONS.items() if getattr(other, n) != getattr(wish, n))
             return f"at this speed there is one with `{' '.join(changed)}`"
@@ -202,7 +204,7 @@ A_LITTLE_MORE = 1.03
 
 
 def bound_by(search: Search, found: Found) -> str:
-    """Return what keeps gains that were sought as quick as may be from more bandwidth."""
+    """Return the limit of the bandwidth of the quickest gains, in words."""
     demand, wish = search.place.demand, search.wish
     if found.share >= 1.0 - 2.0 * ROUNDING:
         return (
@@ -221,7 +223,7 @@ def _fin(demand: Demand) -> str:
 
 
 def _words(demand: Demand, wish: Wish) -> list[str]:
-    """Return what can be lacked, in the order of an outcome."""
+    """Return the requirements in words, in the order of `Outcome.own` and `Outcome.drawn`."""
     margin = demand.phase_margin_deg
     own = (f"damping {number(wish.damped, 3)}", f"phase margin {number(margin, 3)} deg", _fin(demand))
     over = (f"overshoot {number(100.0 * o, 3)} %" for o in (demand.own_overshoot, demand.draws_overshoot))

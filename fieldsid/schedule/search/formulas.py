@@ -1,9 +1,9 @@
-"""Gains of a chosen controller by formula, with two numbers left free: a share of a bandwidth and a multiple of the damping.
+"""Gains of a chosen controller by formula, with two free numbers: a share of a bandwidth and a multiple of the damping.
 
-Yaw P is the paper's: kp = a22^2 / (4 zeta^2 b2) puts the poles at damping zeta; with a fin's lag, delay or a sway state it is
-found as the largest gain whose poles keep that damping, which is the same number where there are none. PD: poles at a bandwidth
-and damping. PI, PID: an integral beside them. LQR: Bryson's weights, solved in closed form
-(Kwakernaak and Sivan 1972, Linear Optimal Control Systems).
+Yaw P is the paper's: kp = a22^2 / (4 zeta^2 b2) gives the poles the damping zeta; with lag or delay of the fin or a sway state it
+is the largest gain whose poles have that damping, which is the same number without these. PD: poles at a bandwidth and damping.
+PI, PID: with an integral added. LQR: Bryson's weights, solved in closed form (Kwakernaak and Sivan 1972, Linear Optimal Control
+Systems).
 """
 
 from __future__ import annotations
@@ -18,26 +18,26 @@ from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.wish import Wish
 
 INTEGRAL_SHARE = 0.1
-"""Integral corner over the proportional loop's crossover: a tenth costs six degrees of phase."""
+"""Corner frequency of the integral over the crossover of the proportional loop: a tenth costs six degrees of phase."""
 LEAST_STIFF = 1e-6
-"""Of the fin's stiffness, what is left of a hull that the whole fin hardly holds."""
+"""Least stiffness of the closed loop over that of the full fin, for a hull that the full fin hardly stabilises."""
 Formula = Callable[[float, float], Gains]
-"""Gains of a share of the bandwidth that uses the fin allowed, and of a multiple of the damping wished."""
+"""The gains for a share of the bandwidth that uses the allowed fin, and a multiple of the required damping."""
 
 
 def formula_of(plant: LinearPlant, wish: Wish, fin: float) -> Formula:
-    """Return the formula of a wish's controller for a plant's estimate whose fin may be asked for `fin` rad by the step."""
+    """Return the formula of a wish's controller for a plant's estimate; the step may use `fin` rad of the fin."""
     return _FORMULAS[wish.kind](plant.one(), wish, fin)
 
 
 def fin_bandwidth(plant: LinearPlant, fin: float, error: float) -> float:
-    """Return the bandwidth (rad/s) at which the formula's gain asks for a fin (rad) at an error (rad)."""
+    """Return the bandwidth (rad/s) at which the formula's gain uses a fin angle (rad) at an error (rad)."""
     most = abs(float(plant.slow_authority[0])) * fin / error
     return float(np.sqrt(max(most + min(float(plant.stiffness[0]), most), LEAST_STIFF * most)))
 
 
 def bandwidth_of(plant: LinearPlant, gains: Gains) -> float:
-    """Return the bandwidth (rad/s) whose formula has a plant's gain: the inverse of the formula."""
+    """Return the bandwidth (rad/s) for which the formula gives these gains at a plant: the inverse of the formula."""
     return fin_bandwidth(plant, abs(gains.kp), 1.0)
 
 
@@ -45,7 +45,7 @@ def _proportional(plant: LinearPlant, wish: Wish, fin: float) -> Formula:
     a, k, b = float(plant.slow_damping[0]), float(plant.stiffness[0]), float(plant.slow_authority[0])
     wished = (a * a / (4.0 * wish.damped**2) - k) / b
     if k > 0 and wished * b <= 0:
-        wished = 0.5 * k / b  # stiff already beyond the wished damping: any gain lowers it, a modest one is left to the margins
+        wished = 0.5 * k / b  # the stiffness alone is underdamped and any gain lowers the damping: a modest gain, within margins
     most = min(abs(wished), fin / wish.step_of(plant.axis)) * float(np.sign(wished))
     return lambda share, _: Gains(most * share**2)
 
@@ -71,7 +71,7 @@ def _with_integral(trial: Formula, plant: LinearPlant) -> Formula:
 
 
 def _quadratic(plant: LinearPlant, wish: Wish, fin: float) -> Formula:
-    """Return the gains of least integral of (share^2 angle/step)^2 + (fin's angle/fin)^2: poles by the symmetric root locus."""
+    """Return the gains that minimise the integral of (share^2 angle/step)^2 + (fin angle/fin)^2, by the symmetric root locus."""
     a, k, b = float(plant.slow_damping[0]), float(plant.stiffness[0]), float(plant.slow_authority[0])
     most = b * fin / wish.step_of(plant.axis)
 

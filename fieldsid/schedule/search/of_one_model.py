@@ -1,7 +1,7 @@
-"""Gains of one model at one speed by the design of a schedule's row, with their own errors, beside those that are loaded.
+"""Gains of one model at one speed by the design of a schedule's row, with standard errors, compared with loaded gains.
 
-An error of the gains is what they move by when the model moves: designed again where each axis of its covariance ends, a
-standard error to either side. Source: Julier and Uhlmann 2004, Proc. IEEE 92(3), the sigma points.
+The errors of the gains are propagated from those of the model: the design is repeated one standard error to either side on each
+principal axis of its covariance. Source: Julier and Uhlmann 2004, Proc. IEEE 92(3), the sigma points.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ GAINS = ("kp", "ki", "kd")
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What gains are to do: the wish, the fin's limit (rad) and what is stated of the fin, all as a loaded schedule has them.
+    """The requirements of a loaded schedule: the wish, the fin limit (rad) and the stated limits of the fin.
 
-    `answer` (s) is what all speeds of that schedule settle in, QUICKEST without one.
+    `answer` (s) is the common settling time of that schedule, QUICKEST without one.
     """
 
     wish: Wish
@@ -45,21 +45,22 @@ class Wanted:
 
 
 def usual(fin_limit: float, *, by_rate: bool, limits: FinLimits | None = None, depth: bool = False) -> Wanted:
-    """Return what is wanted where nothing is said: as quick as the fin (rad) lets them be, on the rate where it is measured."""
+    """Return the default requirements: as quick as the fin limit (rad) allows, PD if the rate is measured (`by_rate`), else P."""
     return Wanted(Wish("pd" if by_rate else "p"), fin_limit, limits or FinLimits(), depth)
 
 
 def wanted_of(loaded: Schedule) -> Wanted:
-    """Return what a schedule was designed for; its rows say the fin's limit, of which the least is taken."""
+    """Return the requirements that a schedule was designed for, with the least fin limit of its rows."""
     least = min(row.fin_limit for row in loaded.rows)
     return Wanted(loaded.wish, least, loaded.stated_limits, loaded.depth, loaded.answer.settling, loaded)
 
 
 @dataclass(frozen=True, slots=True)
 class GainsOfOne:
-    """A row for one speed, standard errors of its gains and feed-forward, the row loaded, and whether that is to be changed.
+    """A row for one speed, standard errors of its gains and feed-forward, and the loaded row.
 
-    It is where the loaded gains lie outside the 95 % band of these and come to worse by the objective of the design.
+    The verdict is to change the loaded gains where they lie outside the 95 % band of the new ones and their outcome by the
+    objective of the design is worse (`is_worse`).
     """
 
     row: Row
@@ -83,23 +84,24 @@ class GainsOfOne:
 
     @property
     def says(self) -> str:
-        """The gains with their errors, those that are loaded, and what to do."""
-        own = [n for n in GAINS if getattr(self.row.gains, n) != 0.0 or (self.loaded and getattr(self.loaded.gains, n) != 0.0)]
+        """The gains with their errors, the loaded gains and the verdict, in words."""
+        used = [n for n in GAINS if getattr(self.row.gains, n) != 0.0 or (self.loaded and getattr(self.loaded.gains, n) != 0.0)]
         if self.loaded is None:
-            return ", ".join(f"{n} {with_error(getattr(self.row.gains, n), self.std_errors[n])}" for n in own)
-        said = [
+            return ", ".join(f"{n} {with_error(getattr(self.row.gains, n), self.std_errors[n])}" for n in used)
+        pairs = [
             f"{n} {with_error(getattr(self.row.gains, n), self.std_errors[n])} for {number(getattr(self.loaded.gains, n), 3)}"
-            for n in own
+            for n in used
         ]
-        return f"{', '.join(said)} loaded: {self.verdict}"
+        return f"{', '.join(pairs)} loaded: {self.verdict}"
 
 
 def gains_of_one(model: Model, speed: float, wanted: Wanted) -> GainsOfOne:
-    """Return the gains of a model at a speed in m/s; raises ModelError where none hold the loop, UsageError for a bad wish."""
+    """Return the gains of a model at a speed in m/s; raises ModelError if none stabilise the loop, UsageError for a bad wish."""
     check_wish(wanted.wish)
     plants, sought = _designed(model, speed, wanted)
     row = row_of(sought, depth=wanted.depth, supported=plants.source.supports(speed))
-    gains = np.array([[getattr(g, n) for n in GAINS] for g in _moved(model, speed, wanted)]).reshape(-1, 2, len(GAINS))
+    gains = np.array([[getattr(g, n) for n in GAINS] for g in _gains_at_sigma_points(model, speed, wanted)])
+    gains = gains.reshape(-1, 2, len(GAINS))
     spread = np.sqrt((0.25 * (gains[:, 0] - gains[:, 1]) ** 2).sum(axis=0))
     errors = dict(zip(GAINS, spread.tolist(), strict=True)) | {"feed_forward": _forward_error(model)}
     if wanted.loaded is None:
@@ -117,22 +119,22 @@ def _designed(model: Model, speed: float, wanted: Wanted) -> tuple[Plants, Sough
     return plants, design_gains(plant, wanted.wish, wanted.fin_limit, wanted.answer)
 
 
-def _moved(model: Model, speed: float, wanted: Wanted) -> Iterator[Gains]:
-    """Yield the gains at both ends of each axis of the covariance; the trim moves the feed-forward alone."""
+def _gains_at_sigma_points(model: Model, speed: float, wanted: Wanted) -> Iterator[Gains]:
+    """Yield the gains at both ends of each principal axis of the covariance without the trim, which no gain depends on."""
     names = [n for n in model.free if n != NAMES[model.axis].trim]
     at = [model.free.index(n) for n in names]
     sizes, axes = np.linalg.eigh(model.covariance[np.ix_(at, at)])
     for size, axis in zip(sizes, axes.T, strict=True):
-        for way in (1.0, -1.0):
-            step = way * sqrt(max(float(size), 0.0)) * axis
-            there = {n: model.values[n] + float(d) for n, d in zip(names, step, strict=True)}
-            yield _designed(replace(model, values={**model.values, **there}), speed, wanted)[1].found.gains
+        for sign in (1.0, -1.0):
+            step = sign * sqrt(max(float(size), 0.0)) * axis
+            shifted = {n: model.values[n] + float(d) for n, d in zip(names, step, strict=True)}
+            yield _designed(replace(model, values={**model.values, **shifted}), speed, wanted)[1].found.gains
 
 
 def _forward_error(model: Model) -> float:
-    """Return the error (rad) of the fin that cancels the trim, C/b."""
+    """Return the standard error (rad) of the feed-forward -C/b."""
     names = NAMES[model.axis]
     b, trim = model.values[names.authority], model.values[names.trim]
-    lever: FloatArray = np.zeros(len(model.free))
-    lever[model.free.index(names.authority)], lever[model.free.index(names.trim)] = trim / b**2, -1.0 / b
-    return sqrt(max(float(lever @ model.covariance @ lever), 0.0))
+    gradient: FloatArray = np.zeros(len(model.free))
+    gradient[model.free.index(names.authority)], gradient[model.free.index(names.trim)] = trim / b**2, -1.0 / b
+    return sqrt(max(float(gradient @ model.covariance @ gradient), 0.0))

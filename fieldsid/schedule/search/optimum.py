@@ -1,8 +1,8 @@
-"""The best gains of a formula at one speed, by its two free numbers: the quickest, and those of least fin that are quick enough.
+"""The best gains of a formula at one speed over its two free numbers: the quickest, or those of least fin that are quick enough.
 
-And the best one gain for all speeds: what a schedule has to beat, by the objective that its rows were designed for.
+And the best constant gain for all speeds, with which a schedule is compared by the objective of its rows.
 
-Every part of the objective is continuous in the gains and in the plant: rows next to each other differ by what the plant differs.
+Every part of the objective is continuous in the gains and in the plant, so that neighbouring rows differ only as the plant does.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from fieldsid.schedule.wish import DAMPING, MOST_DAMPING, RATE_FED, Wish
 SLOWEST_SHARE = 0.03
 SCANNED = 7
 NEARLY = 0.95
-"""The whole fin is taken where a little less settles no sooner."""
+"""Share of the full bandwidth: where it settles no sooner than the full one, the full one is taken."""
 MOST_TRIES, MOST_TURNS = 12, 4
 NEAR_DAMPING = 0.3
-"""How far from the damping of the quickest gains, in e-folds, that of slower ones is sought."""
+"""Half width, in the logarithm, of the range about the current damping in which that of slower gains is searched."""
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Gains, the shares of bandwidth and damping they have of the formula's, and what they come to."""
+    """Gains, their bandwidth and damping over the formula's (`share` and `more`), and their outcome."""
 
     gains: Gains
     share: float
@@ -40,63 +40,63 @@ class Found:
 
 @dataclass(frozen=True)
 class Search:
-    """A wish's formula at a place."""
+    """The search for the gains of a wish's formula at a place."""
 
     place: Place
     wish: Wish
 
     def __reduce__(self) -> tuple[type[Search], tuple[Place, Wish]]:
-        return Search, (self.place, self.wish)  # a formula cannot be sent
+        return Search, (self.place, self.wish)  # a formula cannot be pickled
 
     @cached_property
     def formula(self) -> Formula:
-        """The formula, of which a share of one asks for all of the fin that the step may ask for."""
+        """The formula; a share of one uses all of the fin that the step may use."""
         return formula_of(self.place.plant, self.wish, self.place.demand.fin_limit * self.wish.most_fin)
 
     @property
     def most_damping(self) -> float:
-        """The largest multiple of the damping wished."""
+        """The largest multiple of the required damping."""
         return max(MOST_DAMPING / self.wish.damped, 1.0) if self.wish.kind in RATE_FED else 1.0
 
     def at(self, share: float, more: float) -> Found:
-        """Return the gains of both numbers."""
+        """Return the gains for a share of the bandwidth and a multiple of the damping."""
         gains = self.formula(share, more)
         return Found(gains, share, more, self.place.outcome(gains))
 
     def cost(self, found: Found) -> float:
-        """Return the objective at the place."""
+        """Return the cost of gains at the place."""
         return found.outcome.cost(self.place.demand)
 
     def quickest(self) -> Found:
-        """Return the gains that settle soonest, or of a formula the largest, that lack nothing, or the least."""
+        """Return the gains that settle soonest, or for a formula the largest ones, that meet all requirements or come closest."""
         top, less = (self.usual(share) for share in (1.0, NEARLY))
         if top.outcome.serves and self.cost(top) <= self.cost(less):
             return self.damped(1.0)
         return self.damped(exp(minimum(lambda x: self.cost(self.usual(exp(x))), log(SLOWEST_SHARE), 0.0)))
 
     def usual(self, share: float) -> Found:
-        """Return the gains of a share with the usual damping, or that which poles and margins need."""
+        """Return the gains for a share with the usual damping, or the larger one that poles and margins need."""
         usual = DAMPING / self.wish.damped if self.most_damping > 1.0 else 1.0
         return self.at(share, max(self.needed(share), usual))
 
     def least_fin(self, quick: Found) -> Found:
-        """Return the gains of least fin that settle as soon as is asked; the quickest where these do not."""
-        bare = self.at(quick.share, self.needed(quick.share))
-        found = self._better(self._slowed(quick), self._slowed(bare))
+        """Return the gains of least fin that settle in the required time; the quickest where these do not."""
+        least_damped = self.at(quick.share, self.needed(quick.share))
+        found = self._best_of(self._slowed(quick), self._slowed(least_damped))
         for _ in range(MOST_TURNS):
             near = log(found.more)
             more = least(self._of_damping(found.share), max(near - NEAR_DAMPING, 0.0), near + NEAR_DAMPING)
-            better = self._better(found, self._slowed(self.at(found.share, min(exp(more), self.most_damping))))
+            better = self._best_of(found, self._slowed(self.at(found.share, min(exp(more), self.most_damping))))
             gained, found = found.share / better.share - 1.0, better
             if gained < ROUNDING:
                 break
         return found
 
-    def _better(self, *found: Found) -> Found:
+    def _best_of(self, *found: Found) -> Found:
         return min(found, key=lambda f: (self.cost(f), f.share))
 
     def damped(self, share: float) -> Found:
-        """Return the gains of a share with the damping that suits it best."""
+        """Return the gains for a share with the damping of least cost."""
         more = self.needed(share)
         if self.most_damping > 1.0:
             more = exp(minimum(self._of_damping(share), log(more), log(self.most_damping)))
@@ -106,27 +106,27 @@ class Search:
         return lambda log_more: self.cost(self.at(share, exp(log_more)))
 
     def needed(self, share: float) -> float:
-        """Return the least multiple of the damping with which poles and margins are as asked, or lack the least."""
+        """Return the least multiple of the damping with which poles and margins meet the requirements, or come closest."""
 
-        def lacking(log_more: float) -> float:
-            lacks = sum(map(sum, self.place.linear_lacks(self.formula(share, exp(log_more)))))
-            return lacks if lacks > ROUNDING else log_more - log(self.most_damping)
+        def shortfall(log_more: float) -> float:
+            total = sum(map(sum, self.place.linear_shortfalls(self.formula(share, exp(log_more)))))
+            return total if total > ROUNDING else log_more - log(self.most_damping)
 
-        return exp(minimum(lacking, 0.0, log(self.most_damping))) if self.most_damping > 1.0 and lacking(0.0) > 0.0 else 1.0
+        return exp(minimum(shortfall, 0.0, log(self.most_damping))) if self.most_damping > 1.0 and shortfall(0.0) > 0.0 else 1.0
 
     def _slowed(self, best: Found) -> Found:
-        """Return the least share that settles in time with a damping, by the secant's rule kept between two shares."""
-        asked = self.place.demand.settling
+        """Return the least share that settles in the required time, by the secant method in the logarithm with a bracket."""
+        required = self.place.demand.settling
 
         def late(found: Found) -> float:
-            return log(found.outcome.settled / asked) if found.outcome.serves else 1.0
+            return log(found.outcome.settled / required) if found.outcome.serves else 1.0
 
         def at(share: float) -> Found:
             return self.at(share, max(best.more, self.needed(share)))
 
         high, high_late = best, late(best)
         low, low_late = SLOWEST_SHARE, 1.0
-        share = high.share * exp(high_late)  # settling goes with 1/share where the fin is not at its limit
+        share = high.share * exp(high_late)  # settling is proportional to 1/share while the fin is not at its limit
         for _ in range(MOST_TRIES):
             if high_late > -ROUNDING or high.share / low < 1.0 + ROUNDING:
                 break
@@ -141,7 +141,7 @@ class Search:
 
 
 def minimum(cost: Callable[[float], float], low: float, high: float) -> float:
-    """Return where a cost is least between two places: scanned, then by Brent's method around the best."""
+    """Return the argument of the least cost between two bounds: by a scan, then by Brent's method around the best point."""
     places = np.linspace(low, high, SCANNED)
     costs = [cost(float(x)) for x in places]
     at = int(np.argmin(costs))
@@ -150,7 +150,7 @@ def minimum(cost: Callable[[float], float], low: float, high: float) -> float:
 
 
 def least(cost: Callable[[float], float], low: float, high: float) -> float:
-    """Return where a cost with one valley between two places is least, by Brent's method."""
+    """Return the argument of the least cost between two bounds for a cost with one minimum, by Brent's method."""
     from scipy.optimize import minimize_scalar
 
     return float(minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": ROUNDING}).x)
@@ -161,14 +161,14 @@ FARTHEST = log(1.5)
 
 
 def best_constant(candidates: Sequence[Gains], places: Sequence[Place]) -> Gains:
-    """Return the gains of least cost at the speed where they cost most; of those that cost alike, the ones of less fin."""
+    """Return the candidate whose largest cost over the speeds is least; of equal ones that of the least fin."""
     best, least = candidates[0], (inf, inf)
     for gains in candidates:
         worst, fin = -inf, 0.0
         for place in places:
             found = place.outcome(gains)
             worst, fin = max(worst, found.cost(place.demand)), max(fin, found.fin)
-            if (worst, fin) >= least:  # neither falls at another speed
+            if (worst, fin) >= least:  # both can only grow at further speeds
                 break
         else:
             best, least = gains, (worst, fin)
@@ -181,7 +181,7 @@ def multiples_of(rows: Sequence[Gains]) -> list[Gains]:
 
 
 def improved(place: Place, start: Gains) -> Gains:
-    """Return the best gains near some, sought along all of them and along the rate's alone."""
+    """Return the best gains near a start: searched along a factor on kd, then along a common factor on all gains."""
 
     def times(own: float, rate: float) -> Gains:
         return Gains(start.kp * exp(own), start.ki * exp(own), start.kd * exp(own + rate))
