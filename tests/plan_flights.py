@@ -18,7 +18,7 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import record_of
 from fieldsid.models.speed_law import SpeedLaw
-from fieldsid.planning.flight.excitation import Excitation, Window, asked_of
+from fieldsid.planning.flight.excitation import Excitation, Window, fin_command
 from fieldsid.planning.flight.operating_point import autopilot_of, operating_point
 from fieldsid.planning.flight.rule_flight import fly_operating_points
 
@@ -62,7 +62,7 @@ def exact(day: Day) -> Model:
 def orders(day: Day, candidate: Excitation, window: Window) -> TruthManeuver:
     """What the truth is told: the planned command about its own trim, or its own zig-zag rule for as long as planned."""
     if candidate.record.rule is None:
-        asked = asked_of(candidate, window)
+        asked = fin_command(candidate, window)
         trim = np.where(np.isnan(asked), 0.0, -day.physics.trim / day.physics.authority)
         return TruthManeuver("planned", np.nan_to_num(asked) + trim, np.where(np.isnan(asked), kernel.HOLD, kernel.OPEN))
     scene = operating_point(exact(day), day.speed)

@@ -40,9 +40,9 @@ class StaticMap:
             float(self.one_sided), float(self.square),
         )  # fmt: skip
         if path.first is None and (np.abs(path.end - path.start) <= STRAIGHT_RAD).all():
-            held = np.empty(steps.size)
-            fill_values(path.mean, numbers, held)
-            return FinPath(held, held)
+            angles = np.empty(steps.size)
+            fill_values(path.mean, numbers, angles)
+            return FinPath(angles, angles)
         return through(path, steps, lambda _lengths, start, end, out: fill_lines(start, end, numbers, out))
 
 
@@ -121,8 +121,8 @@ def fill_lines(start: FloatArray, end: FloatArray, numbers: Numbers, out: FloatA
             mean, half = (last_area - first_area) / change, 0.5 * (last - first)
             out[i, 0], out[i, 1], out[i, 2], out[i, 3] = mean - half, mean + half, first, last
         elif change == 0.0:
-            held = last if start[i] == last_angle else value_at(start[i], numbers, rest)
-            out[i, 0], out[i, 1], out[i, 2], out[i, 3] = held, held, held, held
+            constant = last if start[i] == last_angle else value_at(start[i], numbers, rest)
+            out[i, 0], out[i, 1], out[i, 2], out[i, 3] = constant, constant, constant, constant
         else:
             first, bent = value_at(start[i], numbers, rest), value_at(end[i], numbers, rest)
             mean, half = value_at(0.5 * (start[i] + end[i]), numbers, rest), 0.5 * (bent - first)

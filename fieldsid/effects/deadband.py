@@ -27,31 +27,31 @@ def _share(here: float, there: float, edge: float) -> float:
 
 
 @jit
-def with_release(start: FloatArray, end: FloatArray, width: float, lost: float, let_go: float, out: FloatArray) -> None:
+def with_release(start: FloatArray, end: FloatArray, width: float, deficit: float, let_go: float, out: FloatArray) -> None:
     """Fill out (n-1, 4) with lines and ends of the path of a fin that leaves zero at `width` and returns to it at `let_go`.
 
-    Away from zero the fin is `lost` smaller than the command. Angles in rad, let_go <= width.
+    Away from zero the fin is smaller by `deficit` than the command. Angles in rad, let_go <= width.
     """
     moves = abs(start[0]) > width
     for i in range(start.shape[0]):
         a, b = start[i], end[i]
         here, there, from_side, to_side = abs(a), abs(b), 1.0 if a > 0.0 else -1.0, 1.0 if b > 0.0 else -1.0
         moves = here > width or (moves and here >= let_go)
-        before, after, mean = max(here - lost, 0.0) if moves else 0.0, 0.0, 0.0
+        before, after, mean = max(here - deficit, 0.0) if moves else 0.0, 0.0, 0.0
         across = a * b < 0.0
         goes_on = there > width or (moves and there >= let_go and not across)
         if across:
             zero = here / (here + there)
             stops = zero * _share(here, 0.0, let_go) if moves else 0.0
-            mean += 0.5 * stops * (before + max(let_go - lost, 0.0)) * from_side
+            mean += 0.5 * stops * (before + max(let_go - deficit, 0.0)) * from_side
         elif moves and not goes_on:
             stops = _share(here, there, let_go)
-            mean += 0.5 * stops * (before + max(let_go - lost, 0.0)) * from_side
+            mean += 0.5 * stops * (before + max(let_go - deficit, 0.0)) * from_side
         if goes_on:
-            after = there - lost
+            after = there - deficit
             if across or not moves:
                 takes_off = zero + (1.0 - zero) * _share(0.0, there, width) if across else _share(here, there, width)
-                mean += 0.5 * (1.0 - takes_off) * (width - lost + after) * to_side
+                mean += 0.5 * (1.0 - takes_off) * (width - deficit + after) * to_side
             else:
                 mean += 0.5 * (before + after) * to_side
         first, last = before * from_side, after * to_side
@@ -66,8 +66,8 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     if width <= 0.0:
         return path
     if "release" in values:
-        lost, let_go = (1.0 - jump_share) * width, values["release"] * width
-        return through(path, record.steps, lambda _steps, start, end, out: with_release(start, end, width, lost, let_go, out))
+        deficit, let_go = (1.0 - jump_share) * width, values["release"] * width
+        return through(path, record.steps, lambda _steps, start, end, out: with_release(start, end, width, deficit, let_go, out))
     if "off_middle" in values:
         path = path.shifted(-values["off_middle"] * width)
     zone = StaticMap(beyond=1.0, edge=width, blend=values.get("deadband_blend", 0.0), jump=jump_share * width)

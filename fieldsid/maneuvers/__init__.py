@@ -50,7 +50,7 @@ def parse_spec(text: str) -> tuple[Maneuver, dict[str, float]]:
     """
     name, _, rest = text.strip().partition(":")
     maneuver = pick_maneuver(name.strip())
-    given: dict[str, float] = {}
+    values: dict[str, float] = {}
     for item in filter(None, (part.strip() for part in rest.split(","))):
         key, equals, value = item.partition("=")
         if not equals:
@@ -59,12 +59,12 @@ def parse_spec(text: str) -> tuple[Maneuver, dict[str, float]]:
                 found=item,
                 hint=f"write it like `{maneuver.name}:amplitude={maneuver.defaults['amplitude']:g}`",
             )
-        given[key.strip()] = _number(value.strip(), text, maneuver, key.strip())
-    return maneuver, maneuver.checked(given)
+        values[key.strip()] = _number(value.strip(), text, maneuver, key.strip())
+    return maneuver, maneuver.checked(values)
 
 
 def spec_of(maneuver: Maneuver, parameters: Parameters) -> str:
-    """Return the text that `parse_spec` reads back, parameters at their default left out."""
+    """Return the text that `parse_spec` reads back, without parameters that have their default."""
     changed = {k: v for k, v in parameters.items() if not math.isclose(v, maneuver.defaults[k], rel_tol=1e-9, abs_tol=1e-12)}
     return maneuver.name + (":" if changed else "") + ",".join(f"{k}={v:.6g}" for k, v in changed.items())
 

@@ -1,7 +1,7 @@
-"""The contract of a maneuver: named, bounded parameters, a duration, and either a fin command or a rule that sees the motion.
+"""The contract of a maneuver: named, bounded parameters, a duration, and either a fin command or a rule on the motion.
 
-Fin angles are about the trim fin, angles about the value at the start, times from the start of the excitation. NaN in a
-command, or from a rule, means that the autopilot has the fin: between two pulses, and for good once a rule has finished.
+Fin angles are relative to the trim fin, angles to the value at the start, times to the start of the excitation. NaN in a command
+or from a rule means that the autopilot steers: between two pulses, and from the end of a rule on.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from fieldsid.registry import near
 
 Parameters = Mapping[str, float]
 Command = Callable[[Parameters, FloatArray], FloatArray]
-"""command(parameters, time (n,) s) -> fin (n,) rad, NaN where the autopilot has it."""
+"""command(parameters, time (n,) s) -> fin (n,) rad, NaN where the autopilot steers."""
 Rule = Callable[[FloatArray, float, FloatArray, FloatArray, FloatArray, FloatArray], None]
 """rule(values of the parameters in their order, time s, angle (m,), rate (m,), memory (m, k), fin (m,)): fills the fins of m
-vehicles, NaN where the autopilot has one, and changes their memory; a function of `numerics.jit`."""
+vehicles, NaN where the autopilot steers, and updates their memory; a function of `numerics.jit`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One number of a maneuver: unit, closed bounds, default; `whole` marks counts, `tuned` what a planner may move."""
+    """One number of a maneuver: unit, closed bounds, default; `whole` marks counts, `tuned` numbers that a planner may change."""
 
     name: str
     unit: str
@@ -39,10 +39,10 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Maneuver:
-    """One excitation. `duration(parameters)` is its length in s, for a rule the longest time it may take.
+    """One excitation. `duration(parameters)` is its length in s, for a rule the longest possible one.
 
-    Exactly one of `command` and `rule` is given; a rule starts from `memory(parameters)`. Every maneuver has a
-    parameter `amplitude`, the largest fin angle it asks for.
+    It has either a `command` or a `rule`, which starts with `memory(parameters)`. Every maneuver has a parameter `amplitude`, its
+    largest fin angle.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Maneuver:
     memory: Callable[[Parameters], tuple[float, ...]] = lambda _: ()
 
     def vector(self, values: Parameters) -> FloatArray:
-        """Return values in the order of the parameters, as a rule takes them."""
+        """Return values in the order of the parameters, for a rule."""
         return np.array([float(values[p.name]) for p in self.parameters])
 
     @property
@@ -64,7 +64,7 @@ class Maneuver:
         return {p.name: p.default for p in self.parameters}
 
     def checked(self, given: Parameters) -> dict[str, float]:
-        """Return the defaults with `given` on top; raises UsageError for an unknown name or a value out of bounds."""
+        """Return all parameters, defaults replaced by `given`; raises UsageError for an unknown name or a value out of bounds."""
         known = {p.name: p for p in self.parameters}
         for name, value in given.items():
             if name not in known:
@@ -73,12 +73,12 @@ class Maneuver:
                     found=", ".join(f"{p.name} [{p.unit}]" if p.unit else p.name for p in self.parameters),
                     hint=near(name, list(known)),
                 )
-            self._in_bounds(known[name], float(value))
+            self._check_bounds(known[name], float(value))
         return self.defaults | {k: float(v) for k, v in given.items()}
 
-    def _in_bounds(self, parameter: Parameter, value: float) -> None:
-        whole = not parameter.whole or value == np.round(value)
-        if np.isfinite(value) and parameter.low <= value <= parameter.high and whole:
+    def _check_bounds(self, parameter: Parameter, value: float) -> None:
+        is_countable = not parameter.whole or value == np.round(value)
+        if np.isfinite(value) and parameter.low <= value <= parameter.high and is_countable:
             return
         kind = "a whole number" if parameter.whole else "a number"
         raise UsageError(
@@ -90,11 +90,11 @@ class Maneuver:
 
 
 AMPLITUDE_HIGH = 0.7
-"""Largest fin angle a maneuver may ask for, rad: beyond about 40 degrees no fin lifts."""
+"""Largest fin angle of a maneuver, rad: beyond about 40 degrees every fin stalls."""
 
 
 def amplitude(default: float, says: str = "largest fin angle about trim") -> Parameter:
-    """Return the parameter every maneuver has."""
+    """Return the parameter `amplitude`, which every maneuver has."""
     return Parameter("amplitude", "rad", 0.001, AMPLITUDE_HIGH, default, says)
 
 
@@ -104,7 +104,7 @@ def side(p: Parameters) -> float:
 
 
 def levels(time: FloatArray, widths: FloatArray, fins: FloatArray) -> FloatArray:
-    """Return a staircase: `fins[i]` rad for `widths[i]` s one after the other, 0 before and NaN after, (n,)."""
+    """Return a staircase (n,): `fins[i]` rad for `widths[i]` s in turn, 0 before and NaN after."""
     edges = np.concatenate([[0.0], np.cumsum(widths)])
     index = np.searchsorted(edges - 1e-9, time, side="right") - 1
     table = np.concatenate([fins, [np.nan]])

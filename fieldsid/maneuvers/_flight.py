@@ -1,4 +1,4 @@
-"""Fly a maneuver against a plant, one sample at a time: run-up, excitation, recovery by the autopilot, limits kept."""
+"""Simulation of a maneuver on a plant, one sample at a time: run-up, excitation, recovery by the autopilot, within limits."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from fieldsid.numerics.jit import inner, jit
 from fieldsid.records.keys import Key
 
 RATE_HZ = 20.0
-"""Commands a second, unless another rate is asked for."""
+"""Default rate of the commands."""
 
 
 class Plant(Protocol):
-    """What a maneuver is flown on: `size` vehicles side by side that start at rest about their trim."""
+    """The plant of a maneuver: `size` independent vehicles that start at rest about their trim."""
 
     @property
     def size(self) -> int:
-        """How many vehicles there are."""
+        """Number of vehicles."""
         ...
 
     def advance(self, fin: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
-        """Hold the fins (m,) for `step` s and return angle (m,) and rate (m,) at its end, about the start."""
+        """Advance by `step` s with constant fins (m,); return angle (m,), relative to the start, and rate (m,)."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Largest fin angle about trim (rad) and fin rate (rad/s) that are ever commanded."""
+    """Limits of the commanded fin angle about trim (rad) and of its rate (rad/s)."""
 
     fin: float
     fin_rate: float = np.inf
@@ -48,7 +48,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Autopilot:
-    """Brings the vehicle back: fin = -(angle_gain angle + rate_gain rate), at most `fin` rad, the shorter way round."""
+    """Feedback to the initial angle: fin = -(angle_gain angle + rate_gain rate), at most `fin` rad, by the shorter turn."""
 
     angle_gain: Annotated[float, Key("rad of fin per rad.")]
     rate_gain: Annotated[float, Key("rad of fin per rad/s.")]
@@ -56,26 +56,26 @@ class Autopilot:
 
     @property
     def gains(self) -> FloatArray:
-        """Return angle gain, rate gain and largest fin, (3,), as `steer` takes them."""
+        """Return angle gain, rate gain and largest fin, (3,), for `steer`."""
         return np.array([self.angle_gain, self.rate_gain, self.fin])
 
 
 @inner
 def within(fin: float, last: float, reach: float, low: float, high: float) -> float:
-    """Return a fin moved to within `reach` of the last one, then to within its own limits."""
+    """Return a fin angle limited to within `reach` of the last one, then to low .. high."""
     return min(max(min(max(fin, last - reach), last + reach), low), high)
 
 
 @inner
 def steer(
-    asked: float, angle: float, rate: float, last: float, gains: FloatArray, reach: float, low: float, high: float
+    command: float, angle: float, rate: float, last: float, gains: FloatArray, reach: float, low: float, high: float
 ) -> float:  # fmt: skip
-    """Return the fin that is commanded: what is asked for, the autopilot's where that is NaN, moved into the limits.
+    """Return the fin command within its limits: that of the maneuver, or of the autopilot where that is NaN.
 
-    gains (3,) are the autopilot's, see `Autopilot.gains`; the other numbers are those of `within`.
+    gains (3,) are those of `Autopilot.gains`; last, reach, low and high those of `within`.
     """
-    fin = asked
-    if np.isnan(asked):
+    fin = command
+    if np.isnan(command):
         short = (angle + np.pi) % (2.0 * np.pi) - np.pi
         fin = min(max(-(gains[0] * short + gains[1] * rate), -gains[2]), gains[2])
     return within(fin, last, reach, low, high)
@@ -83,21 +83,21 @@ def steer(
 
 @jit
 def steer_all(
-    asked: FloatArray, angle: FloatArray, rate: FloatArray, last: FloatArray, gains: FloatArray, reach: float, most: float,
+    command: FloatArray, angle: FloatArray, rate: FloatArray, last: FloatArray, gains: FloatArray, reach: float, most: float,
     fin: FloatArray, free: BoolArray,
 ) -> int:  # fmt: skip
-    """Fill fin (m,) with what is commanded and free (m,) with where the autopilot commands it; return for how many it does."""
+    """Fill fin (m,) with the limited commands and free (m,) with whether the autopilot steers; return how many it steers."""
     count = 0
     for i in range(fin.shape[0]):
-        free[i] = np.isnan(asked[i])
+        free[i] = np.isnan(command[i])
         count += free[i]
-        fin[i] = steer(asked[i], angle[i], rate[i], last[i], gains, reach, -most, most)
+        fin[i] = steer(command[i], angle[i], rate[i], last[i], gains, reach, -most, most)
     return count
 
 
 @dataclass(frozen=True, slots=True)
 class Flight:
-    """A maneuver as flown: time (n,), fin, angle and rate (n, m), and which samples the autopilot had (n, m)."""
+    """The simulation of a maneuver: time (n,), fin, angle and rate (n, m), and whether the autopilot steers (n, m)."""
 
     time: FloatArray
     fin: FloatArray
@@ -109,7 +109,7 @@ class Flight:
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """Seconds before the excitation and after it, and the sampling rate of the commands."""
+    """Times before and after the excitation in s, and the sampling rate of the commands."""
 
     rate_hz: float = RATE_HZ
     run_up: float = 2.0
@@ -125,10 +125,9 @@ def fly(
     autopilot: Autopilot,
     schedule: Schedule | None = None,
 ) -> Flight:
-    """Return the maneuver flown on a plant: fin over time within the limits, and the motion it made.
+    """Return the simulation of a maneuver on a plant: the fin within its limits, and the motion.
 
-    A rule ends when every vehicle has finished it; the recovery follows. Raises UsageError when the maneuver is
-    shorter than a sample.
+    A rule ends when every vehicle has finished it; the recovery follows.
     """
     schedule = schedule or Schedule()
     values, size = maneuver.checked(parameters), plant.size
@@ -137,19 +136,19 @@ def fly(
     excite = max(length, step)
     count = end = round((schedule.run_up + excite + schedule.recover) * schedule.rate_hz) + 1
     fin, angle, rate = np.zeros((3, count, size))
-    free, asked, last, done = np.zeros((count, size), dtype=bool), np.full(size, np.nan), np.zeros(size), False
+    free, command, last, done = np.zeros((count, size), dtype=bool), np.full(size, np.nan), np.zeros(size), False
     finish = schedule.run_up + excite
     for i in range(count):
         time = i * step
         since = time - schedule.run_up
         begun = since >= -1e-9
         if begun and maneuver.rule is not None:
-            maneuver.rule(numbers, max(since, 0.0), angle[i], rate[i], memory, asked)
+            maneuver.rule(numbers, max(since, 0.0), angle[i], rate[i], memory, command)
         elif begun and maneuver.command is not None:
-            asked[:] = maneuver.command(values, np.array([since]))[0]
-        given = steer_all(asked, angle[i], rate[i], last, gains, limits.fin_rate * step, limits.fin, fin[i], free[i])
+            command[:] = maneuver.command(values, np.array([since]))[0]
+        steered = steer_all(command, angle[i], rate[i], last, gains, limits.fin_rate * step, limits.fin, fin[i], free[i])
         last = fin[i]
-        if begun and not done and (since >= length - 1e-9 or (maneuver.rule is not None and given == size)):
+        if begun and not done and (since >= length - 1e-9 or (maneuver.rule is not None and steered == size)):
             done, finish = True, time
             end = min(count, round((finish + schedule.recover) * schedule.rate_hz) + 1)
         if i >= end - 1:

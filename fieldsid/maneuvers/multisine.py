@@ -1,7 +1,7 @@
-"""A multisine of low crest factor; rudder and elevator take every other harmonic, so both can be flown at once.
+"""A multisine of low crest factor; rudder and elevator have alternate harmonics, so that both can be excited at once.
 
-u(t) = sum over k of A_k cos(2 pi k t / T + phi_k), k = first + channel, first + channel + 2, ... Schroeder's phases
-start, then clip-and-rephase (van der Ouderaa 1988) lowers the crest factor.
+u(t) = sum over k of A_k cos(2 pi k t / T + phi_k), k = first + channel, first + channel + 2, ... The phases start from
+Schroeder's; clipping and taking the new phases in turn (van der Ouderaa 1988) lowers the crest factor.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ MAX_CREST_ITERATIONS = 150
 
 
 def harmonics(p: Parameters) -> tuple[int, ...]:
-    """Return the harmonics of 1/period that lie between the two frequencies and belong to the channel."""
+    """Return the harmonics of 1/period between the two frequencies that belong to the channel."""
     first = max(1, int(np.ceil(p["low_hz"] * p["period"] - 1e-9)))
     last = max(first + 1, int(np.floor(p["high_hz"] * p["period"] + 1e-9)))
     return tuple(range(first + round(p["channel"]), last + 1, 2))

@@ -1,4 +1,4 @@
-"""Amplitude stairs: the same pair of pulses at growing fin angle, to see what is not proportional to it."""
+"""Amplitude stairs: the same pair of pulses at growing fin angle, to excite what is not proportional to it."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""A switched signal: the fin alternates between two angles, each held for a time of its own; what the planner optimises.
+"""A binary signal: the fin alternates between two opposite angles; the planner optimises its switching times.
 
-For a linear model the input of largest information under an amplitude limit sits on the limit almost everywhere, so
-only the switching times are free (Goodwin and Payne 1977, chapter 6).
+For a linear model the input of largest information under an amplitude limit is at the limit almost everywhere, so that only the
+switching times are free (Goodwin and Payne 1977, chapter 6).
 """
 
 from __future__ import annotations

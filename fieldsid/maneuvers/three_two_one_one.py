@@ -1,4 +1,4 @@
-"""The 3-2-1-1: pulses of alternating side and falling length, a wider band than a doublet's."""
+"""The 3-2-1-1: pulses of alternating sign and decreasing length, of a wider bandwidth than a doublet."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SIDES = np.array([1.0, -1.0, 1.0, -1.0])
 
 def _command(p: Parameters, time: FloatArray) -> FloatArray:
     count = round(p["repeats"])
-    # Every other repeat is mirrored: the pattern leaves a net turn of one unit, two of them leave none.
+    # every other repeat is mirrored: one pattern leaves a net turn of one unit, two opposite ones leave none
     sides = np.concatenate([SIDES * (-1.0) ** i for i in range(count)])
     return levels(time, np.tile(LENGTHS, count) * p["unit"], p["amplitude"] * sides)
 

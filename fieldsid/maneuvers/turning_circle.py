@@ -1,4 +1,4 @@
-"""A turning circle: the fin is held until the heading has turned far enough, then put amidships for the pull-out."""
+"""A turning circle: the fin is constant until the heading has changed by a set angle, then amidships for the pull-out."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fieldsid.numerics.jit import jit
 
 @jit
 def _rule(values: FloatArray, time: float, angle: FloatArray, rate: FloatArray, memory: FloatArray, fin: FloatArray) -> None:
-    """Fill the fins; the memory is the time at which the pull-out began."""
+    """Fill the fins (m,); memory (m, 1) is the time at which the pull-out began."""
     most, turn, pull_out, mirrored, duration = values[0], values[1], values[2], values[3], values[4]
     limit = turn if time < duration - pull_out else 0.0
     for i in range(fin.shape[0]):

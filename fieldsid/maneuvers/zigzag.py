@@ -1,4 +1,4 @@
-"""The zig-zag test: the fin is reversed each time the heading has passed a set angle on the side it turns to."""
+"""The zig-zag test: the fin is reversed each time the heading passes a set angle on the side to which the fin turns it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 
 SIDE, SENSE, LEFT = range(3)
-"""Columns of the memory: side of the fin, which way a positive fin turns (0 not known yet), reversals left."""
+"""Columns of the memory: side of the fin, sign of the response to a positive fin (0 if not known yet), remaining reversals."""
 
 
 @jit
@@ -17,7 +17,7 @@ def _rule(values: FloatArray, time: float, angle: FloatArray, rate: FloatArray, 
     most, turn, duration = values[0], values[1], values[4]
     for i in range(fin.shape[0]):
         if abs(angle[i]) >= turn:
-            # The first crossing tells which way the fin turns the vehicle: the sign of the authority need not be known.
+            # The first crossing shows the sign of the authority, which need not be known before.
             if memory[i, SENSE] == 0.0:
                 memory[i, SENSE] = np.sign(angle[i]) * memory[i, SIDE]
             if angle[i] * memory[i, SENSE] * memory[i, SIDE] > 0.0:

@@ -1,1 +1,1 @@
-"""Planning: which maneuver buys the accuracy that is wanted inside the envelope, and which one tells rivals apart."""
+"""Planning: maneuvers within the safety envelope that reach the accuracy goals, or that discriminate rival models."""

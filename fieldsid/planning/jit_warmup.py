@@ -1,4 +1,4 @@
-"""The compile warm-up of planning; what a fit needs too is compiled by fitting/jit_warmup.py at the same time."""
+"""The compile warm-up of planning; fitting/jit_warmup.py compiles the kernels that a fit needs as well."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from fieldsid.noise.kalman.univariate import three_states
 from fieldsid.planning.flight.rule_flight import OperatingPointPlant, closed_loop
 
 SHARED_KERNELS = (linear_sensitivities, three_states)
-"""What planning calls of what every fit needs."""
+"""The kernels of a fit that planning calls."""
 
 
 def compile_planning() -> None:
-    """Call once, on vehicles that do not move, what planning calls thousands of times."""
-    # more than one of each, so that what is handed over lies in memory as it does when planning
+    """Call each kernel of planning once, on vehicles at rest."""
+    # sizes above one, so that the arrays have the memory layout of a real plan
     m, n, zero = 2, 3, np.zeros
     steps = np.full(n - 1, 0.05)
     drive, c = zero((m, n - 1, len(DRIVES))), zero((m, len(CONSTANTS)))

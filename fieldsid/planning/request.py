@@ -1,4 +1,4 @@
-"""From what a user typed to a plan: vehicle, prior, envelope and accuracy goals, checked against each other."""
+"""A plan from command-line options: vehicle, prior, envelope and accuracy goals, checked against each other."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from fieldsid.planning.specify.quantities import parse_accuracy_goals, parse_are
 from fieldsid.vehicle import Vehicle, find_vehicle, load_vehicle
 
 FIN_MAX = 0.26
-"""Fin limit (rad) where no vehicle says another: beyond it the fins of the paper's vehicle stall."""
+"""Default fin limit (rad): beyond it the fins of the paper's vehicle stall."""
 HEADING_MAX, PITCH_MAX = float(np.radians(60.0)), float(np.radians(30.0))
 PRIOR, NONE = "torpedo", "none"
 
@@ -51,7 +51,7 @@ UNLIMITED = EnvelopeLimits()
 
 @dataclass(frozen=True, slots=True)
 class PlanRequest:
-    """Everything that was typed, None where nothing was."""
+    """The options of `sysid plan`, None where they are not given."""
 
     axis: Axis | None = None
     speeds: str | None = None
@@ -73,57 +73,57 @@ class PlanRequest:
 
     @property
     def legs(self) -> int:
-        """How many legs will be searched, for a progress bar."""
+        """Number of legs, for a progress bar."""
         return 1 if self.speeds is None else max(1, len(parse_speeds(self.speeds)))
 
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """A plan, the prior it was made on, and the maneuvers that tell effects apart, where that was asked."""
+    """A plan, its prior, and the discriminating maneuvers of `--separate`."""
 
     plan: Plan
     model: Model
     found: tuple[Separation, ...] = ()
 
 
-def planned(asked: PlanRequest, step: Callable[[], None] = lambda: None, ready: Callable[[], None] = lambda: None) -> Made:
-    """Return the requested plan; raises FieldsidError with what would be possible.
+def planned(options: PlanRequest, step: Callable[[], None] = lambda: None, ready: Callable[[], None] = lambda: None) -> Made:
+    """Return the requested plan; raises FieldsidError with a possible request in the hint.
 
     `ready` is called once the request has been read and checked, before the search.
     """
-    vehicle = _vehicle(asked.vehicle)
-    if asked.seed < 0:
-        raise UsageError("a seed is a whole number from zero", found=f"--seed {asked.seed}", hint="write `--seed 1`")
-    if asked.model is not None and asked.prior is not None:
-        raise UsageError("`--model` and `--prior` both say what is believed", found=f"--prior {asked.prior}", hint="give one")
-    if asked.separate or asked.diagnosis is not None:
-        return _separating(asked, vehicle, step, ready)
-    model = _signed(prior_model(asked), vehicle)
-    request = _request(asked, model, vehicle, asked.axis or model.axis)
+    vehicle = _vehicle(options.vehicle)
+    if options.seed < 0:
+        raise UsageError("a seed is a whole number from zero", found=f"--seed {options.seed}", hint="write `--seed 1`")
+    if options.model is not None and options.prior is not None:
+        raise UsageError("`--model` and `--prior` both say what is believed", found=f"--prior {options.prior}", hint="give one")
+    if options.separate or options.diagnosis is not None:
+        return _separating(options, vehicle, step, ready)
+    model = _signed(prior_model(options), vehicle)
+    request = _request(options, model, vehicle, options.axis or model.axis)
     known = [*NAMES[request.axis].base, *(c.name for e in effects_of(model) for c in e.shared)]
-    request = replace(request, want=parse_accuracy_goals(asked.want, known) if asked.want else {})
+    request = replace(request, want=parse_accuracy_goals(options.want, known) if options.want else {})
     ready()
     plan = make_plan(model, request, step)
     return Made(plan, model)
 
 
-def _request(asked: PlanRequest, model: Model, vehicle: Vehicle | None, axis: Axis, window_s: float = WINDOW.length) -> Request:
+def _request(options: PlanRequest, model: Model, vehicle: Vehicle | None, axis: Axis, window_s: float = WINDOW.length) -> Request:
     return Request(
         axis=axis,
-        speeds=_speeds(asked, model),
-        envelope=envelope_of(axis, asked.limiting, vehicle),
+        speeds=_speeds(options, model),
+        envelope=envelope_of(axis, options.limiting, vehicle),
         want={},
-        minutes=asked.minutes,
-        window=Window(window_s if asked.window is None else asked.window, rate_hz=asked.rate),
-        run_up_s=_run_up(asked.run_up),
-        radius=_with_circles(asked),
-        open_loop=asked.open_loop,
-        seed=asked.seed,
+        minutes=options.minutes,
+        window=Window(window_s if options.window is None else options.window, rate_hz=options.rate),
+        run_up_s=_run_up(options.run_up),
+        radius=_with_circles(options),
+        open_loop=options.open_loop,
+        seed=options.seed,
         vehicle=vehicle.name if vehicle else "vehicle",
         fins=vehicle.fins.of(axis.value) if vehicle and vehicle.fins else None,
         slowest=vehicle.speed_min_m_s if vehicle else None,
         fastest=vehicle.speed_max_m_s if vehicle else None,
-        course=_course(asked.course),
+        course=_course(options.course),
     )
 
 
@@ -131,30 +131,32 @@ def _course(text: str | None) -> float | None:
     return None if text is None else angles.parse_angle(text, "--course", angles.TURN, angles.TURN) % angles.TURN
 
 
-def _with_circles(asked: PlanRequest) -> bool:
-    """Return whether circles are requested; raises UsageError where a limit excludes every circle, or rules are excluded."""
-    if asked.radius and asked.limiting.heading not in (None, NONE):
+def _with_circles(options: PlanRequest) -> bool:
+    """Return whether circles are requested; raises UsageError with a heading limit or `--open-loop`, which exclude them."""
+    if options.radius and options.limiting.heading not in (None, NONE):
         raise UsageError(
             "a circle turns through more than a whole turn, whatever `--max-heading` says",
-            found=f"--radius --max-heading {asked.limiting.heading}",
+            found=f"--radius --max-heading {options.limiting.heading}",
             hint="leave `--max-heading` out, or plan the circles apart: `sysid plan --radius`",
         )
-    if asked.radius and asked.open_loop:
+    if options.radius and options.open_loop:
         raise UsageError(
             "a circle follows the heading: it is not open loop", found="--radius --open-loop", hint="leave one of the two out"
         )
-    return asked.radius
+    return options.radius
 
 
-def prior_model(asked: PlanRequest) -> Model:
+def prior_model(options: PlanRequest) -> Model:
     """Return the prior model: a model or prior file, else the named prior of the axis."""
-    return named_prior(asked.prior or PRIOR, asked.axis or Axis.YAW) if asked.model is None else load_believed(asked.model)
+    return (
+        named_prior(options.prior or PRIOR, options.axis or Axis.YAW) if options.model is None else load_believed(options.model)
+    )
 
 
 def envelope_of(axis: Axis, limiting: EnvelopeLimits, vehicle: Vehicle | None) -> Envelope:
-    """Return the envelope: what was typed, then the vehicle's own limits, then the defaults; raises UsageError.
+    """Return the envelope from the options, else the limits of the vehicle, else the defaults; raises UsageError.
 
-    `none` takes the default of heading or pitch away.
+    The option `none` removes the default limit of heading or pitch.
     """
     area = parse_area(limiting.area)
     band = parse_band(limiting.depth_band)
@@ -193,43 +195,43 @@ def envelope_of(axis: Axis, limiting: EnvelopeLimits, vehicle: Vehicle | None) -
 def _limit(
     text: str | None, option: str, most: tuple[float, float], default: float | None = None, beyond: str = ""
 ) -> float | None:
-    """Return the limit that was typed, None for `none`, the default where nothing was.
+    """Return the limit of an option in rad, None for `none`, the default without the option.
 
-    `most` is the largest bare and with a unit, rad; `beyond` is the hint for who wants more than can be meant.
+    `most` are the largest angles without and with a unit, in rad; `beyond` is an additional hint for a larger one.
     """
     if text is None:
         return default
     return None if text.strip().lower() == NONE else angles.parse_angle(text, option, *most, beyond)
 
 
-def _separating(asked: PlanRequest, vehicle: Vehicle | None, step: Callable[[], None], ready: Callable[[], None]) -> Made:
-    if asked.want:
+def _separating(options: PlanRequest, vehicle: Vehicle | None, step: Callable[[], None], ready: Callable[[], None]) -> Made:
+    if options.want:
         raise UsageError(
             "`--want` asks for accuracy, not for what tells effects apart",
-            found=f"--want {asked.want}",
+            found=f"--want {options.want}",
             hint="leave it out, or plan the two apart",
         )
-    rivals = _rivals(asked, vehicle)
-    request = _request(asked, rivals[0], vehicle, rivals[0].axis, LONGEST_WINDOW_S)
+    rivals = _rivals(options, vehicle)
+    request = _request(options, rivals[0], vehicle, rivals[0].axis, LONGEST_WINDOW_S)
     ready()
     plan, found = separating_plan(rivals, request, step)
     return Made(plan, rivals[0], tuple(found))
 
 
-def _rivals(asked: PlanRequest, vehicle: Vehicle | None) -> tuple[Model, ...]:
-    if asked.diagnosis is None:
-        model = _signed(prior_model(asked), vehicle)
-        # no speeds: a base that is unstable alone may be held by what is added to it
-        return rivals_named(checked_prior(model, asked.axis or model.axis, ()), asked.separate)
-    if asked.model is not None or asked.prior is not None:
+def _rivals(options: PlanRequest, vehicle: Vehicle | None) -> tuple[Model, ...]:
+    if options.diagnosis is None:
+        model = _signed(prior_model(options), vehicle)
+        # stability is not checked here: an added effect may bound the rate of an unstable base model
+        return rivals_named(checked_prior(model, options.axis or model.axis, ()), options.separate)
+    if options.model is not None or options.prior is not None:
         raise UsageError(
             "a diagnosis says itself what is believed", found="`--from` with `--model` or `--prior`", hint="leave the latter out"
         )
-    rivals = rivals_from(asked.diagnosis, asked.separate)
-    if asked.axis not in (None, rivals[0].axis):
+    rivals = rivals_from(options.diagnosis, options.separate)
+    if options.axis not in (None, rivals[0].axis):
         raise UsageError(
-            f"`{asked.diagnosis}` is a diagnosis of {rivals[0].axis.value}",
-            found=f"--axis {asked.axis.value}" if asked.axis else "",
+            f"`{options.diagnosis}` is a diagnosis of {rivals[0].axis.value}",
+            found=f"--axis {options.axis.value}" if options.axis else "",
             hint=f"write `--axis {rivals[0].axis.value}`, or leave it out",
         )
     return rivals
@@ -240,7 +242,7 @@ def _vehicle(path: Path | None) -> Vehicle | None:
 
 
 def _signed(model: Model, vehicle: Vehicle | None) -> Model:
-    """Return a prior with the sign of its authority turned to the vehicle's convention, where one is stated."""
+    """Return a prior whose authority has the sign of the vehicle's convention, where that is stated."""
     if vehicle is None or model.method != "prior":
         return model
     side = vehicle.positive_rudder if model.axis is Axis.YAW else vehicle.positive_elevator
@@ -251,9 +253,9 @@ def _signed(model: Model, vehicle: Vehicle | None) -> Model:
     return replace(model, values={**model.values, name: sign * abs(model.values[name])})
 
 
-def _speeds(asked: PlanRequest, model: Model) -> tuple[float, ...]:
-    if asked.speeds is not None:
-        return parse_speeds(asked.speeds)
+def _speeds(options: PlanRequest, model: Model) -> tuple[float, ...]:
+    if options.speeds is not None:
+        return parse_speeds(options.speeds)
     if not np.isfinite(model.law.reference):
         raise UsageError("the model does not say at what speed it holds", found="no speed", hint="give `--speeds 1.0,1.4,1.8`")
     return (round(model.law.reference, 3),)

@@ -1,4 +1,4 @@
-"""A file that planning reads: whatever is missing or wrong in it is told with the file's name."""
+"""Errors of files that planning reads: every missing or wrong part is reported with the name of the file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fieldsid.records.check import ShapeError
 
 @contextmanager
 def whole_file(path: Path, kind: str, hint: str) -> Iterator[None]:
-    """Raise ArtifactError where what is read of a file in this block is missing or wrong."""
+    """Raise ArtifactError with the file's name where reading its content in this block fails."""
     try:
         yield
     except FieldsidError as error:

@@ -191,8 +191,8 @@ def _extrapolated(checked: Verification) -> list[str]:
     """Return a sentence on the steps that turn more tightly than the runs, whose forces were not measured; empty without such."""
     if checked.extrapolated is None:
         return []
-    size, held = checked.extrapolated
-    step = f"a {degrees(size):.0f} deg step turns tighter than any run, which held {100 * held:.0f} % of its curvature"
+    size, covered = checked.extrapolated
+    step = f"a {degrees(size):.0f} deg step turns tighter than any run, which held {100 * covered:.0f} % of its curvature"
     if not checked.unsaid:
         return [f"{step}: how it settles is extrapolated until a turn that tight is flown"]
     large = f"a {degrees(steps_of(checked.schedule)[2]):.0f} deg step"

@@ -68,7 +68,7 @@ def with_measurement(row: TurnRow, measured: Sequence[MeasuredRow], rudder: floa
     """
     for m in measured:
         is_usable = row.method != "maneuvering" or abs(m.turn.circle.turned) >= LEAST_TURN_FOR_CURRENT_RAD
-        if is_usable and m.entered(row.speed, row.side) and m.held(rudder):
+        if is_usable and m.has_entry(row.speed, row.side) and m.has_rudder(rudder):
             return replace(
                 row,
                 radius=m.turn.circle.radius,

@@ -102,11 +102,11 @@ class MeasuredRow(Displayed):
     predicted: Annotated[Number, Key("The prediction.", "predicted_m")]
     predicted95: Annotated[Interval, Key("Its band.")]
 
-    def entered(self, speed: float, side: str) -> bool:
+    def has_entry(self, speed: float, side: str) -> bool:
         """Whether the circle is to this side, with this entry speed (m/s) to within EQUAL_TURN_SHARE."""
         return self.turn.side == side and abs(self.turn.entry_speed - speed) <= EQUAL_TURN_SHARE * speed
 
-    def held(self, rudder: float) -> bool:
+    def has_rudder(self, rudder: float) -> bool:
         """Whether the circle was flown with this rudder (rad) to within EQUAL_TURN_SHARE."""
         return abs(abs(self.turn.fin) - rudder) <= EQUAL_TURN_SHARE * rudder
 
@@ -152,9 +152,9 @@ class TurnPrediction(Plotted):
         """Yield why measured circles belong to none of the rows, and what would make them."""
         fins: dict[str, list[str]] = {}
         for m in self.measured:
-            if not m.held(self.rudder_max) and any(m.entered(r.speed, r.side) for r in rows):
+            if not m.has_rudder(self.rudder_max) and any(m.has_entry(r.speed, r.side) for r in rows):
                 fins.setdefault(f"{abs(m.turn.fin):.3g}", []).append(m.turn.run)
-            elif m.held(self.rudder_max) and isnan(m.turn.entry_speed) and _to(rows, m.turn.side):
+            elif m.has_rudder(self.rudder_max) and isnan(m.turn.entry_speed) and _to(rows, m.turn.side):
                 yield f"{m.turn.run} begins in the turn, so that its speed before it is not known: log the approach too"
         for fin, names in fins.items():
             counted = f"{', '.join(names)} count{'s' * (len(names) == 1)} as measured"

@@ -1,1 +1,1 @@
-"""What is believed before the dive: a model with its covariance."""
+"""The prior before a dive: a model with its covariance."""

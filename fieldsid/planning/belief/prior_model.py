@@ -48,22 +48,22 @@ def _model_of(body: Mapping[str, Any]) -> Model:
     axis = Axis(body["axis"])
     effects = tuple(str(e) for e in body.get("effects", []))
     known = [*NAMES[axis].base, *(c.name for e in effects for c in pick_effect(e).shared)]
-    given = body["parameters"]
+    entries = body["parameters"]
     for name in known:
-        if name not in given:
+        if name not in entries:
             hint = f"add `{name}: {{value: .., std_error: ..}}`"
-            raise ArtifactError(f"the prior has no parameter `{name}`", found=", ".join(given), hint=hint)
-    for name in given:
+            raise ArtifactError(f"the prior has no parameter `{name}`", found=", ".join(entries), hint=hint)
+    for name in entries:
         if name not in known:
             raise ArtifactError(f"the prior has an unknown parameter `{name}`", found=", ".join(known), hint=near(name, known))
-    values = {n: finite_number(given[n]["value"], n) for n in known}
-    errors = {n: finite_number(given[n].get("std_error", 0.0), f"{n}: std_error") for n in known}
+    values = {n: finite_number(entries[n]["value"], n) for n in known}
+    errors = {n: finite_number(entries[n].get("std_error", 0.0), f"{n}: std_error") for n in known}
     free = tuple(n for n in known if errors[n] > 0)
     return Model(
         axis=axis,
         effects=effects,
         values=values,
-        units={n: str(given[n].get("unit", "")) for n in known},
+        units={n: str(entries[n].get("unit", "")) for n in known},
         free=free,
         covariance=np.diag([errors[n] ** 2 for n in free]) if free else np.zeros((0, 0)),
         law=SpeedLaw(
@@ -93,7 +93,7 @@ def _noise(body: Mapping[str, Any]) -> Noise:
 
 FOLDER = "plan/priors"
 WIDEST = 3.0
-"""Draws stay within this many standard deviations."""
+"""Draws are clipped at this many standard deviations."""
 
 
 def prior_names() -> tuple[str, ...]:
@@ -111,9 +111,9 @@ def named_prior(name: str, axis: Axis) -> Model:
 
 
 def checked_prior(model: Model, axis: Axis, speeds: tuple[float, ...]) -> Model:
-    """Return the model if it can be flown on the axis at the speeds.
+    """Return the model if it is of the axis and can be simulated at the speeds.
 
-    Raises UsageError for the wrong axis, ModelError when the motion about straight and level grows by itself.
+    Raises UsageError for the wrong axis, ModelError when the straight run is unstable and no damping bounds the rate.
     """
     if model.axis is not axis:
         raise UsageError(
@@ -121,11 +121,11 @@ def checked_prior(model: Model, axis: Axis, speeds: tuple[float, ...]) -> Model:
             found=f"axis: {model.axis.value}",
             hint=f"plan that axis: `--axis {model.axis.value}`",
         )
-    held = _held(model)
+    rate_is_bounded = any(e.bounds_rate(model.values) for e in effects_of(model))
     for speed in speeds:
         values = {"damping_exponent": model.law.damping_exponent} | dict(model.values)
         growth = growth_of(base_at(model, speed), combined_core(effects_of(model), values, model.law.scale(speed)))
-        if growth > 0 and not held:
+        if growth > 0 and not rate_is_bounded:
             names = NAMES[axis]
             raise ModelError(
                 f"the prior is unstable at {speed:g} m/s: a disturbance doubles every {np.log(2) / growth:.2g} s",
@@ -136,10 +136,10 @@ def checked_prior(model: Model, axis: Axis, speeds: tuple[float, ...]) -> Model:
 
 
 def growth_of(base: Base, core: Core) -> float:
-    """Return the growth rate (1/s) of the least stable motion; a free heading counts as neither stable nor unstable.
+    """Return the largest real part (1/s) of the poles on a straight run, zero where none is unstable.
 
-    y'' = -a y' - k y + m x, x' = -c x - c_r y': sway may hold a hull that is unstable without it, and upset another. What goes
-    with the angle itself, as a compass's error, pulls to one heading and moves no other motion.
+    y'' = -a y' - k y + m x, x' = -c x - c_r y': the cross state may stabilise a hull or destabilise it. The terms in the angle
+    itself, such as that of a current, are left out.
     """
     constants = np.array([core], dtype=np.float64)
     constants[:, OF_ANGLE] = 0.0
@@ -149,39 +149,35 @@ def growth_of(base: Base, core: Core) -> float:
     return worst if worst > 1e-6 else 0.0
 
 
-def _held(model: Model) -> bool:
-    return any(e.bounds_rate(model.values) for e in effects_of(model))
-
-
 def draws_of(model: Model, count: int, seed: int) -> tuple[Model, ...]:
-    """Return models drawn from the prior: damping and authority keep their sign, coefficients their bounds."""
+    """Return models drawn from the prior; damping and authority keep their sign, coefficients stay within their bounds."""
     if not model.free or not np.isfinite(model.covariance).all():
         return (model,) * count
     rng = np.random.default_rng(seed)
     values, vectors = np.linalg.eigh(model.covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     steps = np.clip(rng.standard_normal((count, len(model.free))), -WIDEST, WIDEST) @ root.T
-    return tuple(_moved(model, dict(zip(model.free, step.tolist(), strict=True))) for step in steps)
+    return tuple(_shifted(model, dict(zip(model.free, step.tolist(), strict=True))) for step in steps)
 
 
 def corner(model: Model, sigmas: Mapping[str, float]) -> Model:
-    """Return the model with some free values moved by a number of their standard errors."""
-    return _moved(model, {n: s * model.std_error(n) for n, s in sigmas.items() if n in model.free})
+    """Return the model with some free values shifted by a number of their standard errors (`sigmas`)."""
+    return _shifted(model, {n: s * model.std_error(n) for n, s in sigmas.items() if n in model.free})
 
 
-def _moved(model: Model, moves: Mapping[str, float]) -> Model:
+def _shifted(model: Model, shifts: Mapping[str, float]) -> Model:
     names = NAMES[model.axis]
     bounds = {c.name: (c.low, c.high) for e in effects_of(model) for c in e.coefficients}
     values = dict(model.values)
-    for name, move in moves.items():
+    for name, shift in shifts.items():
         value = values[name]
         if name in (names.damping, names.authority) and value != 0.0:
-            # A relative error taken in the logarithm: a gain or a damping never changes its sign.
-            values[name] = value * float(np.exp(move / value))
+            # a shift of the logarithm, so that authority and damping keep their sign
+            values[name] = value * float(np.exp(shift / value))
         elif name in bounds:
-            values[name] = float(np.clip(value + move, *bounds[name]))
+            values[name] = float(np.clip(value + shift, *bounds[name]))
         else:
-            values[name] = value + move
+            values[name] = value + shift
     if names.stiffness is not None and model.values[names.stiffness] > 0:
         values[names.stiffness] = max(values[names.stiffness], 0.0)
     law = model.law
@@ -192,10 +188,10 @@ def _moved(model: Model, moves: Mapping[str, float]) -> Model:
 
 
 def scales_of(model: Model, base: Base, fin: float) -> dict[str, float]:
-    """Return what an error of each parameter is measured against.
+    """Return the scale by which the error of each parameter is divided.
 
-    The value itself; where the prior does not even know its sign, the prior's standard error; for the trim, the
-    moment of full fin (rad/s^2).
+    It is the absolute value, or the standard error of the prior where that is larger; for the trim it is the moment of the full
+    fin (rad/s^2).
     """
     names = NAMES[model.axis]
     at_speed = {names.damping: base.damping, names.authority: base.authority, names.trim: base.authority * fin}

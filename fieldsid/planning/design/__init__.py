@@ -1,1 +1,1 @@
-"""The optimal maneuver: Fisher information, objective, search, legs, plan."""
+"""The optimal experiment: Fisher information, objective, search, legs, plan."""

@@ -1,4 +1,4 @@
-"""Build one leg: the best maneuver searched at a speed, or a circle for the radius, kept inside the envelope; what it buys."""
+"""The design of one leg: the best maneuver at a speed, or a circle for the turning radius, within the envelope."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.belief.prior_model import draws_of, scales_of
 from fieldsid.planning.design.leg import CIRCLE, Expected, Leg, turn_back_s
 from fieldsid.planning.design.objective import Objective, information_of, make_objective
-from fieldsid.planning.design.optimise import SMALLEST, Scored, as_switched, catalogue, largest_paying, switching
+from fieldsid.planning.design.optimise import SMALLEST, Scored, as_switched, at_best_amplitude, catalogue, switching
 from fieldsid.planning.flight.excitation import LONGEST_WINDOW_S, Excitation, Window, fits, flown
 from fieldsid.planning.flight.operating_point import operating_point
 from fieldsid.planning.flight.rule_flight import fly_operating_points
@@ -24,16 +24,16 @@ from fieldsid.planning.safety.monte_carlo import Ensemble, draw_ensemble, fly_en
 from fieldsid.runtime.parallel_map import parallel_map
 
 DESIGN_PROBABILITY_SHARE = 0.7
-"""A plan aims at this part of the accepted probability, so that other draws of the prior keep to it as well."""
+"""Share of the accepted probability that a plan may use, so that other draws of the prior stay within it as well."""
 COARSE_DRAWS, DRAWS, ERROR_DRAWS = 200, 500, 12
 FINALISTS = 3
 RUN_UP_S = 10.0
-"""Straight run before the window of each leg, unless another is asked for."""
+"""Default straight run before the window of each leg."""
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What all legs of a plan share; `open_loop` leaves out maneuvers that follow the motion."""
+    """The settings that all legs of a plan share; `open_loop` excludes maneuvers whose rule depends on the motion."""
 
     model: Model
     envelope: Envelope
@@ -47,152 +47,156 @@ class Setting:
 def best_leg(setting: Setting, speed: float, known: Sequence[Excitation] = ()) -> Leg:
     """Return the leg of one speed; `known` are maneuvers that were best at other speeds.
 
-    A maneuver that follows the motion is taken only where a list of its expected fins can be sent to a vehicle. Raises
-    UsageError when nothing stays inside the envelope.
+    A maneuver whose rule depends on the motion is chosen only where its expected fin angles can be flown open loop. Raises
+    UsageError when no maneuver stays within the envelope.
     """
-    judge = make_objective(setting.model, speed, setting.envelope, setting.window, setting.want, setting.run_up_s)
-    crowd = ensemble_at(judge, setting)
-    straight = fly_list(crowd.first(COARSE_DRAWS), np.zeros(0), judge.envelope, judge.autopilot, judge.run_up)
-    if np.mean(straight.outside(judge.envelope)) > setting.envelope.share:
-        raise _nothing_inside(judge)  # as the autopilot steers straight on
-    # what was best elsewhere, each at the angle that pays here
-    scored = [largest_paying(judge, c) for c in known if fits(c, judge.window)] if known else catalogue(judge)
+    objective = make_objective(setting.model, speed, setting.envelope, setting.window, setting.want, setting.run_up_s)
+    ensemble = ensemble_at(objective, setting)
+    straight = fly_list(ensemble.first(COARSE_DRAWS), np.zeros(0), objective.envelope, objective.autopilot, objective.run_up)
+    if np.mean(straight.outside(objective.envelope)) > setting.envelope.share:
+        raise _nothing_inside(objective)  # not even the autopilot on a straight run stays inside
+    # the best maneuvers of other speeds, each at its best amplitude here
+    scored = [at_best_amplitude(objective, c) for c in known if fits(c, objective.window)] if known else catalogue(objective)
     scored = [s for s in scored if s.candidate.record.rule is None or not setting.open_loop]
-    seeds = [s for s in (as_switched(judge, c.candidate) for c in scored) if s is not None]
-    scored.append(switching(judge, seeds, setting.seed))
+    seeds = [s for s in (as_switched(objective, c.candidate) for c in scored) if s is not None]
+    scored.append(switching(objective, seeds, setting.seed))
     scored.sort(key=lambda s: s.cost)
-    leg = _best_of(judge, setting, crowd, scored)
+    leg = _best_of(objective, setting, ensemble, scored)
     if not leg.flown_from_list_in(setting.envelope):
-        leg = _best_of(judge, setting, crowd, [s for s in scored if s.candidate.record.rule is None])
+        leg = _best_of(objective, setting, ensemble, [s for s in scored if s.candidate.record.rule is None])
     costs = {s.candidate.spec: float(np.exp(s.cost)) for s in scored[:6]}
     return replace(leg, alternatives=costs)
 
 
-def _best_of(judge: Objective, setting: Setting, crowd: Ensemble, scored: Sequence[Scored]) -> Leg:
-    """Return the leg of the best of some maneuvers, best first, at the angles at which it stays inside; raises UsageError."""
-    few = crowd.first(COARSE_DRAWS)
-    kept = (enforce_envelope(judge, setting, few, s.candidate) for s in scored)
-    finalists = islice((c for c in kept if c is not None), FINALISTS)
-    inside = [Scored(c, judge.cost(c, margin=10.0)) for c in finalists]
-    best = enforce_envelope(judge, setting, crowd, min(inside, key=lambda s: s.cost).candidate) if inside else None
+def _best_of(objective: Objective, setting: Setting, ensemble: Ensemble, scored: Sequence[Scored]) -> Leg:
+    """Return the leg of the best of some maneuvers (`scored`, best first), reduced to stay within the envelope; or UsageError."""
+    few = ensemble.first(COARSE_DRAWS)
+    reduced = (enforce_envelope(objective, setting, few, s.candidate) for s in scored)
+    finalists = islice((c for c in reduced if c is not None), FINALISTS)
+    inside = [Scored(c, objective.cost(c, margin=10.0)) for c in finalists]
+    best = enforce_envelope(objective, setting, ensemble, min(inside, key=lambda s: s.cost).candidate) if inside else None
     if best is None:
-        raise _nothing_inside(judge)
-    return leg_of(judge, setting, best, crowd)
+        raise _nothing_inside(objective)
+    return leg_of(objective, setting, best, ensemble)
 
 
-def _nothing_inside(judge: Objective) -> UsageError:
-    limits = judge.envelope
+def _nothing_inside(objective: Objective) -> UsageError:
+    limits = objective.envelope
     return UsageError(
-        f"no maneuver stays inside the envelope at {judge.scene.speed:g} m/s with a probability of {1 - limits.share:.0%}",
-        found=", ".join(f"{k} {v:.3g}" for k, v in limits.rooms().items()),
+        f"no maneuver stays inside the envelope at {objective.scene.speed:g} m/s with a probability of {1 - limits.share:.0%}",
+        found=", ".join(f"{k} {v:.3g}" for k, v in limits.excursion_limits().items()),
         hint=f"{limits.widening()}, or narrow the prior with a first model: `--model MODEL`",
     )
 
 
-def ensemble_at(judge: Objective, setting: Setting) -> Ensemble:
+def ensemble_at(objective: Objective, setting: Setting) -> Ensemble:
     """Return the draws of the prior that the legs at an objective's speed are simulated with."""
-    return draw_ensemble(setting.model, judge.scene.speed, judge.window, DRAWS, setting.seed + 1)
+    return draw_ensemble(setting.model, objective.scene.speed, objective.window, DRAWS, setting.seed + 1)
 
 
-def risk_of(judge: Objective, crowd: Ensemble, candidate: Excitation) -> tuple[float, dict[str, float]]:
+def risk_of(objective: Objective, ensemble: Ensemble, candidate: Excitation) -> tuple[float, dict[str, float]]:
     """Return the share of draws that leave the envelope, and each excursion's 95 % quantile."""
-    flights = fly_ensemble(crowd, candidate, judge.envelope, judge.autopilot, judge.run_up)
+    flights = fly_ensemble(ensemble, candidate, objective.envelope, objective.autopilot, objective.run_up)
     excursions = {name: float(np.quantile(values, 0.95)) for name, values in flights.excursions.items()}
-    return float(np.mean(flights.outside(judge.envelope))), excursions
+    return float(np.mean(flights.outside(objective.envelope))), excursions
 
 
 def leg_of(
-    judge: Objective, setting: Setting, candidate: Excitation, crowd: Ensemble | None = None, purpose: str = "parameters"
+    objective: Objective, setting: Setting, candidate: Excitation, ensemble: Ensemble | None = None, purpose: str = "parameters"
 ) -> Leg:
-    """Return an excitation as a leg: expected errors, with those of the paper's pulses for comparison, excursions, risk."""
-    scene, crowd = judge.scene, crowd or ensemble_at(judge, setting)
-    risk, excursions = risk_of(judge, crowd, candidate)
-    nominal = _nominal(judge, candidate)
-    blind = float("nan")
+    """Return the leg of an excitation: expected errors, those of the paper's pulses for comparison, excursions and risk."""
+    scene, ensemble = objective.scene, ensemble or ensemble_at(objective, setting)
+    risk, excursions = risk_of(objective, ensemble, candidate)
+    nominal = _nominal(objective, candidate)
+    open_loop_risk = float("nan")
     if nominal.size:
-        blind = float(np.mean(fly_list(crowd, nominal, judge.envelope, judge.autopilot, judge.run_up).outside(judge.envelope)))
-    turn = turn_back_s(scene.base.damping, scene.base.authority, judge.envelope.fin)
+        open_loop_risk = float(
+            np.mean(
+                fly_list(ensemble, nominal, objective.envelope, objective.autopilot, objective.run_up).outside(objective.envelope)
+            )
+        )
+    turn = turn_back_s(scene.base.damping, scene.base.authority, objective.envelope.fin)
     return Leg(
         speed=scene.speed,
         candidate=candidate,
-        window=judge.window,
+        window=objective.window,
         run_up_s=setting.run_up_s,
         turn_s=turn,
-        autopilot=judge.autopilot,
-        expected=expected_errors(judge, setting, candidate),
+        autopilot=objective.autopilot,
+        expected=expected_errors(objective, setting, candidate),
         excursions=excursions,
         break_probability=risk,
         purpose=purpose,
         nominal=nominal,
-        replay_risk=blind,
+        replay_risk=open_loop_risk,
     )
 
 
-def _nominal(judge: Objective, candidate: Excitation) -> FloatArray:
-    """Return the fin about trim a rule is expected to ask for on the prior's mean, NaN where the autopilot steers, (n,)."""
+def _nominal(objective: Objective, candidate: Excitation) -> FloatArray:
+    """Return the fin angle about trim (n,) rad that a rule commands for the prior's mean, NaN where the autopilot steers."""
     if candidate.record.rule is None:
         return np.zeros(0)
-    window = judge.window
+    window = objective.window
     flight = fly_operating_points(
-        [judge.scene], candidate.record, candidate.parameters, limits=judge.envelope.limits, autopilot=judge.autopilot,
-        schedule=Schedule(window.rate_hz, window.lead, window.recover),
+        [objective.scene], candidate.record, candidate.parameters, limits=objective.envelope.limits,
+        autopilot=objective.autopilot, schedule=Schedule(window.rate_hz, window.lead, window.recover),
     )  # fmt: skip
     return np.where(flight.recovering[:, 0], np.nan, flight.fin[:, 0])[: window.time.size]
 
 
-def expected_errors(judge: Objective, setting: Setting, candidate: Excitation) -> dict[str, Expected]:
-    """Return what one pass of a candidate tells about every parameter, with the spread over draws of the prior."""
-    speed = judge.scene.speed
-    mean = judge.expected(candidate)
+def expected_errors(objective: Objective, setting: Setting, candidate: Excitation) -> dict[str, Expected]:
+    """Return the expected error of every parameter after one pass of a candidate, with its spread over draws of the prior."""
+    speed = objective.scene.speed
+    mean = objective.expected(candidate)
     spread = []
     for drawn in draws_of(setting.model, ERROR_DRAWS, setting.seed + 2):
         scene = operating_point(drawn, speed)
-        response = flown(scene, candidate, judge.window, judge.envelope.limits, judge.autopilot)
+        response = flown(scene, candidate, objective.window, objective.envelope.limits, objective.autopilot)
         spread.append(information_of(scene, response).std_errors())
-    base = pulses(judge)
-    before = {} if base is None else judge.expected(base).std_errors()
-    scales = scales_of(setting.model, judge.scene.base, judge.envelope.fin)
-    values = {**judge.scene.model.values, **judge.scene.model.at_speed(speed)}
+    reference = pulses(objective)
+    baseline = {} if reference is None else objective.expected(reference).std_errors()
+    scales = scales_of(setting.model, objective.scene.base, objective.envelope.fin)
+    values = {**objective.scene.model.values, **objective.scene.model.at_speed(speed)}
     high = {n: _high([e[n] for e in spread]) for n in mean.names}
     errors = mean.std_errors()
-    return {n: Expected(values[n], e, high[n], e / scales[n], before.get(n, float("nan"))) for n, e in errors.items()}
+    return {n: Expected(values[n], e, high[n], e / scales[n], baseline.get(n, float("nan"))) for n, e in errors.items()}
 
 
 def _high(errors: list[float]) -> float:
-    """Return the 5/6 quantile of errors, one of them where some are infinite: nothing lies between those."""
+    """Return the 5/6 quantile of errors, without interpolation where some are infinite."""
     return float(np.quantile(errors, 5 / 6, method="linear" if np.isfinite(errors).all() else "higher"))
 
 
-def pulses(judge: Objective) -> Excitation | None:
-    """Return the paper's pulses in a window, shortened to fit, within the fin limit; None where there is no room."""
+def pulses(objective: Objective) -> Excitation | None:
+    """Return the paper's pulses within the fin limit, shortened to fit the window; None where they do not fit."""
     maneuver = pick_maneuver("square_pulses")
-    fin = judge.envelope.fin
-    spare = judge.window.excitation - 4.0 * maneuver.defaults["width"]
+    fin = objective.envelope.fin
+    spare = objective.window.excitation - 4.0 * maneuver.defaults["width"]
     if spare < 0:
         return None
     values = {"amplitude": min(0.26, fin), "second": min(0.15, fin), "recovery": min(maneuver.defaults["recovery"], spare)}
     return Excitation(maneuver.name, maneuver.checked(values))
 
 
-def enforce_envelope(judge: Objective, setting: Setting, crowd: Ensemble, candidate: Excitation) -> Excitation | None:
-    """Return the candidate with its angles lowered until enough of the draws keep the envelope, None where none is inside."""
+def enforce_envelope(objective: Objective, setting: Setting, ensemble: Ensemble, candidate: Excitation) -> Excitation | None:
+    """Return the candidate with its angles reduced until enough draws stay within the envelope; None where that is impossible."""
     share, inside, outside = 1.0, 0.0, 1.0
     for step in range(7):
-        trial = lowered(candidate, share)
+        trial = with_reduced_angles(candidate, share)
         if trial is None:
             break
-        if risk_of(judge, crowd, trial)[0] <= setting.envelope.share * DESIGN_PROBABILITY_SHARE:
+        if risk_of(objective, ensemble, trial)[0] <= setting.envelope.share * DESIGN_PROBABILITY_SHARE:
             inside = share
             if share == 1.0:
                 break
         else:
             outside = share
         share = 0.5 * (inside + outside) if inside > 0 or step > 2 else share * 0.7
-    return lowered(candidate, inside) if inside > 0 else None
+    return with_reduced_angles(candidate, inside) if inside > 0 else None
 
 
-def lowered(candidate: Excitation, share: float) -> Excitation | None:
-    """Return a candidate with every angle it may choose times `share`; None below its bounds."""
+def with_reduced_angles(candidate: Excitation, share: float) -> Excitation | None:
+    """Return a candidate with each of its tuned angles multiplied by `share`; None below their bounds."""
     changes = {p.name: candidate.parameters[p.name] * share for p in candidate.record.parameters if p.unit == "rad" and p.tuned}
     bounds = {p.name: p.low for p in candidate.record.parameters}
     if share < SMALLEST or any(v < bounds[n] for n, v in changes.items()):
@@ -201,17 +205,17 @@ def lowered(candidate: Excitation, share: float) -> Excitation | None:
 
 
 SETTLED_TURN = 2.5 * np.pi
-"""Heading (rad) to turn through: half a circle to settle, one to be measured on."""
+"""Heading change (rad) of a circle: half a turn to settle, a full one for the measurement."""
 LARGEST_TURN = MOST_TURNS * 2.0 * np.pi
-"""Heading (rad) at which a circle is ended: one that is flown by the clock turns farther the stronger the fin is."""
+"""Heading change (rad) at which a circle is aborted: with commands over time a stronger fin turns farther."""
 SLACK = 1.6
 
 
 def circle_legs(setting: Setting, speeds: Sequence[float]) -> list[Leg]:
     """Return a circle at the fin limit to port and one to starboard at every speed.
 
-    A circle turns through more than a whole turn: its heading has a limit of its own. All other limits hold.
-    Raises UsageError when a circle does not fit them.
+    The heading limit of the envelope is replaced by LARGEST_TURN; all other limits hold. Raises UsageError when a circle violates
+    them.
     """
     return parallel_map(lambda turn: _circle(setting, *turn), [(speed, side) for speed in speeds for side in (0.0, 1.0)])
 
@@ -225,8 +229,8 @@ def _circle(setting: Setting, speed: float, mirrored: float) -> Leg:
     length = float(np.clip(SLACK * SETTLED_TURN / rate + pull_out, 20.0, LONGEST_WINDOW_S - around.lead - around.recover))
     values = {"amplitude": free.fin, "turn": SETTLED_TURN, "pull_out": pull_out, "mirrored": mirrored, "duration": length}
     window = replace(around, length=length + around.lead + around.recover)
-    judge = make_objective(setting.model, speed, free, window, {}, setting.run_up_s)
-    leg = leg_of(judge, setting, Excitation(maneuver.name, maneuver.checked(values)), purpose=CIRCLE)
+    objective = make_objective(setting.model, speed, free, window, {}, setting.run_up_s)
+    leg = leg_of(objective, setting, Excitation(maneuver.name, maneuver.checked(values)), purpose=CIRCLE)
     leg = replace(leg, heading=LARGEST_TURN)
     if leg.break_probability > free.share:
         raise _no_room(leg, setting)
@@ -234,20 +238,20 @@ def _circle(setting: Setting, speed: float, mirrored: float) -> Leg:
 
 
 def _no_room(leg: Leg, setting: Setting) -> UsageError:
-    """Return the error of a circle that leaves the envelope, with what would hold it."""
+    """Return the error for a circle that leaves the envelope, with the limits that it needs."""
     far, limits = leg.excursions, setting.envelope
-    wanted = []
+    options = []
     if limits.area_length is not None:
-        wanted.append(f"`--area {max(1.1 * far['along'], limits.area_length):.0f}x{2.2 * far['across']:.0f}`")
+        options.append(f"`--area {max(1.1 * far['along'], limits.area_length):.0f}x{2.2 * far['across']:.0f}`")
     if limits.area_length is not None and far["behind"] > 0.0:
-        wanted.append(f"`--run-up {setting.run_up_s + 1.1 * far['behind'] / leg.speed:.0f}`")
+        options.append(f"`--run-up {setting.run_up_s + 1.1 * far['behind'] / leg.speed:.0f}`")
     if limits.track is not None:
-        wanted.append(f"`--max-track {1.1 * far['track']:.0f}`")
+        options.append(f"`--max-track {1.1 * far['track']:.0f}`")
     return UsageError(
         f"a full-fin circle at {leg.speed:g} m/s does not fit the envelope",
         found=f"{leg.break_probability:.0%} leave it: {far['along']:.0f} m along, {far['across']:.0f} m to a side, "
         f"{far['behind']:.0f} m behind the start, roll {far['roll']:.2g} rad",
-        hint=f"give {' and '.join(wanted)}, or leave `--radius` out"
-        if wanted
+        hint=f"give {' and '.join(options)}, or leave `--radius` out"
+        if options
         else "leave `--radius` out, or give a smaller `--fin-max`",
     )

@@ -1,4 +1,4 @@
-"""A leg of a plan: one maneuver at one speed, what it buys, what it takes, and how it is ended early."""
+"""A leg of a plan: one maneuver at one speed, its expected errors, its duration, and its abort conditions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from fieldsid.display import Brief
 from fieldsid.maneuvers import Autopilot, within
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.planning.flight.excitation import Excitation, Window, asked_of
+from fieldsid.planning.flight.excitation import Excitation, Window, fin_command
 from fieldsid.planning.safety.envelope import Envelope, Excursion
 from fieldsid.records.keys import INLINE, Key, Number
 from fieldsid.rounding import number
@@ -23,14 +23,14 @@ CIRCLE = "turn radius"
 TURN_LAG = math.log(10.0)
 """Time constants to 90 % of a turn's rate (the paper's u-turn)."""
 LARGEST_SHARE = 0.5
-"""Share of a value that its standard error may be before the value may as well be zero."""
+"""Relative standard error from which on a value is not significantly different from zero."""
 
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """What a parameter will be known to: value, standard error, and the error 5 of 6 draws of the prior stay below.
+    """The expected accuracy of a parameter: value, standard error, and its 5/6 quantile over draws of the prior.
 
-    `relative` is the error over what it is measured against: the value or, where that may be zero, another scale (prior.py).
+    `relative` is the standard error over the scale of the parameter (`belief.prior_model.scales_of`).
     """
 
     value: Annotated[float, Key("The value that is believed, at the leg's speed.")]
@@ -40,13 +40,13 @@ class Expected:
     baseline: Annotated[Number, Key("Standard error that the usual pulses of the same length give.")] = float("nan")
 
     def over(self, passes: int) -> Expected:
-        """Return the expectation after several passes."""
+        """Return the expected accuracy after several passes."""
         root = float(np.sqrt(passes))
         return Expected(self.value, self.std_error / root, self.std_error_high / root, self.relative / root, self.baseline)
 
 
 def error_in_words(value: float, std_error: float, relative: float) -> str:
-    """Return a standard error in per cent of the value it is measured against, else, and where that may be zero, as it is."""
+    """Return a standard error in words: in per cent where its scale is the value and it is significant, else in its unit."""
     of_value = np.isclose(relative * abs(value), std_error, rtol=1e-6, atol=0.0)
     return f"{100.0 * relative:.1f} %" if of_value and relative < LARGEST_SHARE else f"+/- {number(std_error, 2)}"
 
@@ -56,8 +56,8 @@ class Leg(Brief):
     """One maneuver at one speed (m/s), flown `passes` times: run-up, window, turn back.
 
     `expected` is for all passes together. `excursions` are 95 % quantiles over the prior (rad, m). `nominal` (n,) is the fin
-    about trim in rad that a rule is expected to command, NaN where the autopilot steers. `replay_risk` is the probability that
-    these commands, flown open loop, leave the envelope. `heading` (rad) is a limit of its own, in place of the plan's.
+    angle about trim in rad that a rule commands for the prior's mean, NaN where the autopilot steers; `replay_risk` is the
+    probability that these commands, flown open loop, leave the envelope. `heading` (rad) replaces the heading limit of the plan.
     """
 
     speed: Annotated[float, Key("Speed through the water.", "speed_m_s")]
@@ -95,7 +95,7 @@ class Leg(Brief):
 
     @property
     def pass_s(self) -> float:
-        """Seconds of one pass: run-up, window and the turn to the next."""
+        """Duration of one pass in s: run-up, window and the turn to the next."""
         return self.run_up_s + self.window.length + self.turn_s
 
     @property
@@ -109,11 +109,11 @@ class Leg(Brief):
         return self.duration_s * self.speed
 
     def envelope_in(self, envelope: Envelope) -> Envelope:
-        """Return the limits that hold on this leg of a plan with an envelope."""
+        """Return the envelope of a plan with this leg's heading limit."""
         return envelope if self.heading is None else replace(envelope, heading=self.heading)
 
     def flown_from_list_in(self, envelope: Envelope) -> bool:
-        """Whether a list of fins may be sent for it: it is one, or that of its rule keeps inside as often as is asked."""
+        """Whether it can be flown as a list of fin angles: it is open loop, or the replay of its rule has an accepted risk."""
         return self.open_loop or self.replay_risk <= envelope.share
 
     @property
@@ -123,30 +123,30 @@ class Leg(Brief):
 
 
 def commands_of(leg: Leg, envelope: Envelope) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return time (n,) s, fin about trim (n,) rad and 1 where the autopilot steers (n,), never outside the limits.
+    """Return time (n,) s, fin angle about trim (n,) rad within the limits, and 1 where the autopilot steers (n,).
 
-    Where a rule flies, the fin is the one expected on the prior's mean. Whatever a plan holds, the fin is moved
-    into the envelope's angle and rate limits here.
+    For a rule the fin angle is the one for the prior's mean. The angle and rate limits of the envelope are applied here, whatever
+    a plan contains.
     """
     time = leg.window.time
     limits = envelope.limits
     if leg.open_loop:
-        asked = asked_of(leg.candidate, leg.window)
+        command = fin_command(leg.candidate, leg.window)
     else:
-        asked = np.full(time.size, np.nan)
+        command = np.full(time.size, np.nan)
         n = min(time.size, leg.nominal.size)
-        asked[:n] = leg.nominal[:n]
-    steered = np.isnan(asked)
-    wanted = np.where(steered, 0.0, asked)
+        command[:n] = leg.nominal[:n]
+    steered = np.isnan(command)
+    command = np.where(steered, 0.0, command)
     fin = np.empty(time.size)
     last, reach = 0.0, limits.fin_rate / leg.window.rate_hz
     for i in range(time.size):
-        fin[i] = last = within(wanted[i], last, reach, -limits.fin, limits.fin)
+        fin[i] = last = within(command[i], last, reach, -limits.fin, limits.fin)
     return time, fin, steered.astype(np.float64)
 
 
 def turn_back_s(damping: float, authority: float, fin: float) -> float:
-    """Return the seconds of a u-turn at a fin angle: pi a / (b d) + 2.31 / a (the paper's formula), at most 120."""
+    """Return the duration (s) of a u-turn at a fin angle d: pi a / (b d) + 2.31 / a (the paper's formula), at most 120 s."""
     if damping <= 0.02:
         return 120.0
     return float(min(np.pi * damping / (abs(authority) * fin) + TURN_LAG / damping, 120.0))
@@ -158,7 +158,7 @@ SLOWEST_SHARE = 0.6
 
 @dataclass(frozen=True, slots=True)
 class Abort:
-    """End the maneuver when a signal leaves `limit`: `kind` is deviation (from its value at the start), below, above or time."""
+    """An abort condition: a signal exceeds `limit`. `kind` is deviation (from the value at the start), below, above or time."""
 
     signal: Annotated[str, Key("The signal, or `time_s`.")]
     kind: Annotated[str, Key("How it is compared.", of=Literal["deviation", "below", "above", "time"])]
@@ -168,7 +168,7 @@ class Abort:
 
 
 def aborts_of(leg: Leg, envelope: Envelope) -> tuple[Abort, ...]:
-    """Return the abort conditions of a leg, one per limit that holds on it, the time first."""
+    """Return the abort conditions of a leg, one for each limit, the time first."""
     limits = leg.envelope_in(envelope)
     found = [
         Abort("time_s", "time", leg.window.length + GRACE_S, "s", "the window is over"),
@@ -181,11 +181,11 @@ def aborts_of(leg: Leg, envelope: Envelope) -> tuple[Abort, ...]:
     if limits.depth_low is not None and limits.depth_high is not None:
         found.append(Abort("depth_m", "above", limits.depth_high, "m", "too deep"))
         found.append(Abort("depth_m", "below", limits.depth_low, "m", "too shallow"))
-    return (*found, *_of_place(leg, limits))
+    return (*found, *_position_aborts(leg, limits))
 
 
-def _of_place(leg: Leg, limits: Envelope) -> tuple[Abort, ...]:
-    """Return the conditions on the place: x along the leg from the window's start, y to starboard of its line."""
+def _position_aborts(leg: Leg, limits: Envelope) -> tuple[Abort, ...]:
+    """Return the conditions on the position: x along the leg from the window's start, y to starboard of its line."""
     found = []
     sides = [s for s in (limits.track, None if limits.area_width is None else 0.5 * limits.area_width) if s is not None]
     if sides:

@@ -1,8 +1,8 @@
-"""Score a candidate: expected errors over the prior's spread by Fisher's information, and how much of the envelope it uses.
+"""The objective of an experiment: expected errors by the Fisher information over the prior, and excursions within the envelope.
 
-The information of a whitened free run is J^T J with J its sensitivities; whitening is the same Kalman filter the
-prediction-error estimator uses, so coloured sensor noise and a disturbance moment count in full (Ljung 1999, 7.4).
-Initial states and per-run coefficients are estimated too; their share is taken out by the Schur complement.
+The information of a whitened free run is J^T J with J its sensitivities. Whitening is by the Kalman filter of the
+prediction-error estimator, so that coloured sensor noise and a disturbance moment are accounted for (Ljung 1999, 7.4). Initial
+states and per-run coefficients are nuisance parameters, removed by the Schur complement.
 """
 
 from __future__ import annotations
@@ -30,44 +30,44 @@ from fieldsid.planning.safety.monte_carlo import ROLL_SPREAD
 
 RIDGE = 1e-12
 SMALLEST_PIVOT = 1e-10
-"""Share of its own information below which a parameter is fully correlated with the others."""
+"""Smallest eigenvalue of the information in correlation form above which a direction counts as identifiable."""
 
 
 @dataclass(frozen=True, slots=True)
 class Information:
-    """Information matrix (p, p) on `names` at one speed, nuisances taken out; add the matrices of independent runs."""
+    """The information matrix (p, p) of the parameters `names` at one speed, without nuisances; those of independent runs add."""
 
     names: tuple[str, ...]
     matrix: FloatArray
 
     def std_errors(self) -> dict[str, float]:
-        """Return the standard error of every parameter, infinite where the flight cannot tell it from others."""
+        """Return the standard error of every parameter, infinite where it is not identifiable from the flight."""
         errors = np.full(len(self.names), np.inf)
-        shown = np.flatnonzero(np.diag(self.matrix) > 0.0)
-        if np.isfinite(self.matrix).all() and shown.size:
-            part = self.matrix[np.ix_(shown, shown)]
+        excited = np.flatnonzero(np.diag(self.matrix) > 0.0)
+        if np.isfinite(self.matrix).all() and excited.size:
+            part = self.matrix[np.ix_(excited, excited)]
             scale = np.sqrt(np.diag(part))
             values, vectors = np.linalg.eigh(part / np.outer(scale, scale))
-            lost = values < SMALLEST_PIVOT
-            variance = (vectors[:, ~lost] ** 2 / values[~lost]).sum(axis=1)
-            hidden = (vectors[:, lost] ** 2).sum(axis=1) > 1e-6
-            errors[shown] = np.where(hidden, np.inf, np.sqrt(variance)) / scale
+            singular = values < SMALLEST_PIVOT
+            variance = (vectors[:, ~singular] ** 2 / values[~singular]).sum(axis=1)
+            hidden = (vectors[:, singular] ** 2).sum(axis=1) > 1e-6
+            errors[excited] = np.where(hidden, np.inf, np.sqrt(variance)) / scale
         return dict(zip(self.names, errors.tolist(), strict=True))
 
 
 def problem_of(scene: OperatingPoint, record: Record) -> tuple[Problem, FloatArray]:
-    """Return the estimation problem of a scene's model on one record, and its vector of true values (N,)."""
+    """Return the estimation problem of an operating point's model on one record, and its vector of true values (N,)."""
     layout, x = _layout(scene)
     return Problem((record,), layout), x.copy()
 
 
 @lru_cache(maxsize=32)
 def _layout(scene: OperatingPoint) -> tuple[ParameterLayout, FloatArray]:
-    """Return the slots of a scene's model on one run, referred to the model's own speed, and the true values."""
+    """Return the parameter layout of an operating point's model on one run, at the model's reference speed, and true values."""
     law = scene.model.law
     reference = law.reference if np.isfinite(law.reference) else scene.speed
-    made = layout_of([scene.record(np.linspace(0.0, 0.2, 3), np.zeros(3))], scene.axis, scene.effects)
-    layout = replace(made, groups=replace(made.groups, speeds=(reference,), reference=0, trim_of_fin=law.trim_of_fin))
+    plain = layout_of([scene.record(np.linspace(0.0, 0.2, 3), np.zeros(3))], scene.axis, scene.effects)
+    layout = replace(plain, groups=replace(plain.groups, speeds=(reference,), reference=0, trim_of_fin=law.trim_of_fin))
     names, ratio = NAMES[scene.axis], scene.speed / reference
     at_reference = {names.damping: scene.base.damping / ratio, names.authority: scene.base.authority / ratio**2}
     at_reference[names.trim] = scene.base.trim / (ratio**2 if law.trim_of_fin else 1.0)
@@ -76,7 +76,7 @@ def _layout(scene: OperatingPoint) -> tuple[ParameterLayout, FloatArray]:
 
 
 def information_of(scene: OperatingPoint, response: Response) -> Information:
-    """Return the information of one flight on the shared parameters, in the units they have at the flight's speed."""
+    """Return the information of one flight on the shared parameters, which are those at the speed of the flight."""
     record = scene.record(response.time, response.command + scene.trim_fin)
     problem, x = problem_of(scene, record)
     _, normal, _, _ = normal_equations(problem, x, scene.model.noise, range(len(x)))
@@ -101,16 +101,17 @@ def _without_nuisances(normal: FloatArray, shared: int) -> FloatArray:
 
 CORNER = 1.3
 PENALTY = 30.0
-LOST = 1e6
-"""Standard errors at which the envelope is tried; cost of leaving it per share of a limit; cost of an unknown parameter."""
+LARGEST_ERROR = 1e6
+"""Standard errors of the corners of the prior; penalty for an excursion beyond a limit, over the limit; largest weighted error,
+for a parameter that is not identifiable."""
 
 
 @dataclass(frozen=True, slots=True)
 class Objective:
     """The objective of excitations at one speed.
 
-    `scenes`: operating points of the prior's mean and of its corners. `weights`: 1 / (scale x relative accuracy goal) of each
-    parameter; the cost of an excitation is its largest weighted error, 1 where every goal is just met.
+    `scenes` are the operating points of the prior's mean and of its corners, `weights` 1 / (scale x relative accuracy goal) of
+    each parameter: a largest weighted error of 1 means that every goal is just met. `run_up` is in m.
     """
 
     scenes: tuple[OperatingPoint, ...]
@@ -126,7 +127,7 @@ class Objective:
         return self.scenes[0]
 
     def cost(self, candidate: Excitation, margin: float = 1.0) -> float:
-        """Return the mean log of the worst weighted error over the scenes, plus a penalty outside margin x envelope."""
+        """Return the mean over `scenes` of the log of the largest weighted error, plus a penalty outside margin x envelope."""
         responses = flown_all(self.scenes, candidate, self.window, self.envelope.limits, self.autopilot)
         angle, rate = (np.stack([getattr(r, part) for r in responses], axis=1) for part in ("angle", "rate"))
         far = excursions_of(
@@ -137,10 +138,10 @@ class Objective:
         return float(np.mean(np.log(errors)) + PENALTY * max(0.0, np.max(used(far, self.envelope)) / margin - 1.0))
 
     def worst(self, information: Information) -> float:
-        """Return the largest weighted error of an information."""
+        """Return the largest weighted error for an information matrix."""
         errors = information.std_errors()
         worst = max(errors[n] * w for n, w in self.weights.items())
-        return float(min(worst, LOST)) if np.isfinite(worst) else LOST
+        return float(min(worst, LARGEST_ERROR)) if np.isfinite(worst) else LARGEST_ERROR
 
     def expected(self, candidate: Excitation) -> Information:
         """Return the information of a candidate at the prior's mean."""
@@ -157,13 +158,13 @@ def make_objective(
     corners = [{damping: -CORNER, authority: _outward(scene)}, {damping: CORNER, authority: -_outward(scene)}]
     scenes = (scene, *(operating_point(corner(model, c), speed) for c in corners))
     scales = scales_of(model, scene.base, envelope.fin)
-    # at steady speed, thrust and depth no maneuver shows what follows them
-    steady = {c.name for e in scene.effects if e.needs for c in e.coefficients}
-    wanted = dict(want) or {n: 1.0 for n in scales if n not in steady}
-    weights = {n: 1.0 / (scales[n] * w) for n, w in wanted.items()}
+    # at constant speed, thrust and depth the effects of these signals are not identifiable
+    unexcited = {c.name for e in scene.effects if e.needs for c in e.coefficients}
+    goals = dict(want) or {n: 1.0 for n in scales if n not in unexcited}
+    weights = {n: 1.0 / (scales[n] * goal) for n, goal in goals.items()}
     return Objective(scenes, envelope, window, autopilot_of(scene.base, envelope.limits), weights, run_up_s * speed)
 
 
 def _outward(scene: OperatingPoint) -> float:
-    """Return the sign of the move that makes the fin stronger, times the corner's distance."""
+    """Return the shift of the authority, in standard errors, at the corner of the prior with the stronger fin."""
     return CORNER if scene.base.authority > 0 else -CORNER

@@ -1,7 +1,7 @@
-"""The search for the best candidate: every catalogued maneuver tuned coordinate by coordinate, switching times optimised.
+"""The search for the best excitation: a coordinate search over each maneuver of the catalogue, and optimal switching times.
 
-Differential evolution over the holds of a switched signal (Storn and Price 1997), started from the best the
-catalogue gives, then a pattern search on the holds.
+The switching times of a binary signal are found by differential evolution (Storn and Price 1997), started from the best maneuvers
+of the catalogue, and refined by a pattern search.
 """
 
 from __future__ import annotations
@@ -15,110 +15,112 @@ from fieldsid.maneuvers import Maneuver, Parameter, all_maneuvers, pick_maneuver
 from fieldsid.maneuvers.switched import COUNT, HOLDS
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.design.objective import Objective
-from fieldsid.planning.flight.excitation import Excitation, asked_of, fits
+from fieldsid.planning.flight.excitation import Excitation, fin_command, fits
 
 LEFT_OUT = ("switched", "turning_circle")
-"""Searched apart; a full circle is flown for the radius, not for parameters."""
+"""Maneuvers that are not in this search: `switched` has one of its own, and a circle serves the turning radius."""
 STEP_FACTOR = 1.35
 SHORTEST_HOLD_S = 0.25
 MEMBERS, ROUNDS, PATTERN_ROUNDS = 20, 12, 2
 SMALLEST = 0.02
-"""Of an amplitude, over the fin limit."""
+"""Least amplitude over the fin limit."""
 DIFFERENTIAL_WEIGHT, CROSSOVER_SHARE = 0.7, 0.8
-"""Step of the coordinate search, as a factor; shortest hold; differential weight and crossover share."""
+"""Differential weight F and crossover probability CR."""
 SEARCH_MARGIN = 0.9
-"""Share of the envelope the search may use: some draws of the prior go further than its corners, and a signal that has to be
-made smaller for them afterwards is no longer the best."""
+"""Share of the envelope that the search may use: some draws of the prior have larger excursions than its corners, and a signal
+that is reduced for them afterwards is no longer optimal."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scored:
-    """A candidate and its cost, lower is better."""
+    """A candidate and its cost; lower is better."""
 
     candidate: Excitation
     cost: float
 
 
-def catalogue(judge: Objective) -> list[Scored]:
+def catalogue(objective: Objective) -> list[Scored]:
     """Return every maneuver of the catalogue that fits the window, tuned, best first."""
     found = []
     for maneuver in all_maneuvers().values():
         if maneuver.name in LEFT_OUT:
             continue
-        start = _started(maneuver, judge)
+        start = _start_of(maneuver, objective)
         if start is not None:
-            found.append(_coordinate_search(judge, start))
+            found.append(_coordinate_search(objective, start))
     return sorted(found, key=lambda s: s.cost)
 
 
-def switching(judge: Objective, seeds: list[Excitation], seed: int) -> Scored:
-    """Return the best switched signal found from some seeds, which take part themselves, its holds in whole samples."""
+def switching(objective: Objective, seeds: list[Excitation], seed: int) -> Scored:
+    """Return the best binary signal, found from a population that contains the seeds; its holds are multiples of the sample."""
     rng = np.random.default_rng(seed)
     base = pick_maneuver("switched")
-    limit = judge.envelope.fin
+    limit = objective.envelope.fin
 
     def candidate(x: FloatArray) -> Excitation:
         values = dict(zip(HOLDS, x[:COUNT].tolist(), strict=True))
         return Excitation("switched", {**base.defaults, **values, "amplitude": float(x[COUNT]) * limit})
 
     def cost(x: FloatArray) -> float:
-        return judge.cost(candidate(x), margin=SEARCH_MARGIN)
+        return objective.cost(candidate(x), margin=SEARCH_MARGIN)
 
-    room = judge.window.excitation
-    members = _population(judge, seeds, room, rng)
+    room = objective.window.excitation
+    members = _population(objective, seeds, room, rng)
     costs = np.array([cost(m) for m in members])
     for _ in range(ROUNDS):
         _evolve(members, costs, cost, room, rng)
     best = int(np.argmin(costs))
     x, _ = _pattern_search(members[best], float(costs[best]), cost, room)
-    tidy = candidate(np.append(merge_short_holds(x[:COUNT], 1.0 / judge.window.rate_hz), x[COUNT]))
-    return Scored(tidy, judge.cost(tidy))
+    rounded = candidate(np.append(merge_short_holds(x[:COUNT], 1.0 / objective.window.rate_hz), x[COUNT]))
+    return Scored(rounded, objective.cost(rounded))
 
 
 def merge_short_holds(holds: FloatArray, step: float) -> FloatArray:
-    """Return holds in whole samples of `step` s; one too short for a servo to follow joins its two neighbours."""
-    # Whole samples by the instants of the jumps, downwards: the sum never outgrows the room there is.
+    """Return holds as multiples of `step` s; one that is too short for a servo to follow is merged with its two neighbours."""
+    # the times of the jumps are rounded down, so that the sum does not exceed the window
     edges = np.floor(np.cumsum(holds) / step + 1e-6) * step
-    left = [float(h) for h in np.diff(edges, prepend=0.0)]
-    while len(left) > 1 and min(left) < SHORTEST_HOLD_S:
-        i = int(np.argmin(left))
-        if i in (0, len(left) - 1):
-            # At an end there is one neighbour only, of the other side: the time is given up.
-            del left[i]
+    merged = [float(h) for h in np.diff(edges, prepend=0.0)]
+    while len(merged) > 1 and min(merged) < SHORTEST_HOLD_S:
+        i = int(np.argmin(merged))
+        if i in (0, len(merged) - 1):
+            # at an end the only neighbour has the other sign: the hold is dropped
+            del merged[i]
         else:
-            left[i - 1 : i + 2] = [sum(left[i - 1 : i + 2])]
-    return np.round(np.pad(left, (0, holds.size - len(left))), 9)
+            merged[i - 1 : i + 2] = [sum(merged[i - 1 : i + 2])]
+    return np.round(np.pad(merged, (0, holds.size - len(merged))), 9)
 
 
-def _population(judge: Objective, seeds: list[Excitation], room: float, rng: np.random.Generator) -> FloatArray:
+def _population(objective: Objective, seeds: list[Excitation], room: float, rng: np.random.Generator) -> FloatArray:
     """Return members (MEMBERS, COUNT + 1): holds in s and amplitude over the fin limit."""
-    scale = 1.0 / max(judge.scene.base.damping, 0.3)
+    scale = 1.0 / max(objective.scene.base.damping, 0.3)
     holds = np.exp(rng.normal(np.log(2.0 * scale), 0.6, (MEMBERS, COUNT)))
     members = np.column_stack([holds, rng.uniform(0.5, 1.0, MEMBERS)])
     for i, one in enumerate(seeds[: MEMBERS // 2]):
-        members[i] = [*(one.parameters[h] for h in HOLDS), one.parameters["amplitude"] / judge.envelope.fin]
+        members[i] = [*(one.parameters[h] for h in HOLDS), one.parameters["amplitude"] / objective.envelope.fin]
     return _legal(members, room)
 
 
-def as_switched(judge: Objective, candidate: Excitation) -> Excitation | None:
-    """Return a candidate that only jumps between two opposite angles as a switched signal, None for any other."""
+def as_switched(objective: Objective, candidate: Excitation) -> Excitation | None:
+    """Return a candidate whose fin jumps between two opposite angles as the maneuver `switched`; None for any other."""
     if candidate.record.rule is not None:
         return None
-    asked = asked_of(candidate, judge.window)
-    start, end = (round(t * judge.window.rate_hz) for t in (judge.window.lead, judge.window.length - judge.window.recover))
-    fin = np.trim_zeros(np.nan_to_num(asked[start : end + 1]), "b")
+    command = fin_command(candidate, objective.window)
+    start, end = (
+        round(t * objective.window.rate_hz) for t in (objective.window.lead, objective.window.length - objective.window.recover)
+    )
+    fin = np.trim_zeros(np.nan_to_num(command[start : end + 1]), "b")
     if np.unique(np.round(np.abs(fin), 6)).size != 1:
         return None
     side = np.sign(fin)
     edges = np.flatnonzero(np.diff(side)) + 1
-    holds = np.diff(np.concatenate([[0], edges, [fin.size]]))[:COUNT] / judge.window.rate_hz
+    holds = np.diff(np.concatenate([[0], edges, [fin.size]]))[:COUNT] / objective.window.rate_hz
     base = pick_maneuver("switched").defaults | dict.fromkeys(HOLDS, 0.0)
     values = dict(zip(HOLDS, holds.tolist(), strict=False))
     return Excitation("switched", {**base, **values, "amplitude": candidate.parameters["amplitude"]})
 
 
 def _legal(members: FloatArray, room: float) -> FloatArray:
-    """Return members with holds that fit the room and an amplitude from SMALLEST on."""
+    """Return members with their holds scaled to fit `room` s and an amplitude of SMALLEST or more."""
     out = np.abs(members)
     out[..., COUNT] = np.clip(out[..., COUNT], SMALLEST, 1.0)
     out[..., :COUNT] = np.minimum(out[..., :COUNT], room)
@@ -130,7 +132,7 @@ def _legal(members: FloatArray, room: float) -> FloatArray:
 def _evolve(
     members: FloatArray, costs: FloatArray, cost: Callable[[FloatArray], float], room: float, rng: np.random.Generator
 ) -> None:
-    """Move a population on by one round of differential evolution (best/1 and rand/1 in turn)."""
+    """Advance a population by one generation of differential evolution (best/1 or rand/1 at random)."""
     count = costs.size
     for i in range(count):
         a, b, c = rng.choice(count, 3, replace=False)
@@ -160,20 +162,20 @@ def _pattern_search(x: FloatArray, lowest: float, cost: Callable[[FloatArray], f
     return x, lowest
 
 
-def _started(maneuver: Maneuver, judge: Objective) -> Excitation | None:
-    """Return a maneuver at its defaults, as long as the window allows; None where even its shortest does not fit."""
-    room = judge.window.excitation
-    values = maneuver.defaults | {"amplitude": judge.envelope.fin}
+def _start_of(maneuver: Maneuver, objective: Objective) -> Excitation | None:
+    """Return a maneuver at its defaults, shortened to fit the window; None where even the shortest does not fit."""
+    room = objective.window.excitation
+    values = maneuver.defaults | {"amplitude": objective.envelope.fin}
     if "second" in values:
-        values["second"] = min(values["second"], judge.envelope.fin)
+        values["second"] = min(values["second"], objective.envelope.fin)
     for name in ("duration", "period"):
         if name in values:
             values[name] = room
-    if maneuver.name == "multisine" and judge.scene.axis.value == "pitch":
+    if maneuver.name == "multisine" and objective.scene.axis.value == "pitch":
         values["channel"] = 1.0
     candidate = Excitation(maneuver.name, maneuver.checked(values))
     for name in ("recovery", "repeats", "steps", "width", "unit", "hold"):
-        while name in values and not fits(candidate, judge.window):
+        while name in values and not fits(candidate, objective.window):
             low = next(p.low for p in maneuver.parameters if p.name == name)
             whole = next(p.whole for p in maneuver.parameters if p.name == name)
             value = candidate.parameters[name]
@@ -181,26 +183,26 @@ def _started(maneuver: Maneuver, judge: Objective) -> Excitation | None:
             if lower < low or lower >= value:
                 break
             candidate = candidate.with_(**{name: lower})
-    return candidate if fits(candidate, judge.window) else None
+    return candidate if fits(candidate, objective.window) else None
 
 
-def _coordinate_search(judge: Objective, start: Excitation) -> Scored:
-    """Return the best of a maneuver after one step of each of its parameters in turn."""
-    best = largest_paying(judge, start)
+def _coordinate_search(objective: Objective, start: Excitation) -> Scored:
+    """Return the best excitation after one step in each parameter of a maneuver in turn."""
+    best = at_best_amplitude(objective, start)
     for parameter in (p for p in start.record.parameters if p.tuned):
-        for value in moves_of(parameter, best.candidate.parameters[parameter.name], judge.envelope.fin):
+        for value in moves_of(parameter, best.candidate.parameters[parameter.name], objective.envelope.fin):
             trial = best.candidate.with_(**{parameter.name: value})
-            if fits(trial, judge.window) and (cost := judge.cost(trial)) < best.cost:
+            if fits(trial, objective.window) and (cost := objective.cost(trial)) < best.cost:
                 best = Scored(trial, cost)
                 break
     return best
 
 
-def largest_paying(judge: Objective, candidate: Excitation) -> Scored:
-    """Return the candidate at the largest of a few amplitudes that pays."""
+def at_best_amplitude(objective: Objective, candidate: Excitation) -> Scored:
+    """Return the candidate at the amplitude of least cost, out of three shares of its own."""
     amplitude = candidate.parameters["amplitude"]
-    tried = [candidate.with_(amplitude=amplitude * share) for share in (1.0, 0.6, 0.35)]
-    scored = [Scored(c, judge.cost(c)) for c in tried]
+    trials = [candidate.with_(amplitude=amplitude * share) for share in (1.0, 0.6, 0.35)]
+    scored = [Scored(c, objective.cost(c)) for c in trials]
     return min(scored, key=lambda s: s.cost)
 
 

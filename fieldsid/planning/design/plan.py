@@ -1,4 +1,4 @@
-"""A plan: legs over speeds that buy the accuracy that is wanted, inside the envelope, in the fewest minutes."""
+"""A plan: legs over speeds that reach the accuracy goals within the envelope in the fewest minutes."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class PlannedLeg:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Plan(Brief):
-    """Legs in the order they are flown, and all that is needed to fly them within the limits again."""
+    """Legs in the order in which they are flown, with the prior, the envelope and the settings behind them."""
 
     axis: Annotated[Axis, Key("The plane.")]
     vehicle: Annotated[str, Key("The vehicle's name.")]
@@ -70,9 +70,9 @@ class Plan(Brief):
     want: Annotated[Mapping[str, float], Key("Relative standard errors asked for.")]
     seed: Annotated[int, Key("Seed of the search and the draws.")] = 1
     course: Annotated[float | None, Key("Course of the legs; null where none was given.", "course_rad")] = None
-    """Compass course of the first pass of every leg in rad, None where nobody has said."""
+    """Compass course of the first pass of every leg in rad, None where it is not stated."""
     fins: Annotated[PlaneFins | None, Key("The fins that the command is made of; null where it is one.")] = None
-    """The fins that the axis' command is made of; None where it is one."""
+    """The fins over which the command is allocated; None for a single fin."""
 
     @property
     def planned(self) -> Annotated[tuple[PlannedLeg, ...], Key(name="legs")]:
@@ -103,15 +103,15 @@ class Plan(Brief):
 def make_plan(model: Model, request: Request, step: Callable[[], None] = lambda: None) -> Plan:
     """Return the plan for a prior; `step` is called as each leg is found.
 
-    Raises UsageError for speeds, limits or accuracy goals that cannot be met, with what would be possible; ModelError for a prior
-    that is unstable.
+    Raises UsageError for speeds, limits or accuracy goals that cannot be met, with possible ones in the hint; ModelError for an
+    unstable prior.
     """
     circles = checked_circles([model], request, request.window.length)
     return plan_of(model, request, _legs(model, request, step) + circles)
 
 
 def plan_of(model: Model, request: Request, legs: Sequence[Leg]) -> Plan:
-    """Return the plan of legs for a prior; raises UsageError where they take longer than there is time."""
+    """Return the plan of legs for a prior; raises UsageError where they exceed the budget of minutes."""
     _check_minutes(legs, request)
     name = str(model.info.get("name", "")) or model.method or "model"
     return Plan(
@@ -121,9 +121,9 @@ def plan_of(model: Model, request: Request, legs: Sequence[Leg]) -> Plan:
 
 
 def checked_circles(models: Sequence[Model], request: Request, shortest_s: float) -> list[Leg]:
-    """Return the circles of a request, none without, once all that shows before a search has been checked.
+    """Check a request before the search, and return its circles, none if it has none.
 
-    `shortest_s` is what a window takes at least. Raises UsageError and ModelError as `make_plan` does.
+    `shortest_s` is the least length of a window. Raises UsageError and ModelError as `make_plan` does.
     """
     check_speeds(request.speeds, request.slowest, request.fastest)
     _check_budget(request)
@@ -149,9 +149,9 @@ def checked_circles(models: Sequence[Model], request: Request, shortest_s: float
 
 
 def _legs(model: Model, request: Request, step: Callable[[], None]) -> list[Leg]:
-    """Return one leg per speed: the middle speed is searched from nothing, the others from what was best there.
+    """Return one leg per speed: a full search at the middle speed, at the others a search from its best maneuvers.
 
-    What takes t s at one speed takes t times the ratio of the dampings at another: it is tried both ways.
+    These start both with their own times and with the times multiplied by the ratio of the dampings.
     """
     middle = min(range(len(request.speeds)), key=lambda i: abs(request.speeds[i] - float(np.median(request.speeds))))
     damping = [model.at_speed(u)[NAMES[model.axis].damping] for u in request.speeds]
@@ -178,7 +178,7 @@ def _finalists(leg: Leg) -> list[Excitation]:
 
 
 def setting_at(model: Model, request: Request, speed: float) -> Setting:
-    """Return the setting at a speed, its window shortened where the area is."""
+    """Return the setting at a speed, with the window shortened to the length of the area."""
     window = request.window
     if request.envelope.area_length is not None:
         room = request.envelope.area_length / speed - request.run_up_s
@@ -187,15 +187,15 @@ def setting_at(model: Model, request: Request, speed: float) -> Setting:
 
 
 def _repeated(leg: Leg, want: Mapping[str, float], envelope: Envelope) -> Leg:
-    """Return the leg with as many passes as the accuracy goals need; raises UsageError beyond a day's work."""
-    lacking = [n for n in want if not np.isfinite(leg.expected[n].relative)]
-    need = max((leg.expected[n].relative / want[n] for n in want if n not in lacking), default=1.0) ** 2
+    """Return the leg with as many passes as the accuracy goals need; raises UsageError beyond MOST_PASSES."""
+    hidden = [n for n in want if not np.isfinite(leg.expected[n].relative)]
+    need = max((leg.expected[n].relative / want[n] for n in want if n not in hidden), default=1.0) ** 2
     passes = int(np.ceil(need - 1e-9))
-    if lacking or passes > MOST_PASSES:
-        possible = {n: leg.expected[n].relative / np.sqrt(MOST_PASSES) for n in want if n not in lacking}
+    if hidden or passes > MOST_PASSES:
+        possible = {n: leg.expected[n].relative / np.sqrt(MOST_PASSES) for n in want if n not in hidden}
         raise UsageError(
             f"the wish {accuracy_goals_text(want)} cannot be met at {leg.speed:g} m/s inside the envelope",
-            found=f"{', '.join(lacking)} does not show" if lacking else f"it would take {passes} passes of {leg.pass_s:.0f} s",
+            found=f"{', '.join(hidden)} does not show" if hidden else f"it would take {passes} passes of {leg.pass_s:.0f} s",
             hint=f"possible in {MOST_PASSES} passes: `--want {accuracy_goals_text(possible)}`"
             if possible
             else envelope.widening(),
@@ -205,7 +205,7 @@ def _repeated(leg: Leg, want: Mapping[str, float], envelope: Envelope) -> Leg:
 
 
 def _check_budget(request: Request) -> None:
-    """Raise UsageError for a budget that cannot be meant, or circles in pitch."""
+    """Raise UsageError for a budget outside 0 to 1440 minutes, or for circles in pitch."""
     if request.minutes is not None and not 0 < request.minutes <= 1440:
         raise UsageError(
             f"a budget of {request.minutes:g} minutes cannot be meant",
@@ -237,21 +237,21 @@ def _check_minutes(legs: Sequence[Leg], request: Request) -> None:
 
 
 def _possible(legs: Sequence[Leg], request: Request) -> dict[str, float]:
-    """Return the errors that the budget buys, the extra passes shared out to the leg that lacks most."""
+    """Return the accuracy goals that the budget allows, with each extra pass given to the leg that is farthest from its goals."""
     budget = (request.minutes or 0.0) * 60.0 - sum(leg.duration_s for leg in legs if leg.purpose != "parameters")
     legs = [leg for leg in legs if leg.purpose == "parameters"]
     passes = [1] * len(legs)
 
-    def lack(i: int) -> float:
+    def error_over_goal(i: int) -> float:
         leg = legs[i]
-        grown = np.sqrt(leg.passes / passes[i])
-        return float(max((leg.expected[n].relative * grown / w for n, w in request.want.items()), default=0.0))
+        growth = np.sqrt(leg.passes / passes[i])
+        return float(max((leg.expected[n].relative * growth / w for n, w in request.want.items()), default=0.0))
 
     while True:
         used_s = sum(p * leg.pass_s for p, leg in zip(passes, legs, strict=True))
-        worst = max(range(len(legs)), key=lack)
+        worst = max(range(len(legs)), key=error_over_goal)
         if passes[worst] >= legs[worst].passes or used_s + legs[worst].pass_s > budget:
             break
         passes[worst] += 1
-    grown = max(lack(i) for i in range(len(legs)))
-    return {n: w * max(grown, 1.0) for n, w in request.want.items()}
+    largest = max(error_over_goal(i) for i in range(len(legs)))
+    return {n: w * max(largest, 1.0) for n, w in request.want.items()}

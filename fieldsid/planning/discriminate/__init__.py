@@ -1,1 +1,1 @@
-"""Maneuvers that tell rival models apart."""
+"""Maneuvers that discriminate rival models."""

@@ -1,4 +1,4 @@
-"""The maneuver that decides between rival models: the one whose refitted predictions stay furthest apart."""
+"""The maneuver that discriminates rival models best: their predictions differ most after each has been refitted."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ from fieldsid.records.keys import Key, Number
 
 Pairs = Mapping[str, float]
 Map = Callable[[Callable[[Excitation], Pairs], Sequence[Excitation]], list[Pairs]]
-"""The expected log odds of each ordered pair of rivals; and what evaluates a function of them at several candidates."""
+"""The expected log odds of each ordered pair of rivals; and a map function that evaluates them at several candidates."""
 
 LONGEST_WINDOW_S = 60.0
 """Length of the window unless another is requested: slow differences discriminate rivals as well."""
 MOST_LOG_ODDS = 300.0
 FAST_HZ, FAST_ROUNDS, BEYOND_DOUBT = 10.0, 3, 50.0
 AT_ONCE = 2
-"""Candidates that are evaluated at once, before it is asked whether one of them decides."""
+"""Candidates that are evaluated together before the fast search checks whether one of them is decisive."""
 DECISIVE_LOG_ODDS = float(np.log(20.0))
 """Log odds above which a pair counts as discriminated."""
 
 
 @dataclass(frozen=True, slots=True)
 class Separation:
-    """The maneuver that decides: its parameters, speed (m/s), the log odds it is expected to give for the right one.
+    """The discriminating maneuver: its parameters, speed (m/s), and the expected log odds for the true model.
 
-    `expected_log_odds` is that of the pair and direction it separates least; `pairs` holds all, keyed "right>wrong".
+    `expected_log_odds` is the least over the ordered pairs; `pairs` has all of them, with keys "true>wrong".
     """
 
     maneuver: Annotated[str, Key("The maneuver.")]
@@ -76,11 +76,11 @@ class Separation:
         return float(np.exp(min(self.expected_log_odds, MOST_LOG_ODDS)))
 
     def says(self) -> list[str]:
-        """Return what is expected, in sentences."""
+        """Return the expected odds, in sentences."""
         lines = [f"`{self.candidate.spec}` at {self.speed:g} m/s tells them apart:"]
         for key, value in self.pairs.items():
-            right, _, wrong = key.partition(">")
-            lines.append(f"  if it is {right}: odds {_odds(value)} against {wrong}")
+            true, _, wrong = key.partition(">")
+            lines.append(f"  if it is {true}: odds {_odds(value)} against {wrong}")
         if not self.decides:
             lines.append("one pass is not enough for odds of 20 to 1: repeat it, or leave it more room")
         return lines
@@ -101,8 +101,8 @@ class _RivalFlights:
     def responses(self, candidate: Excitation) -> list[Response] | None:
         """Return every rival's flight, None where one leaves the envelope."""
         limits = self.envelope.limits
-        pilot = autopilot_of(self.rivals[0].scene.base, limits)
-        flights = [flown(rival.scene, candidate, self.window, limits, pilot) for rival in self.rivals]
+        autopilot = autopilot_of(self.rivals[0].scene.base, limits)
+        flights = [flown(rival.scene, candidate, self.window, limits, autopilot) for rival in self.rivals]
         for rival, flight in zip(self.rivals, flights, strict=True):
             far = excursions_of(
                 rival.scene.axis, flight.angle[:, None], flight.rate[:, None], speed=self.speed, step=1.0 / self.window.rate_hz,
@@ -113,17 +113,17 @@ class _RivalFlights:
         return flights
 
     def pairs(self, candidate: Excitation) -> Pairs:
-        """Return the expected log odds of every ordered pair, empty where the envelope is left.
+        """Return the expected log odds of every ordered pair, empty where a rival leaves the envelope.
 
-        A model that is part of another cannot be shown to be the right one by fit alone: such pairs are left out.
+        A pair whose true model is nested in the wrong one is left out: the larger model fits at least as well.
         """
         flights = self.responses(candidate)
         if flights is None:
             return {}
         found = {}
-        for (right, flight), (wrong, _) in permutations(zip(self.rivals, flights, strict=True), 2):
-            if not set(right.scene.model.effects) <= set(wrong.scene.model.effects):
-                found[f"{right.name}>{wrong.name}"] = log_odds(right, wrong, flight, self.rounds)
+        for (true, flight), (wrong, _) in permutations(zip(self.rivals, flights, strict=True), 2):
+            if not set(true.scene.model.effects) <= set(wrong.scene.model.effects):
+                found[f"{true.name}>{wrong.name}"] = log_odds(true, wrong, flight, self.rounds)
         return found
 
 
@@ -141,10 +141,9 @@ def separate(
 ) -> Separation:
     """Return the maneuver inside the envelope that discriminates rival models best, at the best of the speeds (m/s).
 
-    `fast`: at most 10 Hz, the maneuvers that the rivals' effects declare to be excited by, no tuning, and none beyond those
-    evaluated at once with the first that decides clearly. `candidates`: what to choose among, in place of the catalogue. `mapped`
-    evaluates several at once. Raises UsageError for fewer than two rivals, rivals of different axes, or when no maneuver stays
-    inside the envelope.
+    `fast`: at most 10 Hz, only the maneuvers that the rivals' effects name in `excited_by`, no tuning, and the search ends at the
+    first clearly decisive maneuver. `candidates` replace the catalogue. `mapped` evaluates several candidates in parallel. Raises
+    UsageError for fewer than two rivals, rivals of different axes, or when no maneuver stays within the envelope.
     """
     _check(models)
     if set(models[0].effects) == set(models[1].effects) and len(models) == 2:
@@ -154,8 +153,8 @@ def separate(
         rivals = tuple(rival_of(operating_point(m, speed)) for m in models)
         rate = min(rate_hz, FAST_HZ) if fast else rate_hz
         rounds = FAST_ROUNDS if fast else MAX_REFIT_ITERATIONS
-        arena = _RivalFlights(rivals, envelope, Window(window_s, rate_hz=rate), rounds, run_up_s * speed)
-        found = _at_speed(arena, candidates, mapped, fast=fast)
+        simulator = _RivalFlights(rivals, envelope, Window(window_s, rate_hz=rate), rounds, run_up_s * speed)
+        found = _at_speed(simulator, candidates, mapped, fast=fast)
         if found is not None and fast:
             found = replace(found, window=replace(found.window, rate_hz=rate_hz))
         if found is not None and (best is None or found.expected_log_odds > best.expected_log_odds):
@@ -164,7 +163,7 @@ def separate(
         raise UsageError(
             "no maneuver of the catalogue stays inside the envelope for every rival",
             found=f"at {', '.join(f'{u:g}' for u in speeds)} m/s; "
-            + (", ".join(f"{k} {v:.3g}" for k, v in envelope.rooms().items()) or "no room"),
+            + (", ".join(f"{k} {v:.3g}" for k, v in envelope.excursion_limits().items()) or "no room"),
             hint=envelope.widening() + ("; `--max-heading none` lets circles in" if envelope.heading is not None else ""),
         )
     return best
@@ -173,10 +172,10 @@ def separate(
 def as_flown(
     found: Separation, models: Sequence[Model], envelope: Envelope, candidate: Excitation, run_up_s: float
 ) -> Separation:
-    """Return what a separation is expected to show with another candidate, the one that is flown."""
+    """Return a separation with another candidate in place of its own, and the log odds expected of that one."""
     rivals = tuple(rival_of(operating_point(m, found.speed)) for m in models)
-    arena = _RivalFlights(rivals, envelope, found.window, MAX_REFIT_ITERATIONS, run_up_s * found.speed)
-    pairs = arena.pairs(candidate)
+    simulator = _RivalFlights(rivals, envelope, found.window, MAX_REFIT_ITERATIONS, run_up_s * found.speed)
+    pairs = simulator.pairs(candidate)
     return replace(
         found, maneuver=candidate.maneuver, parameters=candidate.parameters, pairs=pairs,
         expected_log_odds=min(pairs.values(), default=0.0),
@@ -206,23 +205,23 @@ def _at_speed(arena: _RivalFlights, candidates: Sequence[Excitation] | None, map
 
 
 def _scored(arena: _RivalFlights, candidates: Sequence[Excitation], mapped: Map, *, fast: bool) -> list[tuple[Excitation, Pairs]]:
-    """Return the candidates that stay inside the envelope, with the log odds of their pairs."""
+    """Return the candidates that stay within the envelope, with the log odds of their pairs."""
     named = {m for r in arena.rivals for e in r.scene.effects for m in e.excited_by}
-    asked = [c for c in candidates if not (fast and named) or c.maneuver in named]
+    chosen = [c for c in candidates if not (fast and named) or c.maneuver in named]
     scored = list[tuple[Excitation, Pairs]]()
-    for first in range(0, len(asked), AT_ONCE):
-        some = asked[first : first + AT_ONCE]
-        scored += [(c, pairs) for c, pairs in zip(some, mapped(arena.pairs, some), strict=True) if pairs]
+    for first in range(0, len(chosen), AT_ONCE):
+        batch = chosen[first : first + AT_ONCE]
+        scored += [(c, pairs) for c, pairs in zip(batch, mapped(arena.pairs, batch), strict=True) if pairs]
         if fast and any(min(pairs.values()) > BEYOND_DOUBT for _, pairs in scored[-AT_ONCE:]):
             break
     return scored
 
 
 def worth(pairs: Mapping[str, float]) -> float:
-    """Return the utility of a maneuver: each pair counts until it is clearly discriminated, a little more after that.
+    """Return the utility of a maneuver: the mean over the pairs of a function that saturates once a pair is discriminated.
 
-    A rival whose effect was fitted to almost zero equals the plain model, and no maneuver discriminates the two: such a pair must
-    not hide the others.
+    A rival whose effect was fitted to almost zero equals the model without it, and no maneuver discriminates the two: a minimum
+    over the pairs would then be useless.
     """
     values = np.maximum(np.array(list(pairs.values())), 0.0)
     more = np.log1p(values)
@@ -230,9 +229,9 @@ def worth(pairs: Mapping[str, float]) -> float:
 
 
 def candidate_maneuvers(window: Window, envelope: Envelope) -> list[Excitation]:
-    """Return the maneuvers that are tried: the catalogue small, large, slow and fast, as far as the window allows."""
+    """Return the candidates: maneuvers of the catalogue, small, large, slow and fast, that fit the window."""
     fin, room = envelope.fin, window.excitation
-    wanted: list[tuple[str, dict[str, float]]] = [
+    specified: list[tuple[str, dict[str, float]]] = [
         ("stairs", {"amplitude": fin, "lowest": 0.12 * fin, "steps": 5, "hold": room / 10.5}),
         ("stairs", {"amplitude": 0.5 * fin, "lowest": 0.06 * fin, "steps": 6, "hold": room / 12.5}),
         ("square_pulses", {"amplitude": fin, "second": 0.3 * fin, "width": room / 7.0, "recovery": room / 3.5}),
@@ -247,12 +246,12 @@ def candidate_maneuvers(window: Window, envelope: Envelope) -> list[Excitation]:
         ("turning_circle", {"amplitude": fin, "turn": 4 * np.pi, "pull_out": 5.0, "duration": room}),
         ("turning_circle", {"amplitude": 0.5 * fin, "turn": 4 * np.pi, "pull_out": 5.0, "duration": room}),
     ]
-    made = [Excitation(name, pick_maneuver(name).checked(values)) for name, values in wanted]
+    made = [Excitation(name, pick_maneuver(name).checked(values)) for name, values in specified]
     return [c for c in made if fits(c, window)]
 
 
 def _tuned(arena: _RivalFlights, candidate: Excitation, pairs: Mapping[str, float]) -> tuple[Excitation, Mapping[str, float]]:
-    """Return the candidate improved along each of its parameters in turn."""
+    """Return the candidate after one step in each of its parameters that increases its utility, with its pairs."""
     for parameter in candidate.record.parameters:
         if not parameter.tuned:
             continue
@@ -266,7 +265,7 @@ def _tuned(arena: _RivalFlights, candidate: Excitation, pairs: Mapping[str, floa
 
 
 def _shortened(window: Window, flights: Sequence[Response] | None) -> Window:
-    """Return the window cut to the longest flight: a rule may be over before its time."""
+    """Return the window shortened to the longest flight: a rule may end before its longest duration."""
     if not flights:
         return window
     longest = max(float(f.time[-1]) for f in flights)

@@ -1,4 +1,4 @@
-"""The rivals of a separation: effects by name on a prior, or the leading candidates of a diagnosis."""
+"""The rival models of a separation: a prior with named effects, or the most probable candidates of a diagnosis."""
 
 from __future__ import annotations
 
@@ -25,36 +25,36 @@ LEAST_PROBABILITY, MOST_RIVALS = 0.02, 4
 
 
 def rivals_named(model: Model, names: Sequence[str]) -> tuple[Model, ...]:
-    """Return the model with each rival added: effects joined by `+`, or `none` for the model as it is.
+    """Return a model for each rival: the given one with effects added (joined by `+`), or unchanged for `none`.
 
-    Coefficients not in the model take a typical value. Raises UsageError for an unknown effect, one that is not of
-    the axis, or fewer than two rivals.
+    Coefficients that the model lacks have a typical value. Raises UsageError for an unknown effect, an effect of the other axis,
+    or fewer than two rivals.
     """
     distinct = tuple(dict.fromkeys(names))
     if len(distinct) < 2:
         raise UsageError(
             "two rivals are needed", found=", ".join(names) or "none", hint="name them: `--separate delay,servo_lag`"
         )
-    return tuple(_with(model, _effects(name)) for name in distinct)
+    return tuple(_with_effects(model, _effects(name)) for name in distinct)
 
 
 def typical(coefficient: Coefficient) -> float:
-    """Return a coefficient's typical value: the middle one of its scan (the upper of two), else its start."""
+    """Return a coefficient's typical value: the median of its scan (the upper of two), else its start value."""
     return sorted(coefficient.scan)[len(coefficient.scan) // 2] if coefficient.scan else coefficient.start
 
 
 def rivals_from(path: Path, names: Sequence[str] = ()) -> tuple[Model, ...]:
-    """Return the rivals of a diagnosis file: those named, else its leading candidates.
+    """Return the rivals of a diagnosis file: those named, else its most probable candidates.
 
-    Raises ArtifactError when the file is not a complete diagnosis, UsageError when fewer than two rivals are left.
+    Raises ArtifactError when the file is not a complete diagnosis, UsageError when there are fewer than two rivals.
     """
     with unless_log(path, "a diagnosis"):
         body = load_record(path, KIND)
     with whole_file(path, "diagnosis", "diagnose again, with `-o`"):
         axis = Axis(body["axis"])
         candidates = sorted(body["candidates"], key=lambda c: -float(c["probability"]))
-        wanted = [c for c in candidates if c["effect"] in names] if names else _leading(candidates)
-        models = tuple(_of_candidate(axis, c, body) for c in wanted)
+        chosen = [c for c in candidates if c["effect"] in names] if names else _most_probable(candidates)
+        models = tuple(_model_of(axis, c, body) for c in chosen)
     if len(models) < 2:
         known = ", ".join(f"{c['effect']} with probability {float(c['probability']):.2g}" for c in candidates[:MOST_RIVALS])
         hint = "name two of them with `--separate A,B`"
@@ -62,25 +62,25 @@ def rivals_from(path: Path, names: Sequence[str] = ()) -> tuple[Model, ...]:
     return models
 
 
-def _leading(candidates: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Return what is believed: a maneuver that tells it from what is not would be flown for nothing."""
+def _most_probable(candidates: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Return the candidates of LEAST_PROBABILITY or more, at most MOST_RIVALS; improbable ones need no flight."""
     return [c for c in candidates if float(c["probability"]) >= LEAST_PROBABILITY][:MOST_RIVALS]
 
 
-def _of_candidate(axis: Axis, candidate: Mapping[str, Any], body: Mapping[str, Any]) -> Model:
+def _model_of(axis: Axis, candidate: Mapping[str, Any], body: Mapping[str, Any]) -> Model:
     effects = (*map(str, body.get("known", ())), *_effects(str(candidate["effect"])))
-    given = {str(k): _value(v) for k, v in candidate["parameters"].items()}
+    parameters = {str(k): _value(v) for k, v in candidate["parameters"].items()}
     floor = body["noise_floor"]
     law = body.get("speed_law", {})
     coefficients = {c.name: typical(c) for e in effects for c in pick_effect(e).shared}
     names = NAMES[axis]
-    missing = [n for n in names.base if n not in given]
+    missing = [n for n in names.base if n not in parameters]
     if missing:
         raise KeyError(f"{candidate['effect']}: {missing[0]}")
     return Model(
         axis=axis,
         effects=effects,
-        values=coefficients | given,
+        values=coefficients | parameters,
         units={},
         free=(),
         covariance=np.zeros((0, 0)),
@@ -98,11 +98,11 @@ def _effects(name: str) -> tuple[str, ...]:
     return () if name == PLAIN else tuple(part.strip() for part in name.split("+"))
 
 
-def _with(model: Model, effects: tuple[str, ...]) -> Model:
-    held = {name: effect_held(name, model.own) for name in model.effects}
-    added = {name: pick_effect(name) for name in effects if name not in held}
+def _with_effects(model: Model, effects: tuple[str, ...]) -> Model:
+    present = {name: effect_held(name, model.own) for name in model.effects}
+    added = {name: pick_effect(name) for name in effects if name not in present}
     for name, effect in added.items():
-        refuse_clash(effect, held.values())
+        refuse_clash(effect, present.values())
         if model.axis not in effect.axes:
             raise UsageError(
                 f"effect `{name}` does not act on the {model.axis.value} axis",

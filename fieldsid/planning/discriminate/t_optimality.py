@@ -1,8 +1,8 @@
 """T-optimality of a flight for two rival models: the distance of their predictions after the wrong one has been refitted.
 
-The true model's noise-free response is data; the other model is fitted to it with all its parameters, initial state and per-run
-nuisances free, under the prior from earlier data. What remains, whitened, is twice the expected log odds of the flight
-(T-optimality: Atkinson and Fedorov 1975).
+The noise-free response of the true model serves as data; the other model is fitted to it with all its parameters, initial state
+and per-run nuisances free, under the prior from earlier data. The whitened residual sum of squares is twice the expected log odds
+of the flight (T-optimality: Atkinson and Fedorov 1975).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SMALLEST_STEP = 1.0 / 64.0
 
 @dataclass(frozen=True, slots=True)
 class Rival:
-    """A model at one speed as it enters duels: its scene, and the precision (N, N) earlier data gave its parameters."""
+    """A rival model at one speed: its operating point, and the prior precision (N, N) of its parameters from earlier data."""
 
     name: str
     scene: OperatingPoint
@@ -35,12 +35,12 @@ class Rival:
 
     @property
     def noise(self) -> Noise:
-        """The noise that the residual is whitened with."""
+        """The noise by which the residual is whitened."""
         return self.scene.model.noise
 
 
 def rival_of(scene: OperatingPoint) -> Rival:
-    """Return a scene's model as a rival; without a covariance it is free, but for a weak pull to its own values."""
+    """Return an operating point's model as a rival; without a covariance its prior is weak, about its own values."""
     problem, x = problem_of(scene, scene.record(np.linspace(0.0, 0.2, 3), np.zeros(3)))
     layout = problem.layout
     size = np.maximum(np.abs(x), 1e-3)
@@ -58,7 +58,7 @@ def rival_of(scene: OperatingPoint) -> Rival:
 
 
 def log_odds(winner: Rival, loser: Rival, response: Response, rounds: int = MAX_REFIT_ITERATIONS) -> float:
-    """Return the expected log odds for the winner after its own flight, the loser refitted to it."""
+    """Return the expected log odds for the true model (`winner`) after its flight, with the other one refitted to it."""
     truth = winner.scene.record(response.time, response.command + winner.scene.trim_fin)
     problem, x = problem_of(winner.scene, truth)
     motion, _ = problem.simulate(x, 0)
@@ -69,7 +69,7 @@ def log_odds(winner: Rival, loser: Rival, response: Response, rounds: int = MAX_
 
 
 def _refitted(loser: Rival, record: Record, noise: Noise, rounds: int) -> float:
-    """Return the whitened sum of squares a rival leaves on a record, its pull to earlier data included."""
+    """Return the whitened residual sum of squares of a refitted rival on a record, the prior's term included."""
     problem, start = problem_of(loser.scene, record)
     x, total = start.copy(), np.inf
     step = np.zeros_like(x)
@@ -99,10 +99,10 @@ def _cost(problem: Problem, x: FloatArray, start: FloatArray, loser: Rival, nois
 
 def _solve(normal: FloatArray, gradient: FloatArray, x: FloatArray, problem: Problem) -> FloatArray:
     low, high = problem.layout.low, problem.layout.high
-    held = ((x <= low) & (gradient < 0)) | ((x >= high) & (gradient > 0))
-    open_ = np.flatnonzero(~held)
-    scale = np.sqrt(np.maximum(np.diag(normal)[open_], 1e-30))
-    unit = normal[np.ix_(open_, open_)] / np.outer(scale, scale) + 1e-9 * np.eye(open_.size)
+    at_bound = ((x <= low) & (gradient < 0)) | ((x >= high) & (gradient > 0))
+    free = np.flatnonzero(~at_bound)
+    scale = np.sqrt(np.maximum(np.diag(normal)[free], 1e-30))
+    unit = normal[np.ix_(free, free)] / np.outer(scale, scale) + 1e-9 * np.eye(free.size)
     step = np.zeros_like(x)
-    step[open_] = np.linalg.solve(unit, gradient[open_] / scale) / scale
+    step[free] = np.linalg.solve(unit, gradient[free] / scale) / scale
     return step

@@ -1,1 +1,1 @@
-"""Simulated flights: operating point, closed loop, maneuvers by rule."""
+"""Simulated flights: operating point, closed loop, maneuvers that are a rule."""

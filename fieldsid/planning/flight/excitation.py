@@ -1,4 +1,4 @@
-"""A candidate: a maneuver with its parameters, and how it is laid into a window of run-up, excitation and recovery."""
+"""An excitation: a maneuver with its parameters, and its place in a window of run-up, excitation and recovery."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from fieldsid.planning.flight.rule_flight import Response, fly_fins, fly_operati
 from fieldsid.records.keys import Key
 
 LONGEST_WINDOW_S = 300.0
-"""No maneuver of the catalogue has a longer period."""
+"""Longest window, the longest period of a maneuver in the catalogue."""
 
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """The part of a leg that is identified on: `lead` s steady, the excitation, at least `recover` s; `length` s in all."""
+    """The part of a leg used for identification: `lead` s straight, the excitation, at least `recover` s; `length` s in all."""
 
     length: Annotated[float, Key("Its length.", "length_s")] = 33.0
     lead: Annotated[float, Key("Straight run at its start.", "lead_s")] = 2.0
@@ -30,12 +30,12 @@ class Window:
 
     @property
     def excitation(self) -> float:
-        """Seconds there are for the excitation."""
+        """Time available for the excitation, s."""
         return self.length - self.lead - self.recover
 
     @property
     def shortest(self) -> float:
-        """Seconds that a window with this lead and recovery takes at least."""
+        """Least length of a window with this lead and recovery, s."""
         return self.lead + self.recover + 2.0
 
     @property
@@ -73,17 +73,17 @@ class Excitation:
 
     @property
     def record(self) -> Maneuver:
-        """The maneuver's own record."""
+        """The record of the maneuver."""
         return pick_maneuver(self.maneuver)
 
     @property
     def spec(self) -> str:
-        """The text that `maneuvers.parse_spec` reads back."""
+        """The text of the excitation, which `maneuvers.parse_spec` reads."""
         return spec_of(self.record, self.parameters)
 
     @property
     def duration(self) -> float:
-        """Seconds of excitation, for a rule at most."""
+        """Duration of the excitation in s, for a rule the longest possible."""
         return self.record.duration(self.parameters)
 
     def with_(self, **changes: float) -> Excitation:
@@ -91,40 +91,40 @@ class Excitation:
         return replace(self, parameters=self.record.checked({**self.parameters, **changes}))
 
     def stretched(self, factor: float) -> Excitation:
-        """Return the candidate with every time it may choose multiplied by a factor, frequencies divided, inside their bounds."""
-        powers = {"s": factor, "Hz": 1.0 / factor}
-        moved = {
-            p.name: float(np.clip(self.parameters[p.name] * powers[p.unit], p.low, p.high))
+        """Return the candidate with its tuned times multiplied by a factor and its frequencies divided, within their bounds."""
+        factors = {"s": factor, "Hz": 1.0 / factor}
+        scaled = {
+            p.name: float(np.clip(self.parameters[p.name] * factors[p.unit], p.low, p.high))
             for p in self.record.parameters
-            if p.tuned and p.unit in powers
+            if p.tuned and p.unit in factors
         }
-        return self.with_(**moved)
+        return self.with_(**scaled)
 
 
-def asked_of(candidate: Excitation, window: Window) -> FloatArray:
-    """Return the command an open-loop candidate asks for over a window, (n,) rad about trim, NaN for the autopilot."""
+def fin_command(candidate: Excitation, window: Window) -> FloatArray:
+    """Return the fin command of an open-loop candidate over a window, (n,) rad about trim, NaN where the autopilot steers."""
     time = window.time
     command = candidate.record.command
     if command is None:
         raise UsageError(f"maneuver `{candidate.maneuver}` follows the motion: it has no command of its own")
-    asked = command(candidate.parameters, time - window.lead)
+    fin = command(candidate.parameters, time - window.lead)
     steered = (time < window.lead - 1e-9) | (time >= window.length - window.recover - 1e-9)
-    return np.where(steered, np.nan, asked)
+    return np.where(steered, np.nan, fin)
 
 
 def flown(scene: OperatingPoint, candidate: Excitation, window: Window, limits: Limits, autopilot: Autopilot) -> Response:
-    """Return a candidate flown on one scene over a window."""
+    """Return the response of one operating point to a candidate over a window."""
     return flown_all([scene], candidate, window, limits, autopilot)[0]
 
 
 def flown_all(
     scenes: Sequence[OperatingPoint], candidate: Excitation, window: Window, limits: Limits, autopilot: Autopilot
 ) -> list[Response]:
-    """Return a candidate flown on several scenes, one response each."""
+    """Return the responses of several operating points to a candidate over a window."""
     time = window.time
     if candidate.record.rule is None:
         plant = plant_of(scenes, time.size, window.rate_hz, None)
-        columns = fly_fins(scenes, plant, time, asked_of(candidate, window), limits, autopilot)
+        columns = fly_fins(scenes, plant, time, fin_command(candidate, window), limits, autopilot)
     else:
         schedule = Schedule(window.rate_hz, window.lead, window.recover)
         flight = fly_operating_points(

@@ -1,4 +1,4 @@
-"""An operating point: a model at one speed with base parameters, effects, trim fin and the autopilot of the recovery."""
+"""An operating point: a model at one speed with base parameters, effects and trim fin; and an autopilot for the recovery."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ SLOWEST_RECOVERY = 0.4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OperatingPoint:
-    """One model at one speed (m/s) with values for every coefficient, per-run ones at their start.
+    """One model at one speed (m/s) with values of all coefficients, per-run ones at their start values.
 
-    Two scenes are never equal: what is prepared for one is kept by its identity.
+    Equality is identity, so that kernel inputs can be cached for an operating point.
     """
 
     model: Model
@@ -37,7 +37,7 @@ class OperatingPoint:
 
     @property
     def axis(self) -> Axis:
-        """The plane that is flown."""
+        """The axis of the model."""
         return self.model.axis
 
     @property
@@ -47,7 +47,7 @@ class OperatingPoint:
 
     @property
     def trim_fin(self) -> float:
-        """The fin angle (rad) that holds the vehicle straight and level."""
+        """The fin angle (rad) that balances the trim moment."""
         return -self.base.trim / self.base.authority
 
     def record(self, time: FloatArray, fin: FloatArray) -> Record:
@@ -56,7 +56,7 @@ class OperatingPoint:
 
 
 def operating_point(model: Model, speed: float) -> OperatingPoint:
-    """Return a model at a speed; raises ModelError when its fin does nothing."""
+    """Return the operating point of a model at a speed; raises ModelError when its authority is zero."""
     effects = effects_of(model)
     base = base_at(model, speed)
     if not np.isfinite(base.authority) or base.authority == 0.0:

@@ -1,1 +1,1 @@
-"""What is written of a plan: the file, commands, missions, figure data."""
+"""The output of a plan: its file, commands, missions and figure data."""

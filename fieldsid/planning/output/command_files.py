@@ -22,16 +22,16 @@ TABLE, BAG = "csv", "ros2"
 
 
 def formats() -> tuple[str, ...]:
-    """Return the names of what can be written: the table, the bag, and the stem of every mission style."""
+    """Return the names of the formats: the table, the bag, and the stem of every mission style."""
     return (TABLE, BAG, *sorted({_family(s) for s in styles()}))
 
 
 def write_all(plan: Plan, folder: Path, wanted: Sequence[str] = (), *, force: bool = False) -> list[Path]:
     """Write every leg in the requested formats (all when empty) and return the files.
 
-    A leg that follows a rule on the motion is written as the list of fins it is expected to command, where that stays inside the
-    envelope open loop; else it is left out, or refused where a format was named. Raises UsageError for that and for an unknown
-    format, ArtifactError where a file exists or cannot be written.
+    A leg whose maneuver is a rule is written as the list of its expected fin angles if these, flown open loop, stay within the
+    envelope; otherwise it is left out, or refused where a format was named. Raises UsageError for that and for an unknown format,
+    ArtifactError where a file exists or cannot be written.
     """
     check_formats(wanted)
     chosen = tuple(wanted) or formats()
@@ -44,7 +44,7 @@ def write_all(plan: Plan, folder: Path, wanted: Sequence[str] = (), *, force: bo
 
 
 def unwritten(plan: Plan) -> list[str]:
-    """Return what to say of the legs that no list of fins was written for."""
+    """Return a sentence on each leg for which no list of fin angles was written."""
     out = []
     for i, leg in enumerate(plan.legs, 1):
         if not leg.flown_from_list_in(plan.envelope):
@@ -64,12 +64,12 @@ def check_formats(wanted: Sequence[str]) -> None:
 
 
 def table_text(plan: Plan, leg: Leg) -> str:
-    """Return a leg's commands as CSV: time, fin about trim (0 while the autopilot steers), 1 while it does; several fins each."""
+    """Return a leg's commands as CSV: time, fin about trim (0 while the autopilot steers), 1 while it does, and each fin."""
     time, fin, steered = commands_of(leg, plan.envelope)
     each = {} if plan.fins is None else dict(zip(plan.fins.names, plan.fins.fin_commands(fin).tolist(), strict=True))
     head = ",".join(["time_s", NAMES[plan.axis].fin, "autopilot", *each])
-    told = zip(time.tolist(), fin.tolist(), steered.tolist(), *each.values(), strict=True)
-    rows = [",".join([f"{t:.6g}", f"{f:.6g}", f"{s:.0f}", *(f"{v:.6g}" for v in fins)]) for t, f, s, *fins in told]
+    samples = zip(time.tolist(), fin.tolist(), steered.tolist(), *each.values(), strict=True)
+    rows = [",".join([f"{t:.6g}", f"{f:.6g}", f"{s:.0f}", *(f"{v:.6g}" for v in fins)]) for t, f, s, *fins in samples]
     return "\n".join([head, *rows]) + "\n"
 
 
@@ -91,7 +91,7 @@ def _leg_files(plan: Plan, leg: Leg, stem: Path, chosen: Sequence[str], *, force
 
 
 def conditions_text(plan: Plan, leg: Leg) -> str:
-    """Return what whoever plays a bag must watch, as JSON: the abort conditions, the fin's limits, and what has no limit."""
+    """Return the conditions for the playback of a bag as JSON: abort conditions, fin limits, and the names without a limit."""
     limits = leg.envelope_in(plan.envelope)
     body = {
         "schema": "fieldsid/abort/1",

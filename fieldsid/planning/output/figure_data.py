@@ -1,4 +1,4 @@
-"""What the figure of a leg shows: the command, the predicted response with its band, the envelope, the track."""
+"""The data of a leg's figure: command, predicted response with its band, envelope and track."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ TRACKS = 25
 
 @dataclass(frozen=True, slots=True)
 class LegFigure:
-    """One leg over time (n,) s: fin (rad), where the autopilot steers, angle (rad) and its quantiles (4, n).
+    """One leg over time (n,) s: fin (rad), 1 where the autopilot steers, angle (rad) and its quantiles (4, n).
 
-    `along` and `across` (n,) are the track on the prior's mean, `tracks` (2, m, n) those of some draws, in m; `errors`
-    the parameters' expected standard errors in words; before the window lie `run_up_m` of straight run.
+    `along` and `across` (n,) are the track of the prior's mean, `tracks` (2, m, n) those of some draws, in m; `errors` are the
+    parameters' expected standard errors in words; `run_up_m` is the length of the straight run before the window.
     """
 
     axis: Axis
@@ -46,10 +46,10 @@ class LegFigure:
 
 
 def figure_data(plan: Plan, leg: Leg, model: Model) -> LegFigure:
-    """Return what the figure of a leg shows, the prior's draws flown again."""
+    """Return the data of a leg's figure, with draws of the prior simulated again."""
     envelope = plan.envelope
-    crowd = draw_ensemble(model, leg.speed, leg.window, FIGURE_DRAWS, plan.seed + 9)
-    flights = fly_ensemble(crowd, leg.candidate, envelope, leg.autopilot, 0.0)
+    ensemble = draw_ensemble(model, leg.speed, leg.window, FIGURE_DRAWS, plan.seed + 9)
+    flights = fly_ensemble(ensemble, leg.candidate, envelope, leg.autopilot, 0.0)
     mean = flown(operating_point(model, leg.speed), leg.candidate, leg.window, envelope.limits, leg.autopilot)
     n = min(flights.time.size, mean.time.size)
     _, fin, steered = commands_of(leg, envelope)

@@ -1,7 +1,7 @@
-"""Mission snippets: a leg's commands and abort conditions rendered through the templates of `templates/plan/mission`.
+"""Mission snippets: a leg's commands and abort conditions, rendered by the templates of `templates/plan/mission`.
 
-A MOOS helm compares a variable with a number and knows no deviation from a start: the heading needs the leg's compass course,
-and where that is not known the script waits until somebody says that the heading is watched. Its area is a polygon.
+A MOOS helm compares a variable with a number, and not with its value at the start: a heading limit needs the compass course of
+the leg. Where that is not stated the script waits until the operator confirms that the heading is watched. The area is a polygon.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from fieldsid.text.one_line import one_line
 
 PUBLISHED = {"surge_m_s": "NAV_SPEED", "depth_m": "NAV_DEPTH", "pitch_rad": "NAV_PITCH", "roll_rad": "NAV_ROLL"}
 ANY = 1e6
-"""Larger than any value: a condition that holds once a variable is published at all."""
+"""Larger than any value: a comparison with it holds as soon as the variable is published."""
 SPARE_M = 50.0
-"""Length before and beyond a leg of a polygon that stands for a limit to the sides alone."""
+"""Length of the polygon before and beyond a leg that is limited to the sides only."""
 
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """When a heading is watched, empty for always, and the condition that it is outside."""
+    """The condition under which a heading is watched, empty for always, and the condition that it is outside its limits."""
 
     when: str
     outside: str
@@ -42,25 +42,25 @@ class Band:
 
 @dataclass(frozen=True, slots=True)
 class Polygon:
-    """The corners of the area as a helm takes them, and from where they are."""
+    """The corners of the area in the syntax of a helm, and the origin and axes of their coordinates in words."""
 
     points: str
     says: str
 
 
 def headings(leg: Leg, aborts: tuple[Abort, ...], course: float | None) -> tuple[Band, ...]:
-    """Return the bands of heading (deg) to be watched, there and back; none without a course, or beyond half a turn."""
+    """Return the bands of heading (deg) of outward and return passes; none without a course or for a limit beyond half a turn."""
     limit = _limit(aborts, "yaw_rad", "deviation")
     if limit is None or limit >= math.pi or course is None:
         return ()
-    there, back = (_outside(course + turn, limit) for turn in (0.0, math.pi))
+    outward, back = (_outside(course + turn, limit) for turn in (0.0, math.pi))
     if leg.passes == 1:
-        return (Band("", there),)
-    return (Band("FIELDSID_RETURN = false", there), Band("FIELDSID_RETURN = true", back))
+        return (Band("", outward),)
+    return (Band("FIELDSID_RETURN = false", outward), Band("FIELDSID_RETURN = true", back))
 
 
 def needed(leg: Leg, aborts: tuple[Abort, ...], course: float | None) -> tuple[str, ...]:
-    """Return the conditions without which a script must not start: everything that is watched is there."""
+    """Return the conditions for the start of a script: every variable that is watched is published."""
     found = [f"{PUBLISHED[s]} >= -{ANY:.0f}" for s in dict.fromkeys(a.signal for a in aborts) if s in PUBLISHED]
     if any(a.signal in ("x_m", "y_m") for a in aborts):
         found += [f"NAV_X >= -{ANY:.0f}", f"NAV_Y >= -{ANY:.0f}"]
@@ -74,7 +74,7 @@ def needed(leg: Leg, aborts: tuple[Abort, ...], course: float | None) -> tuple[s
 
 
 def polygon(leg: Leg, aborts: tuple[Abort, ...], course: float | None) -> Polygon | None:
-    """Return the area from the start of the run-up on, turned to the course where that is known; None where there is none."""
+    """Return the area from the start of the run-up, rotated to the course where that is stated; None without a limit."""
     side = _limit(aborts, "y_m", "deviation")
     if side is None:
         return None
@@ -113,7 +113,7 @@ SUFFIX = ".j2"
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """From `time` s on: the fin about trim in rad, or the autopilot; and what each of several fins is told, in its own unit."""
+    """The command from `time` s on: the fin about trim in rad, or the autopilot; and that of each of several fins."""
 
     time: float
     fin: float
@@ -127,19 +127,19 @@ class Step:
 
 
 def styles() -> tuple[str, ...]:
-    """Return the file names a mission can be written as, such as `moos_timer_script.moos`: one per template."""
+    """Return the file names of missions, such as `moos_timer_script.moos`: one per template."""
     return tuple(Path(n).name.removesuffix(SUFFIX) for n in template_names() if n.startswith(f"{FOLDER}/") and n.endswith(SUFFIX))
 
 
 def steps_of(plan: Plan, leg: Leg) -> tuple[Step, ...]:
-    """Return the instants at which the command of a leg changes; within the limits, whatever the plan holds."""
+    """Return the changes of a leg's command, which is within the limits whatever the plan contains."""
     time, fin, steered = commands_of(leg, plan.envelope)
     fin = np.where(steered > 0, 0.0, fin)
     changed = (np.diff(fin, prepend=np.nan) != 0) | (np.diff(steered, prepend=np.nan) != 0)
     each = np.zeros((0, int(changed.sum()))) if plan.fins is None else plan.fins.fin_commands(fin[changed])
     return tuple(
-        Step(round(float(t), 4), round(float(f), 6), bool(s), tuple(np.round(told, 6).tolist()))
-        for t, f, s, told in zip(time[changed], fin[changed], steered[changed], each.T, strict=True)
+        Step(round(float(t), 4), round(float(f), 6), bool(s), tuple(np.round(fins, 6).tolist()))
+        for t, f, s, fins in zip(time[changed], fin[changed], steered[changed], each.T, strict=True)
     )
 
 
@@ -161,7 +161,7 @@ def render(plan: Plan, leg: Leg, style: str) -> str:
 
 
 def refuse_blind(plan: Plan, leg: Leg) -> None:
-    """Raise UsageError for a leg that follows the motion and whose expected fins, flown blind, would leave the envelope."""
+    """Raise UsageError for a leg whose rule, replayed as a list of expected fin angles, has too large a risk."""
     if leg.flown_from_list_in(plan.envelope):
         return
     raise UsageError(
@@ -173,7 +173,7 @@ def refuse_blind(plan: Plan, leg: Leg) -> None:
 
 
 def instead(leg: Leg) -> str:
-    """Return what to do where no list of fins can be sent: a circle has no kin without a rule, all others have."""
+    """Return the hint for a leg that cannot be flown as a list of fins; a circle has no open-loop alternative."""
     rule = "fly it by the vehicle's own rule"
     return rule if leg.purpose == CIRCLE else f"{rule}, or plan with `--open-loop`"
 
@@ -194,7 +194,7 @@ def _context(plan: Plan, leg: Leg) -> dict[str, Any]:
         "fin": names.fin.removesuffix("_rad"),
         "angle": names.angle,
         "vehicle": one_line(plan.vehicle)[:80],
-        "rule": None if leg.open_loop else _blind(leg),
+        "rule": None if leg.open_loop else _replay_remark(leg),
         "spec": leg.candidate.spec,
         "steps": steps_of(plan, leg),
         "fins": _fins(plan),
@@ -211,32 +211,34 @@ def _context(plan: Plan, leg: Leg) -> dict[str, Any]:
 
 
 def _limits(plan: Plan, leg: Leg) -> Envelope:
-    """Return the limits of a leg, the fin's no more than what several fins follow."""
+    """Return the limits of a leg, with the fin limit that the allocation over several fins allows."""
     limits = leg.envelope_in(plan.envelope)
     return limits if plan.fins is None else replace(limits, fin=min(limits.fin, plan.fins.reach))
 
 
 def _fins(plan: Plan) -> list[dict[str, Any]]:
-    """Return each of several fins: its name, its share of the command, its limit and the unit of both; none where it is one."""
+    """Return name, share of the command, limit and unit of each of several fins; empty for a single fin."""
     if plan.fins is None:
         return []
-    told = zip(plan.fins.names, plan.fins.shares, plan.fins.limits, strict=True)
-    return [{"name": name, "share": share, "limit": limit, "unit": plan.fins.unit} for name, share, limit in told]
+    rows = zip(plan.fins.names, plan.fins.shares, plan.fins.limits, strict=True)
+    return [{"name": name, "share": share, "limit": limit, "unit": plan.fins.unit} for name, share, limit in rows]
 
 
 def _turns(plan: Plan, leg: Leg) -> str:
-    """Return which way a positive fin turns the vehicle by the model that was planned with: a file's sign is the logs'."""
+    """Return in words to which side a positive fin turns the vehicle, by the prior of the plan."""
     names = NAMES[plan.axis]
     sign = leg.expected[names.authority].value if names.authority in leg.expected else math.nan
-    ways = {Axis.YAW: ("to starboard", "to port"), Axis.PITCH: ("nose up", "nose down")}[plan.axis]
+    sides = {Axis.YAW: ("to starboard", "to port"), Axis.PITCH: ("nose up", "nose down")}[plan.axis]
     fin = names.fin.removesuffix("_rad")
     return (
-        f"a positive {fin} turns {ways[0] if sign > 0 else ways[1]}" if math.isfinite(sign) else f"the {fin}'s sign is the logs'"
+        f"a positive {fin} turns {sides[0] if sign > 0 else sides[1]}"
+        if math.isfinite(sign)
+        else f"the {fin}'s sign is the logs'"
     )
 
 
-def _blind(leg: Leg) -> str:
-    """Return the remark that a rule's commands are the expected ones, flown whatever the vehicle does."""
+def _replay_remark(leg: Leg) -> str:
+    """Return the remark that the commands of a rule are the expected ones, flown open loop."""
     return (
         f"The maneuver is a rule, {leg.candidate.record.says}: these are the fins it is expected to ask for, flown blind; "
         f"{leg.replay_risk:.1%} of the vehicles that are thought possible leave the limits so."

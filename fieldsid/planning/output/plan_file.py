@@ -1,4 +1,4 @@
-"""A plan as a YAML file: written with everything needed to fly it, and checked again, number by number, when read."""
+"""A plan as a YAML file, whose numbers are all checked when it is read."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def save_plan(plan: Plan, path: Path, *, inputs: Sequence[Path] = (), force: boo
 
 
 def load_plan(path: Path) -> Plan:
-    """Read a plan back, every number checked against what a plan may hold.
+    """Read a plan back, with every number checked against its bounds.
 
     Raises ArtifactError naming what is missing, wrong or out of bounds.
     """
@@ -114,5 +114,5 @@ def _number(body: Mapping[str, Any], name: str, *bounds: float) -> float:
 
 
 def _known(value: Any, *bounds: Any) -> float:
-    """Return a number that may not be known, NaN then."""
+    """Return a number, NaN for None."""
     return math.nan if value is None else finite_number(value, *bounds)

@@ -1,1 +1,1 @@
-"""The safety envelope, and a Monte Carlo ensemble flown inside it."""
+"""The safety envelope, and the probability of leaving it by Monte Carlo simulation."""

@@ -20,11 +20,11 @@ from fieldsid.records.keys import Key, Number
 LARGEST_FIN = AMPLITUDE_HIGH
 LARGEST_SPEED = 15.0
 MOST_TURNS = 4.0
-"""Turns that a deviation of heading may be: more was meant in degrees."""
+"""Largest heading limit in full turns: a larger number was meant in degrees."""
 LEAST_FIN = 0.01
-"""rad: what trims and the play of a linkage are of."""
+"""Smallest fin limit, rad: the size of trims and of the play in a linkage."""
 ACCEPTED_SHARE = 0.05
-"""Share of the draws of the prior that may leave an envelope, unless another is asked for."""
+"""Default share of the draws of the prior that may leave the envelope."""
 NOT_LIMITED = "NOT LIMITED"
 _NO_LIMIT = ", or leave it out where there is no limit"
 OPTIONS: Mapping[str, tuple[str, str, float, str]] = {
@@ -41,21 +41,21 @@ OPTIONS: Mapping[str, tuple[str, str, float, str]] = {
     "area_width": ("--area", "m wide", np.inf, f"write `--area 200x60`{_NO_LIMIT}"),
     "share": ("--risk", "", 0.5, f"no maneuver is without risk: write `--risk 0.01`, or leave it out for {ACCEPTED_SHARE:g}"),
 }  # fmt: skip
-"""Of each limit: the option, its unit, the most that can be meant, and what to write instead of zero."""
+"""For each limit: the option, its unit, the largest accepted value, and the hint for a value that is refused."""
 SET_BY = {"depth": "--depth-band", "along": "--area", "across": "--area"} | {
     name: option for name, (option, *_) in OPTIONS.items()
 }
-"""The option of `sysid plan` that sets the room for an excursion."""
+"""The option of `sysid plan` that sets the limit of an excursion."""
 
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
-    """Limits about straight and level; None where there is none.
+    """Limits of a leg about straight and level; None for no limit.
 
-    heading, pitch, roll (rad) and track (m) are largest deviations to either side; `depth_low` and `depth_high` (m)
-    the band, entered at its middle; `area_length` (m) along the leg from the start of its run-up, `area_width` (m) across it,
-    half to either side of its line. `fin` (rad) and `fin_rate` (rad/s) bound every command. `share` is the accepted
-    probability of leaving any of them.
+    heading, pitch, roll (rad) and track (m) are largest deviations to either side; `depth_low` and `depth_high` (m) are the
+    limits of the depth, with the leg in their middle; `area_length` (m) is along the leg from the start of its run-up,
+    `area_width` (m) across it, half to either side. `fin` (rad) and `fin_rate` (rad/s) limit every command. `share` is the
+    accepted probability of leaving any of them.
     """
 
     fin: Annotated[float, Key("Largest fin angle about trim, rad.")]
@@ -90,35 +90,35 @@ class Envelope:
 
     @property
     def limits(self) -> Limits:
-        """The fin limits of every command."""
+        """The limits of every fin command."""
         return Limits(self.fin, self.fin_rate)
 
     def depth_room(self) -> float | None:
-        """Return how far the depth may move from the middle of the band, m."""
+        """Return the largest deviation of the depth from the middle of its band, m."""
         if self.depth_low is None or self.depth_high is None:
             return None
         return 0.5 * (self.depth_high - self.depth_low)
 
-    def rooms(self) -> dict[str, float]:
-        """Return the limit of every excursion that has one."""
-        known = {
+    def excursion_limits(self) -> dict[str, float]:
+        """Return the limits by the names of the excursions; those without a limit are left out."""
+        limits = {
             "heading": self.heading, "track": self.track, "depth": self.depth_room(), "pitch": self.pitch,
             "roll": self.roll, "along": self.area_length,
             "across": None if self.area_width is None else 0.5 * self.area_width,
         }  # fmt: skip
-        return {k: v for k, v in known.items() if v is not None}
+        return {k: v for k, v in limits.items() if v is not None}
 
     def widening(self) -> str:
-        """Return what to widen in words, the options of `sysid plan` that set a limit."""
-        options = dict.fromkeys(f"`{SET_BY[name]}`" for name in self.rooms())
+        """Return the hint to widen a limit, with the options of `sysid plan` that set one."""
+        options = dict.fromkeys(f"`{SET_BY[name]}`" for name in self.excursion_limits())
         return f"widen {' or '.join(options)}" if options else "allow more fin: `--fin-max`"
 
 
 @dataclass(frozen=True, slots=True)
 class Excursion:
-    """How far one flight went: rad and m, zero where the axis does not move it.
+    """The excursions of one flight in rad and m, zero for quantities that the axis does not change.
 
-    along is the farthest ahead of the start of the run-up, behind the farthest back of it, across the farthest to a side.
+    along is the largest distance ahead of the start of the run-up, behind that back of it, across that to a side.
     """
 
     heading: Annotated[float, Key("Deviation of heading, rad.")]
@@ -132,9 +132,9 @@ class Excursion:
 
 
 def track_of(axis: Axis, angle: FloatArray, speed: float, step: float) -> tuple[FloatArray, FloatArray]:
-    """Return distance along and across the leg (n, m) in m of angles (n, m) `step` s apart; across is depth for pitch.
+    """Return the distances along and across the leg (n, m) in m for angles (n, m) `step` s apart; across is depth for pitch.
 
-    The speed is kept in the turn.
+    The speed is assumed constant in the turn.
     """
     along, side = (np.cumsum(speed * step * part, axis=0) for part in (np.cos(angle), np.sin(angle)))
     return along, side if axis is Axis.YAW else -side
@@ -143,25 +143,26 @@ def track_of(axis: Axis, angle: FloatArray, speed: float, step: float) -> tuple[
 def excursions_of(
     axis: Axis, angle: FloatArray, rate: FloatArray, *, speed: float, step: float, run_up: float, roll_gain: FloatArray | float
 ) -> dict[str, FloatArray]:
-    """Return how far flights went, (m,) each by the names of `Excursion`, by their angles and rates (n, m) `step` s apart.
+    """Return the excursions of flights, (m,) each by the names of `Excursion`, from angles and rates (n, m) `step` s apart.
 
-    run_up is the distance (m) flown before them. Roll is that of a neutrally buoyant hull in a steady turn, u r / g,
-    times `roll_gain`: the centripetal force acts at the centre of mass, the hull's at its axis.
+    run_up is the distance (m) flown before them. Roll is that of a neutrally buoyant hull in a steady turn, u r / g, times
+    `roll_gain`: the centripetal force acts at the centre of mass, the hydrodynamic one at the axis of the hull.
     """
     along, side = track_of(axis, angle, speed, step)
-    most, off, fastest = (np.max(np.abs(part), axis=0) for part in (angle, side, rate))
-    moved = (
-        {"heading": most, "track": off, "roll": roll_gain * speed * fastest / GRAVITY, "across": off}
+    largest, off, fastest = (np.max(np.abs(part), axis=0) for part in (angle, side, rate))
+    of_axis = (
+        {"heading": largest, "track": off, "roll": roll_gain * speed * fastest / GRAVITY, "across": off}
         if axis is Axis.YAW
-        else {"depth": off, "pitch": most}
+        else {"depth": off, "pitch": largest}
     )
     ahead, behind = run_up + np.max(along, axis=0), np.maximum(0.0, -run_up - np.min(along, axis=0))
-    return dict.fromkeys((f.name for f in fields(Excursion)), np.zeros_like(most)) | moved | {"along": ahead, "behind": behind}
+    zeros = dict.fromkeys((f.name for f in fields(Excursion)), np.zeros_like(largest))
+    return zeros | of_axis | {"along": ahead, "behind": behind}
 
 
 def used(excursions: Mapping[str, FloatArray], envelope: Envelope) -> FloatArray:
-    """Return the largest share of a limit that flights use, (m,), 1 at the limit: the area begins at the start."""
-    shares = [excursions[name] / room for name, room in envelope.rooms().items()]
+    """Return the largest excursion of flights over its limit, (m,); above 1 also behind the start, where the area begins."""
+    shares = [excursions[name] / limit for name, limit in envelope.excursion_limits().items()]
     if envelope.area_length is not None:
         behind = excursions["behind"]
         shares.append(np.where(behind > 0.0, 1.0 + behind / envelope.area_length, 0.0))
@@ -169,7 +170,7 @@ def used(excursions: Mapping[str, FloatArray], envelope: Envelope) -> FloatArray
 
 
 def check_speeds(speeds: tuple[float, ...], low: float | None, high: float | None) -> None:
-    """Raise UsageError for speeds that are not positive, beyond any vehicle, or outside the vehicle's own range."""
+    """Raise UsageError for speeds that are not positive, above LARGEST_SPEED, or outside the vehicle's range."""
     if not speeds:
         raise UsageError("no speeds are given", found="an empty list", hint="for example `--speeds 1.0,1.4,1.8`")
     for speed in speeds:
@@ -205,19 +206,19 @@ def check_room(envelope: Envelope, speeds: tuple[float, ...], run_up_s: float, s
 
 
 def _refuse_meaningless(name: str, value: float) -> None:
-    """Raise UsageError for a limit of zero, or of more than can be meant."""
+    """Raise UsageError for a limit that is not above zero or exceeds the largest accepted value."""
     option, unit, most, hint = OPTIONS[name]
-    given = f"{option} {value:.4g} {unit}".rstrip()
+    stated = f"{option} {value:.4g} {unit}".rstrip()
     if not value > 0.0:
-        raise UsageError(f"`{option}` must be above zero", found=given, hint=hint)
+        raise UsageError(f"`{option}` must be above zero", found=stated, hint=hint)
     if value > most:
-        meant = unit == "rad" and value > 2.0 * most and np.radians(value) <= most
-        hint = f"write `{value:g}deg` if it is in degrees" if meant else f"at most {most:.4g} {unit}".rstrip()
-        raise UsageError(f"`{given}` cannot be right", found=f"{name} = {value:g}, most {most:g}", hint=hint)
+        may_be_degrees = unit == "rad" and value > 2.0 * most and np.radians(value) <= most
+        hint = f"write `{value:g}deg` if it is in degrees" if may_be_degrees else f"at most {most:.4g} {unit}".rstrip()
+        raise UsageError(f"`{stated}` cannot be right", found=f"{name} = {value:g}, most {most:g}", hint=hint)
 
 
 def limits_said(envelope: Envelope) -> dict[str, str]:
-    """Return every limit in words, in both units, NOT_LIMITED where there is none; the depth is about the middle of its band."""
+    """Return every limit in words, angles in deg and rad, NOT_LIMITED without one."""
     low, high, length, width = envelope.depth_low, envelope.depth_high, envelope.area_length, envelope.area_width
     fin_rate = envelope.fin_rate if np.isfinite(envelope.fin_rate) else None
 

@@ -1,4 +1,4 @@
-"""A Monte Carlo ensemble: draws of the prior flown at once, the largest excursion of each, and how many leave the envelope."""
+"""A Monte Carlo ensemble: draws of the prior simulated together, with their excursions and the share outside the envelope."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 from fieldsid.planning.belief.prior_model import disturbances, draws_of
-from fieldsid.planning.flight.excitation import Excitation, Window, asked_of
+from fieldsid.planning.flight.excitation import Excitation, Window, fin_command
 from fieldsid.planning.flight.operating_point import OperatingPoint, operating_point
 from fieldsid.planning.flight.rule_flight import OperatingPointPlant, fly_fins, fly_operating_points, plant_of
 from fieldsid.planning.safety.envelope import Envelope, excursions_of, track_of, used
 
 ROLL_SPREAD = 0.4
 TRIM_SPREAD = 0.005
-"""Spread of the roll factor (logarithm) and of the trim fin the autopilot has found (rad)."""
+"""Standard deviation of the logarithm of the roll factor, and of the autopilot's error of the trim fin (rad)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +49,12 @@ class Flights:
     excursions: dict[str, FloatArray]
 
     def outside(self, envelope: Envelope) -> BoolArray:
-        """Return which draws left the envelope, (m,)."""
+        """Return a mask (m,) of the draws that leave the envelope."""
         return np.asarray(used(self.excursions, envelope) > 1.0)
 
 
 def draw_ensemble(model: Model, speed: float, window: Window, count: int, seed: int) -> Ensemble:
-    """Return draws of a prior at a speed (m/s), ready to be flown over a window."""
+    """Return draws of a prior at a speed (m/s) for simulations over a window."""
     rng = np.random.default_rng(seed)
     scenes = tuple(operating_point(drawn, speed) for drawn in draws_of(model, count, seed))
     n = window.time.size
@@ -65,33 +65,36 @@ def draw_ensemble(model: Model, speed: float, window: Window, count: int, seed: 
     return Ensemble(model.axis, scenes, moments, roll, plant_of(scenes, n, window.rate_hz, moments), window)
 
 
-def fly_ensemble(crowd: Ensemble, candidate: Excitation, envelope: Envelope, autopilot: Autopilot, run_up_m: float) -> Flights:
-    """Return an excitation flown by an ensemble, all under the autopilot that was designed on the prior's mean."""
+def fly_ensemble(ensemble: Ensemble, candidate: Excitation, envelope: Envelope, autopilot: Autopilot, run_up_m: float) -> Flights:
+    """Return the flights of an ensemble under an excitation, with one autopilot, that for the prior's mean."""
     if candidate.record.rule is None:
-        asked = asked_of(candidate, crowd.window)
-        _, angle, rate = fly_fins(crowd.scenes, crowd.plant, crowd.window.time, asked, envelope.limits, autopilot)
+        fins = fin_command(candidate, ensemble.window)
+        _, angle, rate = fly_fins(ensemble.scenes, ensemble.plant, ensemble.window.time, fins, envelope.limits, autopilot)
     else:
-        schedule = Schedule(crowd.window.rate_hz, crowd.window.lead, crowd.window.recover)
+        schedule = Schedule(ensemble.window.rate_hz, ensemble.window.lead, ensemble.window.recover)
         flight = fly_operating_points(
-            crowd.scenes, candidate.record, candidate.parameters,
-            limits=envelope.limits, autopilot=autopilot, schedule=schedule, moments=crowd.moments,
+            ensemble.scenes, candidate.record, candidate.parameters,
+            limits=envelope.limits, autopilot=autopilot, schedule=schedule, moments=ensemble.moments,
         )  # fmt: skip
-        n = crowd.window.time.size
+        n = ensemble.window.time.size
         angle, rate = flight.angle[:n], flight.rate[:n]
-    return _measured(crowd, angle, rate, run_up_m)
+    return _with_excursions(ensemble, angle, rate, run_up_m)
 
 
-def fly_list(crowd: Ensemble, fins: FloatArray, envelope: Envelope, autopilot: Autopilot, run_up_m: float) -> Flights:
-    """Return fins about trim, (n,) rad with NaN for the autopilot, flown open loop by an ensemble, the autopilot after them."""
-    asked = np.full(crowd.window.time.size, np.nan)
-    count = min(asked.size, fins.size)
-    asked[:count] = fins[:count]
-    _, angle, rate = fly_fins(crowd.scenes, crowd.plant, crowd.window.time, asked, envelope.limits, autopilot)
-    return _measured(crowd, angle, rate, run_up_m)
+def fly_list(ensemble: Ensemble, fins: FloatArray, envelope: Envelope, autopilot: Autopilot, run_up_m: float) -> Flights:
+    """Return the flights of an ensemble under a list of fin angles about trim, (n,) rad, NaN for the autopilot.
+
+    The autopilot steers after the end of the list.
+    """
+    command = np.full(ensemble.window.time.size, np.nan)
+    count = min(command.size, fins.size)
+    command[:count] = fins[:count]
+    _, angle, rate = fly_fins(ensemble.scenes, ensemble.plant, ensemble.window.time, command, envelope.limits, autopilot)
+    return _with_excursions(ensemble, angle, rate, run_up_m)
 
 
-def _measured(crowd: Ensemble, angle: FloatArray, rate: FloatArray, run_up_m: float) -> Flights:
-    """Return the flights with their excursions."""
-    step, speed = 1.0 / crowd.window.rate_hz, crowd.scenes[0].speed
-    far = excursions_of(crowd.axis, angle, rate, speed=speed, step=step, run_up=run_up_m, roll_gain=crowd.roll)
-    return Flights(crowd.window.time[: angle.shape[0]], angle, *track_of(crowd.axis, angle, speed, step), far)
+def _with_excursions(ensemble: Ensemble, angle: FloatArray, rate: FloatArray, run_up_m: float) -> Flights:
+    """Return the flights of angles and rates (n, m) with tracks and excursions."""
+    step, speed = 1.0 / ensemble.window.rate_hz, ensemble.scenes[0].speed
+    far = excursions_of(ensemble.axis, angle, rate, speed=speed, step=step, run_up=run_up_m, roll_gain=ensemble.roll)
+    return Flights(ensemble.window.time[: angle.shape[0]], angle, *track_of(ensemble.axis, angle, speed, step), far)

@@ -1,1 +1,1 @@
-"""What the user asks for: accuracy goals and quantities as they are typed."""
+"""Accuracy goals and quantities as a user types them."""

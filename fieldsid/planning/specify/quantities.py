@@ -1,4 +1,4 @@
-"""What a user types: an area `200x60`, a band `1:5`, speeds, accuracies `a22=5%,b2=3%`; angles are read in `angles.py`."""
+"""Quantities as a user types them: an area `200x60`, a band `1:5`, speeds, accuracies `a22=5%,b2=3%`; angles: `angles.py`."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ MOST_SPEEDS = 50
 
 def parse_area(text: str | None) -> tuple[float, float] | tuple[None, None]:
     """Read `LxW` in m, length along the leg and width across it; raises UsageError."""
-    return _two(text, "x", "an area", "--area", "length x width in metres: `--area 200x60`")
+    return _two_numbers(text, "x", "an area", "--area", "length x width in metres: `--area 200x60`")
 
 
 def parse_band(text: str | None) -> tuple[float, float] | tuple[None, None]:
     """Read `shallowest:deepest` in m; raises UsageError."""
-    return _two(text, ":", "a depth band", "--depth-band", "for example `--depth-band 1:5`")
+    return _two_numbers(text, ":", "a depth band", "--depth-band", "for example `--depth-band 1:5`")
 
 
-def _two(text: str | None, between: str, what: str, option: str, hint: str) -> tuple[float, float] | tuple[None, None]:
-    """Return two numbers as they are typed, None and None where nothing is."""
+def _two_numbers(text: str | None, between: str, what: str, option: str, hint: str) -> tuple[float, float] | tuple[None, None]:
+    """Return the two numbers of a text with `between` between them, None and None without a text; raises UsageError."""
     if text is None:
         return None, None
     first, mark, second = text.lower().partition(between)
@@ -50,7 +50,7 @@ def parse_speeds(text: str) -> tuple[float, ...]:
 
 
 def read_number(text: str, option: str, whole: str, hint: str) -> float:
-    """Return a number as it is typed in the `whole` of an option; raises UsageError."""
+    """Return the number of a text that is part of the option text `whole`; raises UsageError."""
     try:
         value = float(text)
     except ValueError:
@@ -61,13 +61,13 @@ def read_number(text: str, option: str, whole: str, hint: str) -> float:
 
 
 MIN_RELATIVE_ERROR, MAX_RELATIVE_ERROR = 1e-4, 1.0
-"""Relative errors that can be asked for."""
+"""Range of the relative errors that are accepted as goals."""
 
 
 def parse_accuracy_goals(text: str, known: Sequence[str]) -> dict[str, float]:
     """Read `name=5%` or `name=0.05`, separated by commas, as relative standard errors.
 
-    Raises UsageError for an unknown parameter (with near matches), a value that is not a number or cannot be meant.
+    Raises UsageError for an unknown parameter (with near matches), or a value that is not a number or out of range.
     """
     out: dict[str, float] = {}
     for item in filter(None, (part.strip() for part in text.split(","))):
@@ -100,6 +100,6 @@ def accuracy_goals_text(wish: Mapping[str, float]) -> str:
 
 
 def _up(value: float) -> float:
-    """Round up to two significant digits, so that what is offered can be kept."""
+    """Return a value rounded up to two significant digits, so that the goal can be met."""
     step = 10.0 ** (floor(log10(value)) - 1)
     return round(ceil(value / step - 1e-9) * step, 10)

@@ -16,7 +16,7 @@ from fieldsid.maneuvers import all_maneuvers
 from fieldsid.models.axis import Axis
 from fieldsid.planning.belief.prior_model import checked_prior, corner, draws_of, load_believed, named_prior
 from fieldsid.planning.design.objective import make_objective
-from fieldsid.planning.design.optimise import LEFT_OUT, SHORTEST_HOLD_S, _started, merge_short_holds
+from fieldsid.planning.design.optimise import LEFT_OUT, SHORTEST_HOLD_S, _start_of, merge_short_holds
 from fieldsid.planning.flight.excitation import Window, fits
 from fieldsid.planning.safety.envelope import Envelope, check_room, check_speeds
 from fieldsid.planning.specify.quantities import accuracy_goals_text, parse_accuracy_goals, parse_area, parse_band, parse_speeds
@@ -127,7 +127,7 @@ def test_a_maneuver_is_made_to_fit_a_short_window_or_left_out(length):
     """Pulses without a rest between them are still too long there: the rest cannot be shortened for ever."""
     judge = make_objective(named_prior("torpedo", Axis.YAW), 1.4, Envelope(0.26), Window(length), {}, 10.0)
     with in_time(20):
-        started = [_started(m, judge) for m in all_maneuvers().values() if m.name not in LEFT_OUT]
+        started = [_start_of(m, judge) for m in all_maneuvers().values() if m.name not in LEFT_OUT]
     assert any(s is not None for s in started)
     assert all(fits(s, judge.window) for s in started if s is not None)
 
