@@ -97,7 +97,7 @@ def fly_turn(
     """Fill track (n + 1, 4) with heading, north, east and path of a turn under fins (n,) rad, by the midpoint rule.
 
     `pushed` (rad/s^2) is the moment of thrust and other signals. `own` are rates (r,) and the moment (r,) at them of effects
-    outside the core, empty without any. The cross state is the moment -a21 v with a21 ~ u; divided by the scale of the speed it is
+    outside the core, empty without any. The cross state is the moment -a21 v with a21 ~ u; divided by the speed scale it is
     proportional to v, which does not jump while the speed falls.
     """
     kinds, core = kinds_of(vehicle.core), np.empty(vehicle.core.size)
