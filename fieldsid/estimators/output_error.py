@@ -1,7 +1,7 @@
-"""Output error: free-run simulation, least squares on angle and rate weighted by their own residual noise.
+"""Output error: free-run simulation, least squares on angle and rate, each weighted by its residual standard deviation.
 
-Standard errors are those of the residuals' own colour (noise/sandwich_covariance.py), so that a disturbance or a
-missing effect widens them. Source: Ljung 1999, section 7.2; Klein and Morelli 2006, chapter 6.
+Standard errors allow for the colour of the residuals (noise/sandwich_covariance.py), so that a disturbance or a missing effect
+widens them. Source: Ljung 1999, section 7.2; Klein and Morelli 2006, chapter 6.
 """
 
 from __future__ import annotations
@@ -35,44 +35,44 @@ from fieldsid.noise.whiten import noise_vector
 from fieldsid.numerics.arrays import FloatArray
 
 MAX_ROUNDS = 12
-"""Descents with the weights of the residuals before them, and searches for other times of events. From weights of the wrong
-proportion each descent takes away most of what is left, not all: two ended up to 50 units of log likelihood
-short of the optimum (a delay of 0.6 s)."""
+"""Most descents, each with the weights of the previous residuals, and most searches for other times of events. Where the weights
+start in the wrong proportion, each descent closes most of the distance to the optimum: after two, up to 50 units of log
+likelihood were missing (a delay of 0.6 s)."""
 PROVISIONAL_COST_TOLERANCE = 1e-3
 """Relative change of the cost at which a descent under provisional weights ends."""
 NEGLIGIBLE_LIKELIHOOD_GAIN = 0.01
-"""Log likelihood that the last descent may have gained."""
+"""Gain of log likelihood by a descent at which the alternation ends."""
 NEGLIGIBLE_LOG_WEIGHT_CHANGE = 0.02
-"""Change of both weights on a long record, in logs, that does not move the minimum."""
+"""Sum of the changes of both log weights on a long record below which the minimum is not computed again."""
 MIN_RESCAN_GAIN = 0.5
-"""Log likelihood below which another search of the nuisances' grids at the minimum found is not worth it."""
+"""Gain of log likelihood below which the grids of the nuisance parameters are not searched again."""
 MAX_STARTS = 6
-"""Other times of events that a solution is left for, the most promising first."""
+"""Most starts with other times of events that are tried from a solution, the most promising first."""
 START_COST_TOLERANCE = 1e-5
-"""Relative change of the cost at which a descent ends from one of many starts, most of which lead nowhere."""
+"""Relative change of the cost at which a descent from one of many starts ends; most of these reach no lower minimum."""
 LONG_RECORD_COST_TOLERANCE = 1e-4
-"""The same on a long record, whose start is near the end."""
+"""Relative change of the cost at which a descent on a long record ends, whose start is near the minimum."""
 INITIAL_DAMPING = 1e-9
-"""Marquardt's damping of its first step: a larger one would stop short of the minimum by more than its error."""
+"""Marquardt's damping of the first step on a long record: a larger one would end farther from the minimum than one error."""
 FIRST_PART_SAMPLES = (5_000, 50_000)
-"""Samples of the first parts of a long record."""
+"""Lengths, in samples, of the first parts on which the minimum of a long record is computed beforehand."""
 
 
 def residual_noise(problem: Problem, x: FloatArray, parameters: int) -> Noise:
-    """Return the residual standard deviation of both channels, corrected for the parameters estimated.
+    """Return the residual standard deviation of both channels, corrected for the number of parameters estimated.
 
-    It is not below what counts as no noise: of a log without any, the channel that the model follows exactly would be all.
+    It has a lower bound: in a log without noise, a channel that the model follows exactly would otherwise have all the weight.
     """
     squares, counts = squares_of(problem, x)
-    lost = parameters * counts / max(float(counts.sum()), 1.0)
-    sigma = np.sqrt(squares / np.maximum(counts - lost, 1.0))
+    used_up = parameters * counts / max(float(counts.sum()), 1.0)
+    sigma = np.sqrt(squares / np.maximum(counts - used_up, 1.0))
     floor, least = white_noise_floor(problem.records), (MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S)
     angle, rate = (max(float(v), low) for v, low in zip(sigma, least, strict=True))
     return Noise(angle if sigma[0] > 0 else floor.angle, rate if sigma[1] > 0 else floor.rate)
 
 
 def minimise(problem: Problem, start: FloatArray, noise: Noise) -> tuple[Minimum, Noise]:
-    """Return the output-error minimum from a start, with weights from its own residuals."""
+    """Return the output-error minimum from a start, and its weights, which are those of its residuals."""
     found = levenberg_marquardt(problem, start, noise, tolerance=PROVISIONAL_COST_TOLERANCE)
     cost = negative_log_likelihood(problem, found.x)
     for _ in range(MAX_ROUNDS):
@@ -84,11 +84,12 @@ def minimise(problem: Problem, start: FloatArray, noise: Noise) -> tuple[Minimum
     return found, noise
 
 
-def _rescanned(problem: Problem, found: Minimum, weights: Noise) -> tuple[Minimum, Noise]:
-    """Return the minimum from which no search for the runs' event times and phases leads to a lower one, with its weights.
+def _search_other_event_times(problem: Problem, found: Minimum, weights: Noise) -> tuple[Minimum, Noise]:
+    """Return the lowest minimum that searches for other event times and phases of the runs find, with its weights.
 
-    While the fin rests an event's time changes nothing, and no descent leaves such a stretch. With the shared parameters found,
-    the grids show each run's best; with the times found, the effect screened anew shows which times and sizes go together.
+    While the fin is at rest the cost does not depend on the time of an event, and no descent leaves such an interval. One search
+    uses the grid of each run at the shared parameters found; another screens the effect again at the times found, which shows
+    which times and sizes belong together.
     """
     timed = [e for e in problem.layout.effects if any(c.scan for c in e.nuisance)]
     if not timed:
@@ -97,7 +98,7 @@ def _rescanned(problem: Problem, found: Minimum, weights: Noise) -> tuple[Minimu
     for _ in range(MAX_ROUNDS):
         before, x = cost, found.x
         for start in _starts_at_other_times(problem, x, timed, weights):
-            # what a start before this one has gained stays: it is of another event
+            # the shift of the start is added to the present minimum: an earlier start may have improved another event
             other = levenberg_marquardt(problem, found.x + start - x, weights, tolerance=START_COST_TOLERANCE)
             if not other.cost < found.cost:
                 continue
@@ -111,20 +112,20 @@ def _rescanned(problem: Problem, found: Minimum, weights: Noise) -> tuple[Minimu
 
 
 def _starts_at_other_times(problem: Problem, x: FloatArray, timed: Sequence[Effect], weights: Noise) -> Iterator[FloatArray]:
-    """Yield starts with other times of events and other phases, those of every run alone before those of all together."""
+    """Yield starts with other event times and phases: refitted run by run, by a new screen of each effect, event by event."""
     start = x
     for run in range(len(problem.records)):
         start = refit_nuisances(problem, start, run, weights)
     yield start
     for effect in timed:
-        yield _screened_again(problem, x, effect, weights)
+        yield _screen_again(problem, x, effect, weights)
     yield from starts_at_other_times(problem, x, weights, MAX_STARTS)
 
 
-def _screened_again(problem: Problem, x: FloatArray, effect: Effect, weights: Noise) -> FloatArray:
-    """Return a start with one effect screened beside the other parameters of a solution: times and sizes of its events together.
+def _screen_again(problem: Problem, x: FloatArray, effect: Effect, weights: Noise) -> FloatArray:
+    """Return a start with one effect screened again at the other parameters of a solution: event times and sizes together.
 
-    The first screen stood on a model that lacked the effect, whose parameters it had biased.
+    The first screen used a model without the effect, whose parameters were biased by that.
     """
     rest = problem.with_effects([e for e in problem.layout.effects if e is not effect])
     linearisation = linearise_at(rest, carry_parameters(rest.layout, (problem.layout, x)), weights)
@@ -133,20 +134,20 @@ def _screened_again(problem: Problem, x: FloatArray, effect: Effect, weights: No
 
 
 def found_minimum(problem: Problem) -> tuple[Minimum, Noise]:
-    """Return the output-error minimum of a problem and its weights; raises DivergenceError where no start leads to any."""
-    found, weights = _found_over_parts(problem)
+    """Return the output-error minimum of a problem and its weights; raises DivergenceError where the motion is unbounded."""
+    found, weights = _minimum_by_parts(problem)
     refuse_unbounded_motion(problem, found.x, ESTIMATOR.name, instead="leave effects out")
     return found, weights
 
 
-def _found_over_parts(problem: Problem) -> tuple[Minimum, Noise]:
-    """Return the minimum that a long record comes to over the minima of ever longer first parts, a short one at once.
+def _minimum_by_parts(problem: Problem) -> tuple[Minimum, Noise]:
+    """Return the minimum of a problem; for a long record by way of the minima of its first parts, each longer than the last.
 
-    Each is so near the next one's that a step or two lead there.
+    The minimum of one part is so near to that of the next that one or two steps suffice.
     """
     floor, longest = white_noise_floor(problem.records), max(len(r) for r in problem.records)
     first = problem if longest <= 2 * FIRST_PART_SAMPLES[0] else problem.first(FIRST_PART_SAMPLES[0])
-    found, weights = _rescanned(first, *minimise(first, forward_build(first, floor), floor))
+    found, weights = _search_other_event_times(first, *minimise(first, forward_build(first, floor), floor))
     if first is problem:
         return found, weights
     for samples in FIRST_PART_SAMPLES[1:]:
@@ -162,7 +163,7 @@ def _found_over_parts(problem: Problem) -> tuple[Minimum, Noise]:
 
 
 def errors(problem: Problem, found: Minimum, weights: Noise, noise: Noise, noise_kind: str) -> FloatArray:
-    """Return the covariance (F, F) of the estimate, allowing on short records for noise that is not known exactly."""
+    """Return the covariance (F, F) of the estimate; on short records it allows for the uncertainty of the noise parameters."""
     if noise_kind == "white":
         return covariance(found.normal)
     _, normal, _, results = normal_equations(problem, found.x, weights, found.free)
@@ -171,9 +172,9 @@ def errors(problem: Problem, found: Minimum, weights: Noise, noise: Noise, noise
         return white_weight_covariance(problem, found, weights, vector, normal, results)
     lines, count = linearise_runs(problem, found.x), len(problem.layout.parameters)
     spread = noise_covariance(restricted_likelihood(lines, count), vector, noise_kind)
-    still = found.x[list(found.free)]
+    estimate = found.x[list(found.free)]
     return kenward_roger(
-        lambda v: (still, white_weight_covariance(problem, found, weights, v, normal, results)),
+        lambda v: (estimate, white_weight_covariance(problem, found, weights, v, normal, results)),
         vector,
         noise_kind,
         spread,

@@ -1,7 +1,7 @@
 """Prediction error: the free run plus a Kalman filter for a disturbance moment and coloured sensor noise.
 
-Alternates generalised least squares under the current noise model with the noise model of highest likelihood for
-the new residuals. Efficient under a disturbance, where plain output error is not. Source: Ljung 1999, chapter 7.
+It alternates generalised least squares under the current noise model with maximum likelihood of the noise model for the new
+residuals. It is efficient under a disturbance, where output error is not. Source: Ljung 1999, chapter 7.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from fieldsid.numerics.arrays import FloatArray
 
 MAX_ALTERNATIONS = 8
 CONVERGED_STD_ERRORS = 1e-2
-"""Largest movement, in standard errors, at which noise and parameters count as agreed."""
+"""Largest change of a parameter, in standard errors, at which the alternation has converged."""
 
 
 def solve(problem: Problem, _options: Options) -> Solution:
@@ -38,15 +38,15 @@ def solve(problem: Problem, _options: Options) -> Solution:
 
 
 def after(problem: Problem, plain: Solution) -> Solution:
-    """Return the prediction-error solution that an output-error solution leads to."""
+    """Return the prediction-error solution that starts from an output-error solution."""
     return solve_from(problem, plain.x, residual_noise(problem, plain.x, len(plain.x)))
 
 
 def solve_from(problem: Problem, x: FloatArray, weights: Noise) -> Solution:
-    """Return the prediction-error solution that an output-error minimum x leads to.
+    """Return the prediction-error solution that starts from an output-error minimum x.
 
-    The family of the noise is chosen again after the first step away from that minimum, whose residuals a
-    disturbance fed back through the fin has bent.
+    The kind of noise is selected again after the first descent: where a controller feeds a disturbance back through the fin,
+    the output-error minimum is biased, and so are its residuals.
     """
     part = problem.first(MAX_NOISE_SAMPLES // len(problem.records))
     found = levenberg_marquardt(problem, x, select_noise(problem, x, weights)[1])
@@ -54,8 +54,8 @@ def solve_from(problem: Problem, x: FloatArray, weights: Noise) -> Solution:
     for _ in range(MAX_ALTERNATIONS):
         before = found.x
         found = levenberg_marquardt(problem, before, noise)
-        settled = _moved(found, before) < CONVERGED_STD_ERRORS
-        if settled:
+        has_converged = _largest_change(found, before) < CONVERGED_STD_ERRORS
+        if has_converged:
             break
         lines = linearise_runs(part, found.x)
         noise, _ = reml_noise(problem, lines, restricted_likelihood(lines, len(problem.layout.parameters)), noise_kind, noise)
@@ -65,7 +65,7 @@ def solve_from(problem: Problem, x: FloatArray, weights: Noise) -> Solution:
 
 
 def errors(problem: Problem, found: Minimum, noise: Noise, noise_kind: str) -> FloatArray:
-    """Return the covariance (F, F) of the estimate, allowing on short records for noise that is not known exactly."""
+    """Return the covariance (F, F) of the estimate; on short records it allows for the uncertainty of the noise parameters."""
     if noise_kind == "white" or sum(len(r) for r in problem.records) > KNOWN_NOISE_SAMPLES:
         return covariance(found.normal)
     lines, count, vector = linearise_runs(problem, found.x), len(problem.layout.parameters), noise_vector(noise)
@@ -73,7 +73,8 @@ def errors(problem: Problem, found: Minimum, noise: Noise, noise_kind: str) -> F
     return kenward_roger(lambda v: gls_step(lines, count, v), vector, noise_kind, spread)
 
 
-def _moved(found: Minimum, before: FloatArray) -> float:
+def _largest_change(found: Minimum, before: FloatArray) -> float:
+    """Return the largest change of a free parameter in standard errors."""
     spread = np.sqrt(np.maximum(np.diag(covariance(found.normal)), 0.0))
     return float(np.max(np.abs(found.x - before)[list(found.free)] / np.maximum(spread, 1e-12)))
 

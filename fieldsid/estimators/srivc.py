@@ -1,10 +1,11 @@
-"""Refined instrumental variables for logs with an angle and no rate: the filter is the model's own denominator.
+"""Refined instrumental variables for logs with an angle and no rate: the filter is one over the model's denominator.
 
-All signals pass 1/A(s), A = s^2 + a s + k of the last estimate, so that the residual is the output error itself; the
-instruments are those signals of the noise-free simulation, which no sensor noise can bias:
+All signals are filtered by 1/A(s), A = s^2 + a s + k of the last estimate, so that the residual is the output error. The
+instruments are the same signals of the noise-free simulation, which sensor noise does not bias:
     Theta = (Z' Phi)^-1 Z' Q,   Phi = [-y'_f, -y_f, delta_f, 1_f, start terms],   Q = y''_f,   Z as Phi of the simulation.
-The filter is the compiled core itself, so that the command is held and any step lengths are right. Between samples
-the measurement follows the simulation's shape. Source: Young and Jakeman 1980; Garnier and Wang 2008, chapter 4.
+The filter is the compiled simulation core: it treats the command as a zero-order hold and allows unequal steps. Between samples
+the measurement is interpolated with the shape of the simulation. Source: Young and Jakeman 1980; Garnier and Wang 2008, chapter
+4.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ def solve(problem: Problem, options: Options) -> Solution:
         rows, instruments = filtered_rows(record, theta, state)
         phi, z = rows.columns[use][:, keep], instruments.columns[use][:, keep]
         if not (np.isfinite(z).all() and np.isfinite(phi).all()):
-            raise _astray(record, theta, rounds)
+            raise _divergence_error(record, theta, rounds)
         scale = 1.0 / np.maximum(np.linalg.norm(z, axis=0), 1e-300)
         found = np.linalg.lstsq((z * scale).T @ (phi * scale), (z * scale).T @ rows.target[use], rcond=1e-13)[0] * scale
         moved = float(np.max(np.abs(found[: len(slots)] - x[slots]) / (np.abs(x[slots]) + 1e-3)))
@@ -89,12 +90,12 @@ def filtered_rows(record: Record, theta: RegressionParameters, state: FloatArray
     start, change = np.repeat(path.start, pieces), np.repeat(path.end - path.start, pieces)
     fin = start + change * part, start + change * (part + 1.0 / pieces)
     a, k = max(theta.damping, MIN_FILTER_DAMPING), max(theta.stiffness, 0.0)
-    push = [theta.authority * f + theta.trim for f in fin]
-    motion = through(fine, a, k, push[0], push[1], state)[:, 0]
+    moment = [theta.authority * f + theta.trim for f in fin]
+    motion = through(fine, a, k, moment[0], moment[1], state)[:, 0]
     every = slice(None, None, pieces)
     smooth = through(fine, a, k, motion[:-1], motion[1:])[every]
-    apart = measured - motion[every]
-    rough = smooth + through(record.steps, a, k, apart[:-1], apart[1:])
+    deviation = measured - motion[every]
+    rough = smooth + through(record.steps, a, k, deviation[:-1], deviation[1:])
     inputs = [through(fine, a, k, *fin)[every, 0], through(fine, a, k, np.ones(fine.size), np.ones(fine.size))[every, 0]]
     impulse = through(record.steps, a, k, np.zeros(record.steps.size), np.zeros(record.steps.size), np.array([0.0, 1.0]))
     return _rows(measured, rough, inputs, impulse, a, k), _rows(motion[every], smooth, inputs, impulse, a, k)
@@ -108,7 +109,7 @@ def _rows(angle: FloatArray, out: FloatArray, inputs: list[FloatArray], impulse:
 def through(
     steps: FloatArray, a: float, k: float, start: FloatArray, end: FloatArray, state: FloatArray | None = None
 ) -> FloatArray:
-    """Return a signal, straight over each interval, through 1/(s^2 + a s + k), and its slope: (n, 2)."""
+    """Return a signal, linear over each interval, filtered by 1/(s^2 + a s + k), and its derivative: (n, 2)."""
     drive = np.zeros((steps.size, len(DRIVES)))
     drive[:, DAMPING], drive[:, STIFFNESS], drive[:, MOMENT_START], drive[:, MOMENT_END] = a, k, start, end
     first = np.zeros(3) if state is None else np.array([state[0], state[1], 0.0])
@@ -118,7 +119,7 @@ def through(
     return out[:, :2]
 
 
-def _astray(record: Record, theta: RegressionParameters, rounds: int) -> DivergenceError:
+def _divergence_error(record: Record, theta: RegressionParameters, rounds: int) -> DivergenceError:
     return DivergenceError(
         f"the instrumental variables of run {record.name!r} grow without bound",
         found=f"round {rounds}: damping {theta.damping:.3g}, stiffness {theta.stiffness:.3g}, authority {theta.authority:.3g}",
@@ -127,7 +128,7 @@ def _astray(record: Record, theta: RegressionParameters, rounds: int) -> Diverge
 
 
 def notes_of(rounds: int, moved: float) -> tuple[Note, ...]:
-    """Return the remark on iterations that did not settle."""
+    """Return the note on iterations that did not converge."""
     if moved <= 1e-3:
         return ()
     message = f"the instrumental variables did not settle in {rounds} rounds (last change {100 * moved:.2g} %)"

@@ -1,8 +1,8 @@
 """State variable filter and block least squares: the paper's method on the whole record at once.
 
-Phi Theta = Q with Phi = [-p_f, -y_f, delta_f, 1_f] from the filter's states, initial values as columns of their own.
-The command is held, the measurement straight between samples, then parabolic with the curvature of the model just
-found. The speed law of a joint fit is a(u) ~ u. Source: the paper, estimator 2 (block least squares).
+Phi Theta = Q with Phi = [-p_f, -y_f, delta_f, 1_f] from the filter's states; the initial values have columns as well. The command
+is a zero-order hold. The measurement is linear between samples at first, then parabolic with the curvature of the last estimate.
+The speed law of a joint fit is a(u) ~ u. Source: the paper, estimator 2 (block least squares).
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ MAX_ANGLE_ONLY_BANDWIDTH_RAD_S = 4.0
 
 
 def solve(problem: Problem, options: Options) -> Solution:
-    """Return the block least-squares solution of a joint problem; raises DataError where the data cannot carry it."""
+    """Return the block least-squares solution of a joint problem; raises DataError where the data do not determine it."""
     x, covariance, signals = regress(problem, options.bandwidth)
     return finished(problem, x, covariance, ESTIMATOR.name, bandwidth_notes(signals, options.bandwidth))
 
 
 def regress(problem: Problem, bandwidth: float) -> tuple[FloatArray, FloatArray, list[Measured]]:
-    """Return the vector (N,), covariance of its base parameters and start terms, and the signals of each run."""
+    """Return the parameter vector (N,), the covariance of base parameters and start terms, and the signals of each run."""
     signals = [measured_signals(r, bandwidth) for r in problem.records]
     slots = base_slots(problem)
     theta: list[RegressionParameters] | None = None
@@ -63,15 +63,15 @@ def regress(problem: Problem, bandwidth: float) -> tuple[FloatArray, FloatArray,
 
 
 def median_step(record: Record) -> float:
-    """Return the usual sampling interval in s."""
+    """Return the median sampling interval in s."""
     return float(np.median(record.steps))
 
 
 @dataclass(frozen=True, slots=True)
 class Stacked:
-    """All runs' rows: matrix (m, P) over base parameters and each run's start terms, target (m,), each run's part.
+    """The regression rows of all runs: matrix (m, P) of base parameters and start terms, target (m,), rows of each run.
 
-    `maps` (runs of (4, P)) take a run's own four columns to the stack's.
+    `maps`, one (4, P) for each run, express the four base parameters of the run by those of the stack.
     """
 
     matrix: FloatArray
@@ -97,7 +97,7 @@ class Stacked:
 
 
 def column_map(problem: Problem, run: int, slots: dict[str, int], width: int) -> FloatArray:
-    """Return how a run's damping, stiffness, authority and trim follow from the shared parameters, (4, width)."""
+    """Return the matrix (4, width) from the shared parameters to a run's damping, stiffness, authority and trim."""
     names, groups = NAMES[problem.layout.axis], problem.layout.groups
     order, out = list(slots), np.zeros((4, width))
     ones = problem.start()
@@ -114,9 +114,9 @@ def column_map(problem: Problem, run: int, slots: dict[str, int], width: int) ->
 def without_noise_bias(
     problem: Problem, rows: Stacked, found: FloatArray, signals: list[Measured], bandwidth: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the estimate (P,) with the bias of white sample noise taken out, and its inverse normal matrix (P, P).
+    """Return the estimate (P,) corrected for the bias of white sensor noise, and its inverse normal matrix (P, P).
 
-    Where noise makes up more than half of a direction, the estimate is returned as it is: nothing can mend it.
+    Where noise makes up more than half of the information in a direction, the estimate is returned uncorrected.
     """
     normal = rows.matrix.T @ rows.matrix
     gram, cross = np.zeros_like(normal), np.zeros(normal.shape[0])
@@ -139,7 +139,7 @@ def base_slots(problem: Problem) -> dict[str, int]:
 
 
 def least_squares(rows: Stacked, wanted: int) -> FloatArray:
-    """Return the solution (P,); raises DataError where fewer than the `wanted` first columns can be told apart."""
+    """Return the solution (P,); raises DataError where one of the first `wanted` columns is zero or there are too few rows."""
     matrix, target = rows.matrix, rows.target
     scale = np.linalg.norm(matrix, axis=0)
     dead = np.flatnonzero(scale[:wanted] == 0.0)
@@ -167,11 +167,11 @@ def finished(
     notes: tuple[Note, ...],
     history: History | None = None,
 ) -> Solution:
-    """Return the solution with every run's initial state at its best and the noise of its free run.
+    """Return the solution with the initial state of every run fitted, and with the noise of the free run.
 
-    `known` is the covariance of the base parameters, and of what may come after them.
+    `known` is a covariance whose first rows are those of the base parameters; further rows are ignored.
 
-    Raises DivergenceError when the motion that was found grows without bound.
+    Raises DivergenceError where the motion of the solution grows without bound.
     """
     layout, slots = problem.layout, list(base_slots(problem).values())
     covariance = np.zeros((layout.shared, layout.shared))
@@ -185,7 +185,7 @@ def finished(
 
 
 def bandwidth_notes(signals: list[Measured], bandwidth: float) -> tuple[Note, ...]:
-    """Return the remark on a filter too wide for a log without a rate."""
+    """Return the note on a filter bandwidth that is too large for a log without a rate."""
     if bandwidth <= MAX_ANGLE_ONLY_BANDWIDTH_RAD_S or all(s.order == 1 for s in signals):
         return ()
     message = (

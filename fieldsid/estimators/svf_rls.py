@@ -1,9 +1,9 @@
 """State variable filter and recursive least squares with forgetting: the paper's on-board estimator, over a record.
 
-The estimate of every sample is kept with its band, and the time from which each parameter stays near its last value.
-Bands are those of the recursion, scaled by what the colour of the residuals makes of them at the end; the bias of
-white sensor noise is taken out of every estimate.
-Source: the paper, estimator 2 (recursive).
+The history has the estimate after every sample with its standard error, and the time from which each parameter stays near its
+last value. The standard errors are those of the recursion, times one factor for each parameter: the ratio of the last error with
+and without allowance for coloured residuals. Every estimate is corrected for the bias of white sensor noise. Source: the paper,
+estimator 2 (recursive).
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def solve(problem: Problem, options: Options) -> Solution:
 
 
 def share_of(record: Record, signals: Measured, bandwidth: float) -> NoiseShare:
-    """Return the share of the record's own white noise in one row's products."""
+    """Return the contribution of the record's white noise to the products of one row."""
     floor = white_noise_floor([record])
     return noise_share(signals.order, bandwidth, median_step(record), floor.angle, floor.rate)
 
@@ -69,9 +69,9 @@ def share_of(record: Record, signals: Measured, bandwidth: float) -> NoiseShare:
 def run(
     record: Record, signals: Measured, options: Options, theta: RegressionParameters, *, stiff: bool
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return estimates and plain standard deviations after every sample (n, p), and rows of phi and target (n, p + 1).
+    """Return estimates and uncorrected standard errors after every sample (n, p), and rows of phi and target (n, p + 1).
 
-    theta gives the curvature between samples until the recursion's own estimate does.
+    theta gives the curvature between samples until the estimate of the recursion does.
     """
     count, path = len(record), record.commanded
     samples = np.zeros((count, 6))
@@ -91,7 +91,7 @@ def run(
 def errors_of(
     problem: Problem, x: FloatArray, rows: FloatArray, signals: Measured, options: Options
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the last estimate's covariance (p, p) allowing for colour, and the plain one, both with forgetting."""
+    """Return the covariance (p, p) of the last estimate with and without allowance for colour, both with forgetting."""
     record, theta = problem.records[0], x[list(base_slots(problem).values())]
     weight = np.array(options.forgetting ** np.arange(rows.shape[0] - 1.0, -1.0, -1.0), dtype=np.float64)
     columns, residual = rows[:, :-1], rows[:, -1] - rows[:, :-1] @ theta
@@ -106,7 +106,7 @@ def errors_of(
 
 
 def history_of(record: Record, names: list[str], values: FloatArray, errors: FloatArray) -> History:
-    """Return the record of the recursion, thinned to a few thousand samples, with the time each parameter settled."""
+    """Return the history of the recursion, thinned to a few thousand samples, with the settling time of each parameter."""
     keep = np.unique(np.linspace(0, len(record) - 1, min(len(record), LONGEST_HISTORY)).round().astype(int))
     settled = {n: settle_time(record.time, values[:, j], errors[-1, j]) for j, n in enumerate(names)}
     return History(record.time[keep], tuple(names), values[keep], errors[keep], settled)
@@ -121,7 +121,7 @@ def settle_time(time: FloatArray, values: FloatArray, last_error: float) -> floa
 
 
 def settle_notes(record: Record, history: History) -> tuple[Note, ...]:
-    """Return the remark on parameters that were still moving in the last fifth of the record."""
+    """Return the note on parameters that had not settled before the last fifth of the record."""
     length = float(record.time[-1] - record.time[0])
     late = {n: s for n, s in history.settled_s.items() if s > 0.8 * length}
     if not late:

@@ -28,16 +28,16 @@ class Estimate:
 
 
 def estimates(model: Model) -> tuple[Estimate, ...]:
-    """Return the estimates of a model at its law's reference speed: parameters and coefficients, the law's, the fin's offset."""
-    own = [Estimate(n, v, model.std_error(n), model.units.get(n, "")) for n, v in model.values.items()]
+    """Return the estimates of a model at the reference speed of its law: parameters, those of the law, and the fin offset."""
+    parameters = [Estimate(n, v, model.std_error(n), model.units.get(n, "")) for n, v in model.values.items()]
     law = [
         Estimate(n, _number(known["value"]), _number(known["std_error"]), "1/s^2" if "@" in n else "1")
         for n, known in dict(model.info.get("law_parameters", {})).items()
     ]
     offset = offset_of(model)
-    return (*own, *law, Estimate(offset.name, offset.value, offset.std_error, "rad"))
+    return (*parameters, *law, Estimate(offset.name, offset.value, offset.std_error, "rad"))
 
 
 def _number(value: float | None) -> float:
-    """Return a number, NaN for one that a file could not hold."""
+    """Return a number, NaN for None, which JSON has instead of NaN."""
     return float("nan") if value is None else value

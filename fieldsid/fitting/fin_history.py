@@ -1,4 +1,4 @@
-"""What the fin has done of late, in block means: what a motion, or what a model leaves of one, may follow."""
+"""Regressors made of the fin's recent history, as block means: a motion, or the residual of a model, may depend on them."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from fieldsid.numerics.block_means import block_means, block_width
 from fieldsid.numerics.first_order_lag import held_first_order_lag
 
 MEMORY_TIME_CONSTANTS_S = (0.3, 1.0, 3.0, 10.0, 30.0)
-"""Time constants through which the fin may have left its mark, as far as the record is eight times as long."""
+"""Time constants of the first-order lags through which the fin may act; those above an eighth of the record are left out."""
 BLOCK_S = 0.25
 
 
 def fin_history(record: Record) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Return block means (m,) of the fin about its mean, now and up to three blocks before, and through ever slower lags."""
+    """Return the fin about its mean, in block means (m,): delayed by 0 to 3 blocks, and through lags of rising time constant."""
     fin = blocks_of(record.fin - record.fin.mean(), record)
     length = float(record.time[-1] - record.time[0])
     lags = [np.concatenate([np.zeros(k), fin[: fin.size - k]]) for k in range(4)]
@@ -23,7 +23,10 @@ def fin_history(record: Record) -> tuple[list[FloatArray], list[FloatArray]]:
 
 
 def columns_of(record: Record, rate: FloatArray) -> FloatArray:
-    """Return what a missing effect could follow, block means (m, p) scaled to one: fin, its history, rate, a constant."""
+    """Return the regressors on which a missing effect may depend: fin, its history, rate and a constant.
+
+    They are block means (m, p), each column scaled to a largest absolute value of one; signed squares are among them.
+    """
     lags, slow = fin_history(record)
     speed = blocks_of(rate, record)
     parts = [*lags, *slow, *(v * np.abs(v) for v in (lags[0], *slow, speed)), speed, np.ones(speed.size)]
@@ -31,9 +34,10 @@ def columns_of(record: Record, rate: FloatArray) -> FloatArray:
 
 
 def share_of_fin(record: Record) -> float:
-    """Return the share (0..1) of the turning's power that follows the fin's history, as large as the data allow.
+    """Return the share (0..1) of the power of the turning that a regression on the fin's history explains.
 
-    The turning is the rate, or the slope of the angle where no rate was measured; slower than a block, about its mean.
+    The turning is the block mean of the rate about its mean, or the difference of those of the angle where no rate was measured.
+    The share is 1 where the record has too few blocks for the regression.
     """
     by_rate = bool(record.rate_ok.any())
     values, ok = (record.rate, record.rate_ok) if by_rate else (record.angle, record.angle_ok)
@@ -47,12 +51,12 @@ def share_of_fin(record: Record) -> float:
     power = float(centred @ centred)
     if motion.size <= columns.shape[1] or not power > 0.0:
         return 1.0
-    left = motion - columns @ np.linalg.lstsq(columns, motion, rcond=1e-9)[0]
-    return 1.0 - float(left @ left) / power
+    residual = motion - columns @ np.linalg.lstsq(columns, motion, rcond=1e-9)[0]
+    return 1.0 - float(residual @ residual) / power
 
 
 def _lagged(values: FloatArray, tau: float) -> FloatArray:
-    """Return block means (m,) through a first-order lag of time constant tau in s, from zero."""
+    """Return block means (m,) filtered by a first-order lag of time constant tau in s that starts at zero."""
     return held_first_order_lag(values, np.full(values.size, np.exp(-BLOCK_S / tau)), 0.0)[1:]
 
 

@@ -1,4 +1,4 @@
-"""The fin angle that the trim moment stands for: delta_r0 = C0 / b2 in yaw, delta_s0 = Cb / d2 in pitch, in rad."""
+"""The fin angle that is equivalent to the trim moment: delta_r0 = C0 / b2 in yaw, delta_s0 = Cb / d2 in pitch, in rad."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Offset:
 
 
 def offset_of(model: Model) -> Offset:
-    """Return the fin offset of a model at its reference speed, its error by propagation with the correlation."""
+    """Return the fin offset of a model at its reference speed, its error propagated from the covariance of trim and authority."""
     names = NAMES[model.axis]
     trim, authority = model.values[names.trim], model.values[names.authority]
     if authority == 0.0:

@@ -1,8 +1,8 @@
-"""Which way the fin turns the vehicle, where the authority of a fit cannot be told from zero.
+"""The sign of the fin's authority by regression, where the estimate of a fit does not differ significantly from zero.
 
-The equation of motion integrated over short windows has the fin's coefficient between few others: it tells the sign where a
-model with many effects leaves the authority open. Its errors are correlated from window to window, and counted as the fewer
-that they are. A fin that a controller moves follows the motion, and tells nothing here.
+The equation of motion, integrated over short windows, is a regression with few columns besides the fin. It determines the sign
+of the authority where a model with many effects does not. Its residuals are correlated from window to window; the variance is
+enlarged for that. A run whose fin a controller moves is left out: there the fin follows the motion.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ MAX_RHO = 0.999
 
 
 def fin_sense(problem: Problem, solution: Solution) -> dict[str, float]:
-    """Return `fin_t`, how many standard errors the fin's coefficient is from nil; nothing where an authority is clear itself.
+    """Return `fin_t`, the t-value of the fin's coefficient in the regression; empty where the fit's own authority is significant.
 
-    `fin_t` is that of the regression over all runs in which no controller moves the fin, with the sign of the authority.
+    It pools the runs in which no controller moves the fin, and has the sign of the authority.
     """
     layout, name = problem.layout, NAMES[problem.layout.axis].authority
-    own = [i for i, n in enumerate(layout.names[: layout.shared]) if n == name or n.startswith(f"{name}@")]
-    errors = np.sqrt(np.maximum(np.diag(solution.covariance)[own], 0.0))
-    if bool(np.all(np.abs(solution.x[own]) >= MIN_STD_ERRORS * errors)):
+    authorities = [i for i, n in enumerate(layout.names[: layout.shared]) if n == name or n.startswith(f"{name}@")]
+    errors = np.sqrt(np.maximum(np.diag(solution.covariance)[authorities], 0.0))
+    if bool(np.all(np.abs(solution.x[authorities]) >= MIN_STD_ERRORS * errors)):
         return {}
     found = [_t_value(r, stiff=NAMES[layout.axis].stiffness is not None) for r in problem.records]
-    told = [t for t in found if np.isfinite(t)]
-    return {"fin_t": float(np.sum(told) / np.sqrt(len(told)))} if told else {}
+    finite = [t for t in found if np.isfinite(t)]
+    return {"fin_t": float(np.sum(finite) / np.sqrt(len(finite)))} if finite else {}
 
 
 def _t_value(record: Record, *, stiff: bool) -> float:
@@ -45,10 +45,10 @@ def _t_value(record: Record, *, stiff: bool) -> float:
         return float("nan")
     scaled = used / size
     solution, _, rank, _ = np.linalg.lstsq(scaled, target, rcond=1e-10)
-    left = target - scaled @ solution
-    power = float(left @ left)
+    residual = target - scaled @ solution
+    power = float(residual @ residual)
     if rank < used.shape[1] or not power > 0.0:
         return float("nan")
-    rho = min(max(float(left[1:] @ left[:-1]) / power, 0.0), MAX_RHO)
+    rho = min(max(float(residual[1:] @ residual[:-1]) / power, 0.0), MAX_RHO)
     variance = np.linalg.inv(scaled.T @ scaled)[-2, -2] * power / target.size * (1.0 + rho) / (1.0 - rho)
     return float(solution[-2] / np.sqrt(variance))

@@ -38,15 +38,15 @@ from fieldsid.registry import members, near, pick
 FEWEST_SAMPLES = 40
 DRAG_EXPONENT = 2.0
 THRUST_EXPONENTS = (0.0, 3.0)
-"""What a straight run's thrust can go with: the same command at every speed, up to a drag that steepens."""
+"""Bounds of the exponent of thrust over speed on straight runs: from one command at every speed to a drag that grows as u^3."""
 MIN_LOG_SPEED_SPREAD = 0.1
-"""Spread of the runs' log speed from which their thrusts say how thrust goes with speed."""
+"""Least spread of the runs' log speed at which the exponent of thrust over speed is estimated."""
 AUTO = "auto"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Fit(Plotted):
-    """A fitted model with what it was fitted to: predictions of every run, noise floor, remarks, RLS history."""
+    """A fitted model with the free run of every run, the noise floor, the notes, and the history of recursive least squares."""
 
     model: Model
     predictions: tuple[Prediction, ...]
@@ -78,10 +78,9 @@ def fit(
 ) -> Fit:
     """Return the joint fit of records on one axis.
 
-    method "auto" is output error, and the prediction-error method where a disturbance, and no missing effect, colours
-    the residuals. Raises DataError for records too short or
-    without fin movement, UsageError for a method that cannot take the effects or several runs, EffectError for two effects
-    that cannot be in one model.
+    The method "auto" is output error, or prediction error where a disturbance, and no missing effect, colours the residuals.
+    Raises DataError for records that are too short or in which the fin does not move, UsageError for a method that cannot take
+    the effects or several runs, EffectError for two effects that cannot be in one model.
     """
     check(records, axis)
     parts = check_signals(records, effects)
@@ -141,7 +140,7 @@ def check(records: Sequence[Record], axis: Axis) -> None:
 
 
 def check_signals(records: Sequence[Record], effects: Sequence[str]) -> tuple[Effect, ...]:
-    """Return the effects of some names; raises DataError for a signal that a record lacks, EffectError for two that clash."""
+    """Return the effects with these names; raises DataError for a signal that a record lacks, EffectError for two that clash."""
     parts = tuple(effect_named(name) for name in dict.fromkeys(effects))
     for i, part in enumerate(parts):
         refuse_clash(part, parts[:i])
@@ -159,9 +158,9 @@ def check_signals(records: Sequence[Record], effects: Sequence[str]) -> tuple[Ef
 def fitted(problem: Problem, solution: Solution) -> Fit:
     """Return the fit record of a solution."""
     floor = white_noise_floor(problem.records)
-    if not all(r.is_whole for r in problem.records):  # samples further apart than those of the clock differ by the motion too
-        left = [problem.residual(solution.x, run)[0] for run in range(len(problem.records))]
-        floor = lowered_noise_floor(floor, problem.records, left)
+    if not all(r.is_whole for r in problem.records):  # where samples are missing, differences of the signals contain the motion
+        residuals = [problem.residual(solution.x, run)[0] for run in range(len(problem.records))]
+        floor = lowered_noise_floor(floor, problem.records, residuals)
     names = problem.layout.names
     notes = (
         *parameter_checks(problem, solution, floor),
@@ -170,18 +169,18 @@ def fitted(problem: Problem, solution: Solution) -> Fit:
         *solution.notes,
     )
     model = model_of(problem, solution)
-    # a start of least prediction error is not that of the best free run, which every other command shows
+    # initial states of least prediction error do not give the best free run, which every other command shows
     shown = solution.x if solution.weights is None else best_start(problem, solution.x, floor)
     predictions = tuple(prediction_of(problem, shown, run) for run in range(len(problem.records)))
     sigma = np.sqrt(np.maximum(np.diag(solution.covariance), 1e-300))
     correlation = solution.covariance / np.outer(sigma, sigma)
     order = [names.index(n) for n in model.free]
-    model = replace(model, info={**model.info, "left": _left(predictions, floor)})
+    model = replace(model, info={**model.info, "left": _residual_summary(predictions, floor)})
     return Fit(model, predictions, floor, correlation[np.ix_(order, order)], notes, solution.history)
 
 
-def _left(predictions: Sequence[Prediction], floor: Noise) -> dict[str, Any]:
-    """Return what a fit leaves of its runs and the noise of their sensors, for a model to keep."""
+def _residual_summary(predictions: Sequence[Prediction], floor: Noise) -> dict[str, Any]:
+    """Return the residuals' root mean squares and the noise floor of the sensors, which the model file keeps."""
     merit = goodness_of_fit(predictions)
     noise = {"angle_rad": floor.angle, "rate_rad_s": floor.rate}
     return {"angle_rms_rad": merit.angle_rms, "rate_rms_rad_s": merit.rate_rms, "noise_floor": noise}
@@ -203,8 +202,8 @@ def model_of(problem: Problem, solution: Solution) -> Model:
     values = dict(zip(layout.names, solution.x[: layout.shared].tolist(), strict=True))
     units = {s.name: s.unit for s in layout.parameters[: layout.shared]}
     law = layout.law(values)
-    aside = {n for n in values if n.startswith(f"{names.authority}@")}
-    free = tuple(n for n in values if n not in aside)
+    of_groups = {n for n in values if n.startswith(f"{names.authority}@")}
+    free = tuple(n for n in values if n not in of_groups)
     order = [layout.names.index(n) for n in free]
     p = residual_whiteness(problem, solution.x, solution.noise)
     sigma = dict(zip(layout.names, np.sqrt(np.maximum(np.diag(solution.covariance), 0.0)).tolist(), strict=True))
@@ -220,13 +219,16 @@ def model_of(problem: Problem, solution: Solution) -> Model:
         trained=trained(problem) | fin_sense(problem, solution),
         method=solution.method,
         runs=tuple(r.name for r in problem.records),
-        info={"whiteness_p": p, "law_parameters": {n: {"value": values[n], "std_error": sigma[n]} for n in sorted(aside)}},
+        info={
+            "whiteness_p": p,
+            "law_parameters": {n: {"value": values[n], "std_error": sigma[n]} for n in sorted(of_groups)},
+        },
         own=definitions_of(layout.effects),
     )
 
 
 def trained(problem: Problem) -> dict[str, float]:
-    """Return what the data reached: speeds, largest fin and rate, seconds, longest held fin, helpers' means, thrust law."""
+    """Return the range of the data: speeds, largest fin and rate, duration, longest constant fin, helper means, thrust law."""
     records = problem.records
     speeds = [r.speed for r in records if np.isfinite(r.speed)]
     rates = [float(np.max(np.abs(r.rate[r.rate_ok]))) for r in records if r.rate_ok.any()]
@@ -244,9 +246,9 @@ def trained(problem: Problem) -> dict[str, float]:
 
 
 def _thrust_law(records: Sequence[Record]) -> dict[str, float]:
-    """Return how the thrust went with the speed u from run to run: thrust_at_1_m_s u^thrust_exponent.
+    """Return the thrust over the speed u of the runs as a power law: thrust_at_1_m_s u^thrust_exponent.
 
-    The exponent is that of the runs' means where their speeds tell, and the two of a hull's drag where they do not.
+    The exponent is fitted to the means of the runs where their speeds differ enough, else it is 2, as for a hull's drag.
     """
     runs = [r for r in records if "thrust" in r.signals and r.speed > 0]
     if not runs:

@@ -1,4 +1,4 @@
-"""The records of runs that are fitted together, those left that can be."""
+"""The records of those runs of a joint fit that an estimator can use."""
 
 from __future__ import annotations
 
@@ -15,21 +15,22 @@ from fieldsid.runtime.parallel_map import parallel_map
 
 
 def records_of(groups: Sequence[Sequence[Run]], axis: Axis, unfit: Refused[Run] | None = None) -> list[list[tuple[Run, Record]]]:
-    """Return the runs of several groups with their records, without those that no estimator can use.
+    """Return the runs of several groups with their records, without the runs that no estimator can use.
 
-    unfit is called with each of these, as `sifted` does for each group; without it DataError is raised for the first. It is
-    raised where a controller alone moves the fin in every run of the first group, which is fitted; the others are predicted.
+    `unfit` is called with each run left out, see `sifted`; without `unfit` the first such run raises DataError. DataError is
+    also raised where a controller moves the fin in every run of the first group. The first group is to be fitted, the others
+    are only predicted.
     """
     runs = [run for group in groups for run in group]
     if not runs:
         check([], axis)
-    made = iter(parallel_map(partial(attempt, partial(_checked, axis=axis)), runs))
-    left = [sifted(group, [next(made) for _ in group], unfit) for group in groups]
-    refuse_feedback_alone([record for _, record in left[0]])
-    return left
+    attempts = iter(parallel_map(partial(attempt, partial(_checked_record, axis=axis)), runs))
+    usable = [sifted(group, [next(attempts) for _ in group], unfit) for group in groups]
+    refuse_feedback_alone([record for _, record in usable[0]])
+    return usable
 
 
-def _checked(run: Run, *, axis: Axis) -> Record:
+def _checked_record(run: Run, *, axis: Axis) -> Record:
     record = record_of(run, axis)
     check([record], axis)
     return record

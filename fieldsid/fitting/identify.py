@@ -31,56 +31,57 @@ def identify(
     done: Callable[[], None] = lambda: None,
     unfit: Refused[Run] | None = None,
 ) -> tuple[Fit, ...]:
-    """Return one fit per run, or a single one over all of them when joint; `done` is called after each.
+    """Return one fit per run, or a single fit of all runs when joint; `done` is called after each fit.
 
-    Of each run the part is used that excites the axis (logs/segments.py), or all of it when `whole`.
-    A vehicle gives the fin's limit and the side a positive fin turns to. unfit is called with each of several runs that cannot be
-    fitted, and the others are fitted; without it, for a single run, and where none is left, its error is raised.
-    Raises DataError for runs that do not allow the fit, UsageError for a method that cannot do what is asked, and for a joint
-    fit of which one run is left.
+    Of each run the part that excites the axis is used (logs/segments.py), or the entire run when `whole`.
+    `vehicle` states the fin's limit and the side to which a positive fin turns. `unfit` is called with each of several runs that
+    cannot be fitted, and the others are fitted; without `unfit`, for a single run, and where no run can be fitted, the error of
+    the run is raised.
+    Raises DataError for runs that do not allow the fit, UsageError for a method that takes neither the effects nor several runs,
+    and for a joint fit of several runs of which only one can be used.
     """
 
-    def judged(run: Run) -> _Judged:
+    def checked(run: Run) -> _CheckedRun:
         part = run if whole else segment(run, axis).of(run)
         record = record_of(part, axis)
         check([record], axis)
         check_signals([record], effects)
-        return _Judged(run, record, run_checks(part, axis, vehicle))
+        return _CheckedRun(run, record, run_checks(part, axis, vehicle))
 
-    def fitted(group: Sequence[_Judged]) -> Fit:
+    def fitted(group: Sequence[_CheckedRun]) -> Fit:
         records = [j.record for j in group]
         refuse_feedback_alone(records)
         found = fit(records, axis, method=method, effects=effects, options=options)
         done()
-        of_model = (
+        model_notes = (
             *sampling_findings(found.model, records),
             *sign_findings(found.model, vehicle),
             *offset_findings(found.model, vehicle),
         )
-        notes = (*of_model, *(note for j in group for note in j.notes))
+        notes = (*model_notes, *(note for j in group for note in j.notes))
         return replace(found, notes=(*notes, *found.notes))
 
-    ready = [j for _, j in sifted(runs, (attempt(judged, run) for run in runs), unfit)]
+    ready = [j for _, j in sifted(runs, (attempt(checked, run) for run in runs), unfit)]
     if joint:
         check_joint([j.run.name for j in ready], len(runs))
         return (fitted(ready),)
-    alone = [j.run for j in ready]
-    return tuple(found for _, found in sifted(alone, (attempt(fitted, [j]) for j in ready), unfit))
+    usable_runs = [j.run for j in ready]
+    return tuple(found for _, found in sifted(usable_runs, (attempt(fitted, [j]) for j in ready), unfit))
 
 
-def check_joint(left: Sequence[str], given: int) -> None:
-    """Raise UsageError where of several runs for a joint fit one is left: its own fit is another model than the one asked for."""
-    if given > 1 and len(left) == 1:
+def check_joint(usable: Sequence[str], total: int) -> None:
+    """Raise UsageError where only one of several runs can be used: its single fit would be another model than the joint one."""
+    if total > 1 and len(usable) == 1:
         raise UsageError(
-            f"a joint fit needs two runs, and 1 of {given} can be used",
-            found=f"{left[0]!r}",
+            f"a joint fit needs two runs, and 1 of {total} can be used",
+            found=f"{usable[0]!r}",
             hint="leave `--joint` out to fit that one alone",
         )
 
 
 @dataclass(frozen=True, slots=True)
-class _Judged:
-    """A run that can be fitted, its record, and what speaks against it."""
+class _CheckedRun:
+    """A run that can be fitted, its record, and the notes of the run checks."""
 
     run: Run
     record: Record

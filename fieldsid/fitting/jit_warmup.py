@@ -1,6 +1,7 @@
 """The compile warm-up: the first fit on a machine compiles for ten seconds, in this process and a forked worker.
 
-Later processes load what numba has kept, in 0.04 s. A marker file of our own says that all of it is there (`warmup_marker`).
+Later processes load the compiled code from numba's cache in 0.04 s. A marker file (`warmup_marker`) says that the cache is
+complete.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from fieldsid.models.effect import effect_named, with_variant
 from fieldsid.models.model import Noise
 from fieldsid.models.record import ROLES, Record
 from fieldsid.noise.fisher_scoring import score_of_innovations
-from fieldsid.noise.kalman.univariate import three_states, with_sensors, with_sensors_abreast
+from fieldsid.noise.kalman.univariate import three_states, with_sensors, with_sensors_in_lanes
 from fieldsid.noise.maximum_likelihood import estimate_noise
 from fieldsid.noise.moment_response import base_responses
 from fieldsid.noise.sandwich_covariance import score_covariance, score_covariance_kernel
@@ -41,7 +42,7 @@ DISTURBED = Noise(0.01, 0.01, disturbance=0.01, disturbance_time=1.0)
 
 
 def a_record() -> Record:
-    """Return a few seconds that mean nothing, with every helper, for what is compiled to be called with."""
+    """Return a record of three seconds with every helper signal, as an argument for the kernels to be compiled."""
     time = np.linspace(0.0, 3.0, SAMPLES)
     fin, every = np.where(np.sin(2.0 * time) > 0.0, 0.1, -0.1), np.ones(SAMPLES, dtype=bool)
     angle, rate = 0.1 * np.sin(time), 0.1 * np.cos(time)
@@ -86,24 +87,24 @@ def _sandwich() -> None:
 
 def _nonlinear() -> None:
     problem, _ = _a_problem()
-    more = problem.with_effects((effect_named("quadratic_damping"),))
-    more.linearise(more.start(), 0)
-    more.residual(more.start(), 0)
+    with_effect = problem.with_effects((effect_named("quadratic_damping"),))
+    with_effect.linearise(with_effect.start(), 0)
+    with_effect.residual(with_effect.start(), 0)
 
 
 def _effects() -> None:
     problem, _ = _a_problem()
     effects = all_effects(Axis.YAW).values()
     at_fin = tuple(e for e in effects if e.fin is not None)
-    for own in (*((e,) for e in effects), at_fin, *((with_variant(e, f),) for e in at_fin for f in e.variants)):
-        more = problem.with_effects(own)
-        more.linearise(more.start(), 0)
-        equation_error_start(more.records, more.layout)
+    for chosen in (*((e,) for e in effects), at_fin, *((with_variant(e, f),) for e in at_fin for f in e.variants)):
+        with_effect = problem.with_effects(chosen)
+        with_effect.linearise(with_effect.start(), 0)
+        equation_error_start(with_effect.records, with_effect.layout)
 
 
 @dataclass(frozen=True, slots=True)
 class WarmupJob:
-    """A call, and the kernels that it compiles."""
+    """A function to call, and the kernels that the call compiles."""
 
     run: Callable[[], None]
     kernels: tuple[Kernel, ...]
@@ -116,39 +117,39 @@ WARMUP_JOBS = (
     WarmupJob(_lag, (first_order_lag, held_first_order_lag)),
     WarmupJob(lambda: _estimate("disturbance"), (score_of_innovations,)),
     WarmupJob(lambda: _whiten(replace(DISTURBED, coloured_rate=0.01)), (with_sensors,)),
-    WarmupJob(lambda: _estimate("both"), (with_sensors_abreast,)),
+    WarmupJob(lambda: _estimate("both"), (with_sensors_in_lanes,)),
     WarmupJob(_sandwich, (score_covariance_kernel,)),
 )
-"""What a fit calls, in the order in which it is needed."""
+"""The jobs that compile all kernels of a fit, in the order in which a fit needs them."""
 WARMUP_KERNELS = tuple(kernel for job in WARMUP_JOBS for kernel in job.kernels)
 
 
 def compile_all() -> None:
-    """Call everything once that a fit and a search over effects use."""
+    """Call once every kernel that a fit and a search over effects use."""
     for job in WARMUP_JOBS:
         job.run()
     _effects()
 
 
 def load_compiled() -> None:
-    """Load what an earlier process compiled, once; nothing where that must still be done."""
+    """Load the kernels that an earlier process compiled; do nothing where they are loaded or not yet compiled."""
     if not is_loaded(nonlinear_sensitivities) and warmup_marker(WARMUP_KERNELS).exists():
         compile_all()
 
 
 class Warmup:
-    """Jobs that this process and a forked worker take one by one; the worker goes on to the effects and to `besides`."""
+    """Jobs that this process and a forked worker take one by one; the worker then compiles the effects and `extra_jobs`."""
 
-    def __init__(self, jobs: Sequence[WarmupJob], besides: Sequence[Callable[[], None]] = ()) -> None:
+    def __init__(self, jobs: Sequence[WarmupJob], extra_jobs: Sequence[Callable[[], None]] = ()) -> None:
         self._jobs, self._done, self._left = jobs, set[int](), job_queue(len(jobs))
-        self._reports, target = os.pipe()
-        self._worker = fork_worker(lambda: _compiled(jobs, self._left, target, besides)) if jobs else None
-        os.close(target)
+        self._reports, report_pipe = os.pipe()
+        self._worker = fork_worker(lambda: _compile_jobs(jobs, self._left, report_pipe, extra_jobs)) if jobs else None
+        os.close(report_pipe)
 
     def compile_now(self, kernels: Sequence[Kernel] | None = None) -> None:
-        """Do the jobs that nobody has begun until these kernels, or all, are compiled; wait for the job the worker is at."""
-        asked = None if kernels is None else {id(k) for k in kernels}
-        wanted = {i for i, job in enumerate(self._jobs) if asked is None or any(id(k) in asked for k in job.kernels)}
+        """Run the jobs not yet begun until these kernels, or all, are compiled; wait for the job that the worker is running."""
+        requested = None if kernels is None else {id(k) for k in kernels}
+        wanted = {i for i, job in enumerate(self._jobs) if requested is None or any(id(k) in requested for k in job.kernels)}
         while wanted - self._done:
             if number := os.read(self._left, 1):
                 self._run(number[0])
@@ -163,7 +164,7 @@ class Warmup:
         self._done.add(number)
 
     def end(self) -> bool:
-        """End the worker, whatever it is at, and return whether all jobs were done."""
+        """Stop the worker, even within a job, and return whether all jobs were done."""
         if self._worker is not None:
             self._worker.kill()
         while reports := os.read(self._reports, len(self._jobs) + 1):
@@ -174,12 +175,14 @@ class Warmup:
 
 
 @contextmanager
-def warming_up(tell: Callable[[str], None] = lambda _text: None, besides: Sequence[Callable[[], None]] = ()) -> Iterator[Warmup]:
-    """Compile in a forked worker what fits need while the context runs, if this machine has not done so yet.
+def warming_up(
+    tell: Callable[[str], None] = lambda _text: None, extra_jobs: Sequence[Callable[[], None]] = ()
+) -> Iterator[Warmup]:
+    """Compile the kernels of a fit in a forked worker while the context runs, where this machine has not compiled them yet.
 
     Yields the warm-up, whose `compile_now` is to be called before the first fit: it shares the jobs with the worker, and does all
-    of them where this process cannot be forked. The effects and `besides` are left to the worker; the context compiles
-    itself what it needs sooner. The worker ends with the context.
+    of them where this process cannot be forked. Only the worker compiles the effects and `extra_jobs`; code in the context that
+    needs one of these sooner compiles it on its first call. The worker ends with the context.
     """
     if all(is_loaded(kernel) for kernel in WARMUP_KERNELS) or (marker := warmup_marker(WARMUP_KERNELS)).exists():
         idle = Warmup(())
@@ -189,7 +192,7 @@ def warming_up(tell: Callable[[str], None] = lambda _text: None, besides: Sequen
             idle.end()
         return
     tell("first run on this machine: compiling, about ten seconds, once")
-    warmup, is_complete = Warmup(WARMUP_JOBS, besides), False
+    warmup, is_complete = Warmup(WARMUP_JOBS, extra_jobs), False
     try:
         yield warmup
     finally:
@@ -199,12 +202,12 @@ def warming_up(tell: Callable[[str], None] = lambda _text: None, besides: Sequen
         marker.touch()
 
 
-def _compiled(jobs: Sequence[WarmupJob], left: int, target: int, besides: Sequence[Callable[[], None]]) -> bytes:
-    """Do jobs in the worker and report their numbers, without looking for garbage: it makes millions of objects, and ends."""
+def _compile_jobs(jobs: Sequence[WarmupJob], left: int, report_pipe: int, extra_jobs: Sequence[Callable[[], None]]) -> bytes:
+    """Run jobs in the worker and report their numbers; garbage collection is off, as the worker soon ends."""
     gc.disable()
     while number := os.read(left, 1):
         jobs[number[0]].run()
-        os.write(target, number)
-    for job in (_effects, *besides):
+        os.write(report_pipe, number)
+    for job in (_effects, *extra_jobs):
         job()
     return b""

@@ -9,21 +9,22 @@ import numpy.typing as npt
 
 from fieldsid.models.record import Record
 from fieldsid.noise.innovations import filter_of
-from fieldsid.noise.kalman.univariate import LANES, with_sensors_abreast
+from fieldsid.noise.kalman.univariate import LANES, with_sensors_in_lanes
 from fieldsid.noise.noise_kinds import IS_STANDARD_DEVIATION
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 
 LOG_STEP = 3e-4
-"""Relative change of a noise's number whose effect is taken for a derivative."""
+"""Step of the logarithm of a noise parameter in a forward difference."""
 STEP_FACTOR, PER_STEP = float(np.exp(LOG_STEP)), 1.0 / LOG_STEP
 
 
 @dataclass(frozen=True, slots=True)
 class Innovations:
-    """The innovations of a residual under a noise: standardised, and their standard deviations, (2 n,) each; the log likelihood.
+    """The standardised innovations of a residual under a noise, their standard deviations, (2 n,) each, and the log likelihood.
 
-    `moved` are both, (P, 2, n) each, with each noise parameter increased by LOG_STEP, where they were computed together.
+    `moved` holds both, (P, 2, n) each, with the logarithm of each noise parameter increased by LOG_STEP; None where it has not
+    been computed yet.
     """
 
     standardised: FloatArray
@@ -37,8 +38,8 @@ def innovations_of(
 ) -> Innovations:
     """Return the innovations of a residual (2, n) under a noise vector (7,) that acts on a base of damping a and stiffness k.
 
-    Where disturbance and sensor colour are both present, the innovations with each parameter at `place` (P,) increased come with
-    them.
+    Where a disturbance and coloured sensor noise are both present, `moved` is computed in the same pass, for the parameters at
+    `place` (P,).
     """
     if place.size < noise.size:
         standardised, innovation_std = np.empty((2, 1, *residual.shape))
@@ -49,8 +50,8 @@ def innovations_of(
     noises = np.tile(noise, (LANES, 1))
     noises[np.arange(1, place.size), place[1:]] *= STEP_FACTOR
     series = np.ascontiguousarray(residual[None])
-    logs = with_sensors_abreast(record.nominal_steps, record.ok, a, k, noises, series, standardised, innovation_std)
-    # copies: the first rows become those of the first number moved
+    logs = with_sensors_in_lanes(record.nominal_steps, record.ok, a, k, noises, series, standardised, innovation_std)
+    # copies: `information` overwrites the first rows of `moved`
     moved = standardised[: place.size], innovation_std[: place.size]
     return _innovations(standardised[0].copy(), innovation_std[0].copy(), logs, moved)
 
@@ -65,13 +66,14 @@ def _innovations(
 def information(
     record: Record, a: float, k: float, noise: FloatArray, place: npt.NDArray[np.int64], residual: FloatArray, here: Innovations
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-    """Return the score (P,) and the Fisher information (P, P) of a noise about what a residual (2, n) comes to `here`.
+    """Return the score (P,) and the Fisher information (P, P) of a noise, given the innovations `here` of a residual (2, n).
 
-    Both are by the logarithms x of the noise's numbers at `place` (P,), all those that are not zero or held among them, a
-    standard deviation first, from forward differences of the innovations e and the logarithms of their spreads s:
+    Both are with respect to the logarithms x of the noise parameters at `place` (P,). These are all that are neither zero nor
+    fixed, a standard deviation first. They follow from forward differences of the innovations e and of the logarithms of their
+    standard deviations s:
         dl/dx = -sum(ds + e de),  F = sum(2 ds ds' + (de + e ds) (de' + e ds'))
-    Standard deviations that grow together leave the filter's gains as they are: over all of them the ds of a sample add up
-    to one and the de to -e, which gives those of the first. What has moved in `here` is used up.
+    Where all standard deviations grow by one factor, the gains of the filter do not change: summed over the standard deviations,
+    the ds of a sample are 1 and the de are -e, which gives those of the first. The arrays `here.moved` are overwritten.
     Source: Harvey 1989, Forecasting, structural time series models and the Kalman filter, section 3.4.5.
     """
     standardised, innovation_std = here.moved or _moved(record, a, k, noise, place, residual)
@@ -85,7 +87,7 @@ def information(
 def _moved(
     record: Record, a: float, k: float, noise: FloatArray, place: npt.NDArray[np.int64], residual: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return innovations and their spreads (P, 2, n) with each of the noise's numbers moved but the first."""
+    """Return innovations and their standard deviations (P, 2, n) with each noise parameter but the first increased."""
     series, kalman = np.ascontiguousarray(residual[None]), filter_of(noise)
     standardised, innovation_std = np.empty((2, place.size, 1, *residual.shape))
     for row, p in enumerate(place.tolist()[1:], 1):
@@ -100,7 +102,7 @@ def score_of_innovations(
     seen: npt.NDArray[np.bool_], e: FloatArray, over: FloatArray, is_size: npt.NDArray[np.bool_],
     d_innovations: FloatArray, d_log_std: FloatArray,
 ) -> FloatArray:  # fmt: skip
-    """Return the score (P,); turn errors and spreads with each number moved, (P, m), into de + e ds and ds. over is 1 / s."""
+    """Return the score (P,); replace the increased innovations and deviations (P, m) by de + e ds and ds. over is 1 / s."""
     score = np.zeros(d_innovations.shape[0])
     for l in range(e.size):
         d_log_std[0, l], d_innovations[0, l] = 1.0 * seen[l], -e[l]

@@ -22,14 +22,14 @@ from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 MIN_NOISE_SIGNAL_SHARE = 1e-4
 MAX_SCORING_ITERATIONS, MIN_DAMPING, MIN_DAMPING_AFTER_REFUSAL = 30, 1e-3, 0.1
-"""Rounds at most, least damping of a step, and what it is at least raised from where one was refused."""
+"""Most iterations, least damping of a step, and the least damping from which a refused step raises it."""
 MAX_LOG_STEP = 1.5
-"""Longest step of a logarithm: the Fisher information holds only locally."""
+"""Longest step of the logarithm of a noise parameter: the Fisher information is valid only locally."""
 MIN_WHITE_SHARE = 0.1
-"""Share of what the differences show that the white noise is at least: an AR(1) noise of many samples, which has no white
-part, shows half its own increments in them."""
+"""Least white noise, as a share of the noise floor from third differences: an AR(1) noise that is correlated over many samples
+has no white part, but the floor contains half of its increments."""
 BELOW_ANY_BOUND = 1e-12
-"""Less than any bound."""
+"""A value below the lower bound of every noise parameter, so that its logarithm exists."""
 MIN_SCORING_GAIN = 0.02
 """Gain in log likelihood below which the iteration ends."""
 GRADIENT_STEP = 1e-4
@@ -40,7 +40,7 @@ def log_likelihood(
 ) -> float:
     """Return the Gaussian log likelihood, up to its constant, of residuals [(2, n)] under a noise.
 
-    Minus infinity where one of them is that of a motion without bound.
+    It is minus infinity where a residual is not finite, as that of an unbounded motion.
     """
     if not all(np.isfinite(e).all() for e in residuals):
         return -np.inf
@@ -52,14 +52,14 @@ def log_likelihood(
 
 
 def log_prior(noise: Noise) -> float:
-    """Return the log prior density of a noise, up to a constant: of the numbers that its kind has, see `NoiseParameter.usual`."""
+    """Return the log prior density of the parameters of a noise, up to a constant; see `NoiseParameter.usual`."""
     numbers = noise_vector(noise)
     place = np.array([i for i in map(NOISE_FIELDS.index, kind_of(numbers).fields) if LOG_PRECISIONS[i] > 0.0], dtype=np.int64)
     return _log_prior_at(np.log(numbers[place]), place)
 
 
 def _log_prior_at(x: FloatArray, place: npt.NDArray[np.int64]) -> float:
-    """Return the log prior density, up to a constant, of logarithms x (P,) of the noise's numbers at `place` (P,)."""
+    """Return the log prior density, up to a constant, of the logarithms x (P,) of the noise parameters at `place` (P,)."""
     return -0.5 * float(LOG_PRECISIONS[place] @ (x - LOG_MEDIANS[place]) ** 2)
 
 
@@ -76,41 +76,42 @@ def estimate_noise(
     has_prior: bool = False,
     evaluations: EvaluationCounter | None = None,
 ) -> tuple[Noise, float]:
-    """Return the noise of a family with the highest likelihood, and that log likelihood.
+    """Return the noise of a kind with the highest likelihood, and that log likelihood.
 
-    dynamics are (damping, stiffness) of each run's base model; start gives where the search begins; likelihood, of a
-    noise vector (7,), is by default that of the residuals as they are; floor is what the white noise stays near, by
-    default what the signals show of it; reinitialise: whether components that the start has almost none of begin at a
-    share of their rough size; has_prior: whether the prior density counts with the likelihood, see `log_prior`;
-    evaluations counts the runs filtered. Fisher scoring on the logarithms of the noise's numbers (Harvey 1989, section
-    3.4.5); another likelihood gives its own gradient, the residuals' the information. Residuals of a motion without bound
-    have none: the start is returned, and minus infinity.
+    `dynamics` are (damping, stiffness) of each run's base model. `start` is where the search begins. `likelihood` is a function
+    of a noise vector (7,), by default the likelihood of the residuals. `floor` is the white noise, near which the estimate of it
+    is bounded, by default that of the signals' third differences. With `reinitialise`, components that are nearly zero in `start`
+    begin at a share of their rough size. With `has_prior` the prior density is part of the objective, see `log_prior`.
+    `evaluations` counts the runs filtered. The method is Fisher scoring on the logarithms of the noise parameters (Harvey 1989,
+    section 3.4.5). Where a `likelihood` is given, its gradient is by differences and the information is still that of the
+    residuals. Where a residual is not finite, `start` and minus infinity are returned.
     """
     if not all(np.isfinite(e).all() for e in residuals):
         return start, -np.inf
     names = NOISE_KINDS[noise_kind].fields
     floor = floor or white_noise_floor(records)
-    begun, scarce = _begun(records, dynamics, residuals, floor, start) if reinitialise else ({}, ())
-    low, high = _bounds(names, floor, _resolution(records))
+    initial, near_zero = _reinitialised(records, dynamics, residuals, floor, start) if reinitialise else ({}, ())
+    low, high = _bounds(names, floor, _least_white_noise(records))
     place = np.array([NOISE_FIELDS.index(n) for n in names])
     known = np.array([p.absent for p in NOISE_PARAMETERS.values()])
     counted = evaluations or EvaluationCounter()
     slope = _LogNoiseLikelihood(records, dynamics, residuals, known, place, has_prior, likelihood, counted)
-    x = np.clip(np.log([max(begun.get(n, getattr(start, n)), BELOW_ANY_BOUND) for n in names]), low, high)
+    x = np.clip(np.log([max(initial.get(n, getattr(start, n)), BELOW_ANY_BOUND) for n in names]), low, high)
     value, score, fisher = slope.at(x)
-    idle = np.array([n in scarce for n in names]) & (score <= 0.0)
-    if idle.any():  # what gains nothing by growing from almost nothing would shrink to nothing in many steps
-        x[idle] = low[idle]
+    stays_zero = np.array([n in near_zero for n in names]) & (score <= 0.0)
+    if stays_zero.any():  # a component near zero that gains nothing by growing would take many steps to its lower bound
+        x[stays_zero] = low[stays_zero]
         value, score, fisher = slope.at(x)
     damping, secants, curvature = MIN_DAMPING, list[tuple[FloatArray, FloatArray]](), fisher
     for _ in range(MAX_SCORING_ITERATIONS):
-        # each within its own leap, the others making the best of that: one on its way to nothing would hold them all back
+        # the step of each parameter is bounded and the others are solved for given that: scaling the entire step would let one
+        # parameter on its way to zero slow all others down
         moved = bounded_step(curvature, score, damping, x, np.maximum(low, x - MAX_LOG_STEP), np.minimum(high, x + MAX_LOG_STEP))
         if float(score @ moved) < MIN_SCORING_GAIN:
             break
-        trial, enough = x + moved, value + MIN_SCORING_GAIN
-        new = slope.at(trial, enough)
-        if value < new[0] < enough:
+        trial, sufficient = x + moved, value + MIN_SCORING_GAIN
+        new = slope.at(trial, sufficient)
+        if value < new[0] < sufficient:
             x, value = trial, new[0]
             break
         if new[0] > value:
@@ -124,14 +125,14 @@ def estimate_noise(
     return Noise(*slope.vector(x).tolist()), value
 
 
-def _next_damping(kept: float) -> float:
-    """Return the damping after a step that gained this share of the predicted gain."""
-    return 0.1 if kept > 0.5 else 1.0 if kept > 0.25 else 3.0
+def _next_damping(gained_share: float) -> float:
+    """Return the factor of the damping after a step that gained the share `kept` of the predicted gain."""
+    return 0.1 if gained_share > 0.5 else 1.0 if gained_share > 0.25 else 3.0
 
 
 @dataclass(frozen=True, slots=True)
 class _LogNoiseLikelihood:
-    """The likelihood of residuals as a function of the logarithms of some of the noise's numbers."""
+    """The log likelihood of residuals as a function of the logarithms of some of the noise parameters."""
 
     records: Sequence[Record]
     dynamics: Sequence[tuple[float, float]]
@@ -143,15 +144,15 @@ class _LogNoiseLikelihood:
     evaluations: EvaluationCounter
 
     def vector(self, x: FloatArray) -> FloatArray:
-        """Return the noise vector (7,) of logarithms x (P,)."""
+        """Return the noise vector (7,) at logarithms x (P,)."""
         noise = self.known.copy()
         noise[self.place] = np.exp(x)
         return noise
 
     def at(self, x: FloatArray, least: float = -np.inf) -> tuple[float, FloatArray, FloatArray]:
-        """Return log likelihood, score (P,) and information (P, P) at x (P,); minus infinity where it is no number.
+        """Return log likelihood, score (P,) and information (P, P) at x (P,); minus infinity where one is not finite.
 
-        Where the likelihood is below `least`, score and information are not computed.
+        Where the likelihood is below `least`, score and information are not computed: they are zero and the identity.
         """
         count, noise = x.size, self.vector(x)
         runs = [(r, *base_dynamics(a, k), e) for r, (a, k), e in zip(self.records, self.dynamics, self.residuals, strict=True)]
@@ -174,14 +175,14 @@ class _LogNoiseLikelihood:
 
 
 def _bounds(names: tuple[str, ...], floor: Noise, least: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """Return log bounds; white sensor noise stays near what the differences of the signal show of it.
+    """Return the bounds of the logarithms of noise parameters; white sensor noise stays near the noise floor.
 
-    Where they show less than `least` it stays above that.
+    Where the floor is below `least` (angle, rate), that is the lower bound.
     """
-    shown = (
+    least_white = (
         MIN_WHITE_SHARE * seen if seen > bound else bound for seen, bound in zip((floor.angle, floor.rate), least, strict=True)
     )
-    low = {n: p.low for n, p in NOISE_PARAMETERS.items()} | dict(zip(("angle", "rate"), shown, strict=True))
+    low = {n: p.low for n, p in NOISE_PARAMETERS.items()} | dict(zip(("angle", "rate"), least_white, strict=True))
     high = {n: p.high for n, p in NOISE_PARAMETERS.items()} | {
         "angle": max(2.0 * floor.angle, 2.5 * least[0]),
         "rate": max(2.0 * floor.rate, 2.5 * least[1]),
@@ -189,10 +190,10 @@ def _bounds(names: tuple[str, ...], floor: Noise, least: tuple[float, float]) ->
     return np.log([low[n] for n in names]), np.log([high[n] for n in names])
 
 
-def _resolution(records: Sequence[Record]) -> tuple[float, float]:
-    """Return a share of each channel's own size, below which no model of the motion can be right.
+def _least_white_noise(records: Sequence[Record]) -> tuple[float, float]:
+    """Return the least white noise of angle and rate: a share of the channel's rms, below which no model can be exact.
 
-    A signal that was filtered before it was logged shows no white noise at all.
+    It matters for a signal that was filtered before it was logged and shows no white noise at all.
     """
     angle = _rms([r.angle[r.angle_ok] - r.angle[r.angle_ok].mean() for r in records if r.angle_ok.any()])
     rate = _rms([r.rate[r.rate_ok] - r.rate[r.rate_ok].mean() for r in records if r.rate_ok.any()])
@@ -200,30 +201,31 @@ def _resolution(records: Sequence[Record]) -> tuple[float, float]:
 
 
 ROUGH_SHARE, ALMOST_NONE_SHARE = 0.5, 0.1
-"""Share of its rough size at which a component starts where the start is white, and below which one of another start is almost
-none: that one starts there, as its slope vanishes at zero. Of 300 estimates in four diagnoses each ended within 0.5 of the best
-log likelihood known but two, where half the rough size, and the start as it stands, missed it by more in six and in nine."""
+"""Share of its rough size at which a component starts where the start is white; and the share below which a component of another
+start counts as nearly zero and is raised to it, as the likelihood has no slope at zero. Of 300 estimates in four diagnoses all
+but two ended within 0.5 of the best log likelihood known. With a threshold of half the rough size six missed it by more, with no
+threshold nine."""
 
 
-def _begun(
+def _reinitialised(
     records: Sequence[Record],
     dynamics: Sequence[tuple[float, float]],
     residuals: Sequence[FloatArray],
     floor: Noise,
     start: Noise,
 ) -> tuple[dict[str, float], Collection[str]]:
-    """Return the numbers of the noise that begin elsewhere than at the start, and the components that it has almost none of."""
+    """Return the noise parameters that are changed from the start, and the components that are nearly zero in the start."""
     rms_angle = _rms([e[0][r.angle_ok] for e, r in zip(residuals, records, strict=True)])
     rms_rate = _rms([e[1][r.rate_ok] for e, r in zip(residuals, records, strict=True)])
-    extra = max(float(np.sqrt(max(rms_rate**2 - floor.rate**2, 0.0))), 0.1 * floor.rate)
-    spare = max(float(np.sqrt(max(rms_angle**2 - floor.angle**2, 0.0))), 0.1 * floor.angle)
+    excess_rate = max(float(np.sqrt(max(rms_rate**2 - floor.rate**2, 0.0))), 0.1 * floor.rate)
+    excess_angle = max(float(np.sqrt(max(rms_angle**2 - floor.angle**2, 0.0))), 0.1 * floor.angle)
     damping = max(float(np.mean([max(d[0], 0.1) for d in dynamics])), 0.1)
-    rough = {"disturbance": damping * extra + 1e-6, "coloured_angle": spare, "coloured_rate": extra}
+    rough = {"disturbance": damping * excess_rate + 1e-6, "coloured_angle": excess_angle, "coloured_rate": excess_rate}
     if all(getattr(start, name) == 0.0 for name in rough):
         return {"angle": floor.angle, "rate": floor.rate} | {name: ROUGH_SHARE * size for name, size in rough.items()}, ()
     least = {name: ALMOST_NONE_SHARE * size for name, size in rough.items()}
-    scarce = {name: size for name, size in least.items() if getattr(start, name) < size}
-    return scarce, scarce
+    near_zero = {name: size for name, size in least.items() if getattr(start, name) < size}
+    return near_zero, near_zero
 
 
 def _rms(parts: list[FloatArray]) -> float:

@@ -1,9 +1,9 @@
-"""What a constant moment does to the linear base model, and series made free of what such a moment of random size has in common.
+"""The response of the linear base model to a constant moment, and the whitening of series for a random moment of each run.
 
-A run's trim is not quite that of the next: a fin returns to its middle within a tenth of a degree, a payload shifts. A moment
-m ~ N(0, s^2) of the run's own adds m r to its residual, r the response of p' = -a p - k y + 1 from rest. Of the covariance that
-whitens all else to I it makes I + s^2 r r', whose inverse square root is I - (1 - (1 + s^2 r'r)^-1/2) r r' / r'r.
-Source: Woodbury's identity; a variance component of grouped data (Searle, Casella and McCulloch 1992, chapter 1).
+The trim varies from run to run: a fin returns to its neutral position within a tenth of a degree, a payload shifts. A constant
+moment m ~ N(0, s^2) of one run adds m r to its residual, where r is the response of p' = -a p - k y + 1 from rest. With r
+whitened for the other noise, the covariance I becomes I + s^2 r r', whose inverse square root is I - (1 - (1 + s^2 r'r)^-1/2) r
+r' / r'r. Source: Woodbury's identity; a variance component of grouped data (Searle, Casella and McCulloch 1992, chapter 1).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fieldsid.numerics.jit import jit
 
 @jit
 def base_responses(steps: FloatArray, a: float, k: float) -> FloatArray:
-    """Return angle and rate (3, 2, n) of the linear base: under a unit moment from rest, from a unit angle, from a unit rate."""
+    """Return angle and rate (3, 2, n) of the linear base model: to a unit moment from rest, a unit angle and a unit rate."""
     n, last_h = steps.shape[0] + 1, -1.0
     out = np.zeros((3, 2, n))
     out[1, 0, 0] = out[2, 1, 0] = 1.0
@@ -34,13 +34,13 @@ def base_responses(steps: FloatArray, a: float, k: float) -> FloatArray:
 
 
 def without_common_moment(white: FloatArray, response: FloatArray, std: float) -> tuple[FloatArray, float]:
-    """Return whitened series (m, 2, n) with a moment of standard deviation std (rad/s^2) whitened too, and its log variance.
+    """Return series (m, 2, n), whitened also for a moment of standard deviation std (rad/s^2), and the added log variance.
 
-    response (2, n) is that of a unit moment, whitened as the series are.
+    `white` are the series and `response` (2, n) the response to a unit moment, both whitened for the other noise.
     """
-    known = float(np.vdot(response, response))
-    if known <= 0.0:
+    power = float(np.vdot(response, response))
+    if power <= 0.0:
         return white, 0.0
-    grown = 1.0 + std**2 * known
-    along = np.tensordot(white, response, axes=2) * ((1.0 - grown**-0.5) / known)
-    return white - along[:, None, None] * response, float(np.log(grown))
+    variance = 1.0 + std**2 * power
+    removed = np.tensordot(white, response, axes=2) * ((1.0 - variance**-0.5) / power)
+    return white - removed[:, None, None] * response, float(np.log(variance))

@@ -1,4 +1,4 @@
-"""The kinds of noise: which processes each holds, and the bounds of each parameter.
+"""The kinds of noise: the processes of which each consists, and the bounds of each parameter.
 
 To add a kind of the processes that are here, add a `NoiseKind`. To add a process, add its parameters to `models.model.Noise` and
 to NOISE_PARAMETERS, and its state to `kalman/univariate.py`.
@@ -14,19 +14,20 @@ import numpy.typing as npt
 from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S
 
 SEA_TIMES_S = (0.5, 8.0)
-"""Correlation times (s) of a moment that the water turns a hull by, 95 of 100. A wave has lost its memory after a sixth of its
-period, 3 s of chop to 15 s of swell; an eddy as long as the hull, 1 to 6 m, passes it at 1.5 m/s in 0.7 to 4 s. As much again is
-left to the slow. What moves more slowly yet is no sea but a trim that changes, which is an effect: without the prior a drift of
-the trim was left to a disturbance of 25 to 30 s. The two banks, by different hands, have 0.3 to 2 and 2 to 5 s."""
+"""95 % prior range of the correlation time (s) of the moment that the water exerts on a hull. The correlation time of a wave is a
+sixth of its period, which is 3 s (chop) to 15 s (swell); an eddy as long as the hull, 1 to 6 m, passes it at 1.5 m/s in 0.7 to 4
+s. The upper limit is twice as long. Anything slower is not the sea but a change of the trim, which is an effect: without this
+prior a drift of the trim was explained by a disturbance of 25 to 30 s. The two banks of simulated logs have 0.3 to 2 and 2 to 5
+s."""
 STANDARD_DEVIATIONS = 4.0
-"""Standard deviations of a normal distribution between which 95 of 100 lie."""
+"""Width of the 95 % range of a normal distribution in standard deviations."""
 
 
 @dataclass(frozen=True, slots=True)
 class NoiseParameter:
     """Bounds of a field of `Noise`, and its value where a kind does not have it; a standard deviation (SI) or a time in s.
 
-    `usual` are the limits between which 95 of 100 lie before anything is measured, log-normally; None where nothing is known.
+    `usual` are the limits of the 95 % range of its log-normal prior; None where there is no prior.
     """
 
     low: float
@@ -37,7 +38,7 @@ class NoiseParameter:
 
     @property
     def log_prior(self) -> tuple[float, float]:
-        """Median and precision of the prior of its logarithm; a precision of zero where nothing is known."""
+        """Median and precision of the prior of its logarithm; the precision is zero where there is no prior."""
         if self.usual is None:
             return 0.0, 0.0
         low, high = np.log(self.usual)
@@ -46,14 +47,14 @@ class NoiseParameter:
 
 @dataclass(frozen=True, slots=True)
 class NoiseKind:
-    """Fields of `Noise` that are estimated, and what residuals of this kind are said to be."""
+    """The fields of `Noise` that are estimated, and the sentence that describes residuals of this kind."""
 
     fields: tuple[str, ...]
     says: str
 
     @property
     def absent(self) -> tuple[int, ...]:
-        """The places in the noise vector of the standard deviations that are zero."""
+        """The indices in the noise vector of the standard deviations that are zero."""
         return tuple(i for i, (n, p) in enumerate(NOISE_PARAMETERS.items()) if p.is_standard_deviation and n not in self.fields)
 
 
@@ -86,4 +87,4 @@ NOISE_KINDS = {
 }
 """The kinds that a fit compares, simple ones first."""
 SINGLE_NOISE_KINDS, JOINT_NOISE = ("disturbance", "coloured"), "both"
-"""The kinds that models are compared under, and all of them together."""
+"""The kinds under which models are compared, and the kind that combines them."""

@@ -1,8 +1,9 @@
-"""The noise of runs of which each has a constant moment of its own, by maximum likelihood.
+"""The noise of several runs, each with a random constant moment, by maximum likelihood.
 
-The moment's standard deviation s and the rest of the noise are estimated in turn: the rest from residuals less each run's most
-probable moment, s from what the runs tell of their moments. With r a run's response to a unit moment and e its residual, both
-whitened and free of its initial state, q = r'r and t = r'e, its log likelihood is, up to a constant,
+The standard deviation s of the moments and the other noise parameters are estimated in turn: the latter from the residuals less
+the response to each run's most probable moment, s from q and t of the runs. Let r be the response of a run to a unit moment and e
+its residual, both whitened and with the initial state projected out, q = r'r and t = r'e. The log likelihood of the run is, up to
+a constant,
 
     -log(1 + s^2 q) / 2 + s^2 t^2 / (2 + 2 s^2 q),   and the most probable moment is s^2 t / (1 + s^2 q).
 Source: Searle, Casella and McCulloch 1992, Variance Components, chapter 6.
@@ -26,23 +27,24 @@ from fieldsid.numerics.gram_least_squares import solve_normal_equations
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 DEAD_BAND_RAD = 0.0017
-"""A tenth of a degree: the dead band of a digital servo and its linkage, anywhere in which the middle of a fin may lie."""
+"""A tenth of a degree: the dead band of a digital servo and its linkage, within which the neutral position of a fin may lie."""
 FIN_REPEATABILITY_RAD = DEAD_BAND_RAD / sqrt(12.0)
-"""The standard deviation of that, the largest of the runs' own moments as an angle of the fin: one that differs more from run to
-run is no trim."""
+"""The standard deviation of a uniform distribution over the dead band. As a fin angle it is the largest standard deviation of the
+runs' moments: a moment that differs more from run to run is not a trim."""
 MIN_OWN_MOMENT_GAIN = 0.5
-"""Log likelihood that moments of the runs' own must gain: half a unit is what one parameter gains by chance."""
+"""Least gain of log likelihood by the moments of the runs: half a unit is the expected gain of one parameter by chance."""
 STD_GRID = np.geomspace(1e-3, 1.0, 61)
-"""Shares of the largest standard deviation that are tried: neighbours differ by an eighth, which costs less than 0.01."""
+"""Shares of the largest standard deviation that are tried: neighbours differ by an eighth, which loses less than 0.01 of log
+likelihood."""
 MAX_ROUNDS, SAME_STD_RATIO = 3, 1.3
-"""Rounds in which both are estimated in turn, and the ratio within which a new standard deviation ends them."""
+"""Most rounds of the alternation, and the ratio of two successive standard deviations at which it ends."""
 
 
 @dataclass(frozen=True, slots=True)
 class MomentInformation:
-    """What a run tells of its own moment, free of its initial state.
+    """The information of a run about its constant moment, with the initial state projected out.
 
-    Information q in (rad/s^2)^-2, pull t, and how angle and rate at the start (2,) move with a unit moment.
+    information q in (rad/s^2)^-2, pull t = r'e, and start (2,), the change of initial angle and rate with a unit moment.
     """
 
     information: float
@@ -57,7 +59,7 @@ class MomentInformation:
 def moment_information(
     records: Sequence[Record], dynamics: Sequence[tuple[float, float]], residuals: Sequence[FloatArray], noise: Noise
 ) -> tuple[MomentInformation, ...]:
-    """Return what residuals [(2, n)] of runs tell of each run's own moment under a noise, its own moment left out of that."""
+    """Return the information of residuals [(2, n)] about each run's moment, under a noise without its `own_moment`."""
     stationary, found = replace(noise, own_moment=0.0), list[MomentInformation]()
     for record, (a, k), residual in zip(records, dynamics, residuals, strict=True):
         series = np.concatenate([residual[None], base_responses(record.nominal_steps, *base_dynamics(a, k))])
@@ -71,18 +73,18 @@ def moment_information(
 
 
 def disturbance_mean_std(noise: Noise, span: float) -> float:
-    """Return the standard deviation (rad/s^2) of a disturbance's mean over a run of that length (s).
+    """Return the standard deviation (rad/s^2) of the mean of a disturbance over a run of length `span` (s).
 
-    Of an AR(1) moment of size w and time T: w^2 (2 T / span) (1 - (T / span) (1 - exp(-span / T))).
+    An AR(1) moment of standard deviation w and time T has the variance w^2 (2 T / span) (1 - (T / span) (1 - exp(-span / T))).
     """
     share = noise.disturbance_time / span
     return noise.disturbance * float(np.sqrt(2.0 * share * (1.0 + share * np.expm1(-1.0 / share))))
 
 
 def likeliest_std(runs: Sequence[MomentInformation], most: float) -> float:
-    """Return the standard deviation (rad/s^2) of the runs' own moments, at most `most`, zero where none gains likelihood.
+    """Return the likeliest standard deviation (rad/s^2) of the runs' moments, at most `most`; zero where it gains too little.
 
-    One run alone does not tell its own moment from the trim of all.
+    It is zero for a single run, where a moment of the run cannot be distinguished from the common trim.
     """
     if len(runs) < 2 or not most > 0.0:
         return 0.0
@@ -98,17 +100,25 @@ def estimate_noise_of_runs(
     start: Noise, floor: Noise, most: float, known: Sequence[MomentInformation] = (), *,
     reinitialise: bool = True, evaluations: EvaluationCounter | None = None,
 ) -> tuple[Noise, float]:  # fmt: skip
-    """Return the noise of a kind, each run's own moment with it, of the highest posterior density, and the log of that.
+    """Return the noise of a kind, with `own_moment`, of the highest posterior density, and the log of that density.
 
-    It is the likelihood times the prior density, each up to a constant. Arguments are those of `estimate_noise`; `most` is the
-    largest standard deviation of the moments (rad/s^2), `known` what other runs tell of theirs. Where the motion is without
-    bound: the start, and minus infinity.
+    The density is the likelihood times the prior density, each up to a constant. The arguments are those of `estimate_noise`;
+    `most` is the largest standard deviation of the moments (rad/s^2), `known` the information of other runs about their moments.
+    Where a residual is not finite, `start` and minus infinity are returned.
     """
     noise, std = start, start.own_moment if len(records) + len(known) > 1 else 0.0
     for count in range(MAX_ROUNDS):
-        left, again = _less_own_moments(records, dynamics, residuals, noise, std), reinitialise and count == 0
+        reduced, again = _less_own_moments(records, dynamics, residuals, noise, std), reinitialise and count == 0
         noise, value = estimate_noise(
-            records, dynamics, left, noise_kind, noise, floor=floor, reinitialise=again, has_prior=True, evaluations=evaluations
+            records,
+            dynamics,
+            reduced,
+            noise_kind,
+            noise,
+            floor=floor,
+            reinitialise=again,
+            has_prior=True,
+            evaluations=evaluations,
         )
         if not np.isfinite(value):
             return start, -np.inf
@@ -123,14 +133,14 @@ def estimate_noise_of_runs(
 def _less_own_moments(
     records: Sequence[Record], dynamics: Sequence[tuple[float, float]], residuals: Sequence[FloatArray], noise: Noise, std: float
 ) -> Sequence[FloatArray]:  # fmt: skip
-    """Return residuals [(2, n)] less what each run's most probable own moment does, its start moved along."""
+    """Return residuals [(2, n)] less the response to each run's most probable moment, with the initial state refitted."""
     if std == 0.0 or not all(np.isfinite(e).all() for e in residuals):
         return residuals
-    left = []
-    for record, (a, k), e, told in zip(
+    reduced = []
+    for record, (a, k), e, about_moment in zip(
         records, dynamics, residuals, moment_information(records, dynamics, residuals, noise), strict=True
     ):
         moment, *starts = base_responses(record.nominal_steps, *base_dynamics(a, k))
-        free = moment - np.tensordot(told.start, np.stack(starts), axes=1)
-        left.append(np.where(record.ok, e - told.most_probable(std) * free, 0.0))
-    return left
+        response = moment - np.tensordot(about_moment.start, np.stack(starts), axes=1)
+        reduced.append(np.where(record.ok, e - about_moment.most_probable(std) * response, 0.0))
+    return reduced

@@ -1,8 +1,8 @@
 """Standard errors of free-run least squares when the residuals are not white.
 
-With normal matrix N = sum J' W J and residual covariance S the estimate's covariance is N^-1 (J' W S W J) N^-1.
-S is that of the fitted noise model (AR(1) moment through the base dynamics, AR(1) sensor noise, white noise); the
-middle is summed exactly by the adjoint of the noise's state recursion, no stationarity assumed.
+With normal matrix N = sum J' W J and residual covariance S the estimate's covariance is N^-1 (J' W S W J) N^-1. S is the
+covariance of the fitted noise model (AR(1) moment through the base dynamics, AR(1) sensor noise, white noise). The middle factor
+is computed exactly by the adjoint of the noise's state recursion, without assuming stationarity.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""An information matrix corrected by secants: by how much the score has fallen over the last steps.
+"""An information matrix corrected by secants: by the change of the score over the last steps.
 
-The expected information is the curvature of a log likelihood where the model is right. Where it is not, as of the noise of a
-model that lacks an effect, the likelihood bends less, and scoring by the expected information alone takes tens of small steps.
+The expected information is the curvature of the log likelihood where the model is right. Where the model lacks an effect, the
+curvature is smaller, and scoring by the expected information alone takes tens of small steps.
 Source: Nocedal and Wright 2006, equation 6.19 (BFGS), from the expected information at the last point instead of a constant.
 """
 
@@ -14,17 +14,17 @@ import numpy as np
 from fieldsid.numerics.arrays import FloatArray
 
 CURVATURE_SHARES = (0.01, 0.8)
-"""Curvature over a step, in that of the matrix it corrects, between which a secant counts: below, the matrix would become
-singular; above, the expected information is as good."""
+"""Limits of the curvature along a step, relative to that of the matrix, between which a secant is used: below, the corrected
+matrix would be nearly singular; above, the expected information is good enough."""
 MAX_STEP = 0.5
-"""Longest step whose secant says what the curvature is at its end, where parameters are logarithms."""
+"""Longest step, in logarithms of the parameters, whose secant is used: beyond it the curvature changes along the step."""
 
 
 def with_secants(information: FloatArray, secants: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
-    """Return an information matrix (P, P) that meets the last of some secants, and the earlier ones as far as that lets it.
+    """Return an information matrix (P, P) that satisfies the last secant exactly and the earlier ones approximately.
 
-    Each is a step (P,) of logarithms and the fall (P,) of the score over it, the oldest first. The matrix stays positive
-    definite.
+    A secant is a step (P,) of logarithms and the decrease (P,) of the score over it; the oldest is first. The matrix stays
+    positive definite.
     """
     out, (least, most) = information, CURVATURE_SHARES
     for step, fall in secants:

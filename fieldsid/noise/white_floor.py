@@ -24,9 +24,10 @@ def white_noise_floor(records: Sequence[Record]) -> Noise:
 
 
 def lowered_noise_floor(floor: Noise, records: Sequence[Record], residuals: Sequence[FloatArray]) -> Noise:
-    """Return a floor (white, both channels), lowered to what the third differences of a model's residuals [(2, n)] show.
+    """Return the lower, for each channel, of a white noise floor and that of the third differences of residuals [(2, n)].
 
-    Where a vehicle answers within a few samples, the signals' own differences contain its motion; the residuals hardly do.
+    Where a vehicle responds within a few samples, the differences of the signals contain its motion; those of a model's residuals
+    hardly do.
     """
     angle = _pooled([white_noise_std(e[0], r.angle_ok) for e, r in zip(residuals, records, strict=True)])
     rate = _pooled([white_noise_std(e[1], r.rate_ok) for e, r in zip(residuals, records, strict=True)])

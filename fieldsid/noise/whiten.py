@@ -4,7 +4,7 @@ The residual of a free run obeys, to first order, the linear base model without 
     y' = p,  p' = -a p - k y + w,  w an AR(1) moment,  measured: y + n_y + white, p + n_p + white
 with n_y, n_p AR(1). Its innovations over their standard deviations are white, and the same filter applied to the
 sensitivities gives generalised least squares: the prediction-error method (Ljung 1999, chapter 7) in free-run form.
-A constant moment of the run's own is whitened after it (moment_response.py).
+The random constant moment of a run is whitened afterwards (moment_response.py).
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from fieldsid.numerics.arrays import FloatArray
 
 _FIELDS = attrgetter(*NOISE_FIELDS)
 MIN_DAMPING_1_S = 1e-3
-"""Damping in 1/s of the base through which noise acts, at least: a residual does not grow where nonlinear damping holds it."""
+"""Least damping in 1/s of the base model through which noise acts: nonlinear damping bounds the residual of an unstable one."""
 
 
 def noise_vector(noise: Noise) -> FloatArray:
-    """Return the stationary part of a noise record as the vector the filter takes, (7,)."""
+    """Return the stationary part of a noise record as the vector (7,) that the filter takes."""
     return np.array(_FIELDS(noise))
 
 
 def is_white(noise: Noise) -> bool:
-    """Whether a noise record holds white sensor noise only."""
+    """Whether a noise record consists of white sensor noise only."""
     return _is_stationary_white(noise) and noise.own_moment == 0.0
 
 
@@ -40,7 +40,7 @@ def _is_stationary_white(noise: Noise) -> bool:
 
 
 def base_dynamics(damping: float, stiffness: float) -> tuple[float, float]:
-    """Return the damping and stiffness through which noise moves a base model: an unstable one is taken as marginal."""
+    """Return the damping and stiffness of the base model through which noise acts: an unstable one is taken as marginal."""
     return max(damping, MIN_DAMPING_1_S), max(stiffness, 0.0)
 
 

@@ -1,4 +1,4 @@
-"""How angle and rate (y, p) of the linear base model go over an interval, under a moment w that is held."""
+"""The transition of angle and rate (y, p) of the linear base model over an interval, under a constant moment w."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import numpy as np
 from fieldsid.numerics.jit import inner
 
 SAME_STEP_SHARE = 1e-7
-"""Share of a step within which another is the same: times are rounded."""
+"""Relative difference within which two steps count as equal: times are rounded."""
 
 
 @inner
 def _taylor(a: float, k: float, s: float, y: float, p: float, w: float) -> tuple[float, float]:
-    """Return (y, p) after s under a held moment w, by the series of the exponential to order 8."""
+    """Return (y, p) after a time s under a constant moment w, by the Taylor series of the exponential to order 8."""
     add_y, add_p, push = y, p, w
     for order in range(1, 9):
         share = s / order
@@ -25,7 +25,7 @@ def _taylor(a: float, k: float, s: float, y: float, p: float, w: float) -> tuple
 
 @inner
 def transition(a: float, k: float, h: float) -> tuple[float, float, float, float, float, float]:
-    """Return the held-input transition of (y, p) over h: f_yy, f_yp, f_py, f_pp, and what w adds to y and to p."""
+    """Return the zero-order-hold transition of (y, p) over h: f_yy, f_yp, f_py, f_pp, and the gains from w to y and to p."""
     pieces = max(1, int(np.ceil(max(abs(a), np.sqrt(abs(k)), 1e-9) * h / 0.25)))
     s = h / pieces
     yy, yp, py, pp, wy, wp = 1.0, 0.0, 0.0, 1.0, 0.0, 0.0
@@ -38,5 +38,5 @@ def transition(a: float, k: float, h: float) -> tuple[float, float, float, float
 
 @inner
 def is_other_step(step: float, last: float) -> bool:
-    """Whether a step between samples is another than the last one, for which the transition is known."""
+    """Whether a step between samples differs from the last one, for which the transition is known."""
     return abs(step - last) > SAME_STEP_SHARE * step

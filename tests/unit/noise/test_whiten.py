@@ -14,7 +14,7 @@ from fieldsid.models.record import Record
 from fieldsid.noise.fisher_scoring import information, innovations_of
 from fieldsid.noise.innovations import filter_of
 from fieldsid.noise.kalman.transition import transition
-from fieldsid.noise.kalman.univariate import with_sensors_abreast
+from fieldsid.noise.kalman.univariate import with_sensors_in_lanes
 from fieldsid.noise.maximum_likelihood import log_likelihood
 from fieldsid.noise.sandwich_covariance import score_covariance
 from fieldsid.noise.whiten import noise_vector, whiten
@@ -149,7 +149,7 @@ def test_noises_abreast_come_to_what_each_comes_to_alone(log):
     residual = np.where(seen(log), 0.01 * np.random.default_rng(6).standard_normal(2 * len(log)), 0.0).reshape(2, -1)
     noises = np.array([moved(noise_vector(NOISES["both"]), place, 0.5) for place in range(8)])
     errors, spreads = np.empty((2, 8, 2, len(log)))
-    with_sensors_abreast(log.nominal_steps, log.ok, A, K, noises, residual[None], errors, spreads)
+    with_sensors_in_lanes(log.nominal_steps, log.ok, A, K, noises, residual[None], errors, spreads)
     for lane, noise in enumerate(noises):
         alone, wide = np.empty((2, 1, 2, len(log)))
         filter_of(noise)(log.nominal_steps, log.ok, A, K, noise[None], residual[None], alone, wide)
