@@ -1,4 +1,4 @@
-"""The recursive estimate as the vehicle flies: constant memory, NumPy alone where numba is not there."""
+"""The recursive estimate during the flight: its memory is constant, and it runs with NumPy alone where numba is missing."""
 
 from fieldsid.online.estimate import OnlineEstimate
 from fieldsid.online.identifier import OnlineIdentifier

@@ -1,11 +1,12 @@
-"""A jump of the fin's authority told as it happens, with the damping or without: a linkage that slipped, a fin that was lost.
+"""Detect a jump of the fin's authority during the flight, with or without one of the damping, as when a fin or linkage breaks.
 
-The equation's rows are summed second by second. At each second what came last is compared with all before, for every place
-where it may have begun: authority, damping and trim are free after it, as a payload's inertia or a smaller fin at the stern takes
-authority and damping by one share; drag and stiffness stay. Damping goes with the speed, authority with its square. How little
-the drag is known at rates that were not flown before is in the error. A second is longer than residuals remember, so that its sum
-of scores is one independent draw of their noise.
-Source: Chow 1960, Econometrica 28(3); the scores' variance by clusters: Liang and Zeger 1986, Biometrika 73(1).
+The products of the regression rows are summed for each second. At the end of each second, and for each second of the last twenty
+in which a jump may have happened, the rows since then are compared with all rows before. Authority, damping and trim are free
+after a jump: a payload's inertia or a smaller fin at the stern changes authority and damping by one factor. Quadratic drag and
+stiffness stay. Damping is scaled with the speed, authority with its square. The error includes the uncertainty of the drag at
+rates that were not flown before. A second is longer than the correlation of the residuals, so that its sum of scores is one
+independent draw of their noise. Source: Chow 1960, Econometrica 28(3); the scores' variance by clusters: Liang and Zeger 1986,
+Biometrika 73(1).
 """
 
 from __future__ import annotations
@@ -21,22 +22,24 @@ import numpy as np
 from fieldsid.numerics.arrays import BoolArray, FloatArray, IntArray
 from fieldsid.records.keys import Key
 
-KEPT_S, LEAST_S, MOST_S = 60, 6, 20
-"""Seconds that are kept apart, and the least and the most of them that may have come after a jump."""
-OTHER_MOTION, OTHER_POWER = 0.15, 1.0
-"""Share by which one authority answers for another motion otherwise, sway and lag that no such model has; and the power of the
-speed by which it may differ from u^2: sway and heave make it another."""
-SURE = 4.5
-"""Standard errors beyond that: at 15 places a second, an hour of noise alone makes fewer than one in ten thousand."""
-KNOWN_SHARE = 0.1
-"""Standard error, as a share of the larger, at which the authorities before and since are known well enough to be compared."""
-LEAST_DRAWS = 20
-"""Seconds that the noise of the scores is told from."""
-LEAST_EXCITED, LEAST_MOVED = 1e-6, 0.05
-"""Least eigenvalue, scaled to ones, of all columns before and of fin and trim since: a fin that is held tells neither."""
+SEPARATE_SECONDS, MIN_SECONDS_AFTER, MAX_SECONDS_AFTER = 60, 6, 20
+"""Seconds whose sums are kept separately, and the least and the most of them that may have come after a jump."""
+MOTION_MISFIT, SPEED_POWER_MISFIT = 0.15, 1.0
+"""Relative change of the estimated authority that another kind of motion may cause, as the model lacks sway and lag; and by how
+much the exponent of the authority over speed may differ from 2, as sway and heave change it."""
+MIN_STD_ERRORS = 4.5
+"""Standard errors beyond that change from which a jump is reported: with 15 candidates a second, noise alone gives fewer than one
+false jump in ten thousand hours."""
+MAX_RELATIVE_ERROR = 0.1
+"""Largest standard error of the authorities before and after, as a share of the larger one, at which they are compared."""
+MIN_DRAWS = 20
+"""Least number of seconds from which the noise of the scores is estimated."""
+MIN_EXCITATION_BEFORE, MIN_EXCITATION_AFTER = 1e-6, 0.05
+"""Least eigenvalue of the normal matrix, scaled to a unit diagonal, of all columns before a jump, and of fin and trim after it: a
+constant fin does not separate authority from trim."""
 COLUMNS = RATE, _, _, FIN, ONE, _ = tuple(range(6))
 FREE = (RATE, FIN, ONE)
-"""Columns: rate, rate with its size, angle, fin, one, target; rate, fin and one are free after a jump."""
+"""Columns: r, r|r|, angle, fin, one, target. The coefficients of r, fin and one are free after a jump."""
 _UPPER = np.triu_indices(len(COLUMNS))
 
 
@@ -51,7 +54,7 @@ class Jump:
 
 @dataclass(slots=True)
 class _Sums:
-    """Products of rows [phi, target] (5, 5) over a while from `begin` s on, and how many they are."""
+    """Sum of the products of rows [phi, target] (6, 6) over an interval that starts at `begin` s, and the number of rows."""
 
     begin: float = nan
     products: FloatArray = field(default_factory=lambda: np.zeros((len(COLUMNS), len(COLUMNS))))
@@ -59,7 +62,7 @@ class _Sums:
 
 
 class AuthorityJump:
-    """Sums of rows, those of the last minute second by second; `stiff` says whether the second column has a parameter."""
+    """Sums of row products, separately for each second of the last minute; `stiff`: whether the model has a stiffness."""
 
     __slots__ = ("_before", "_free", "_keep", "_noise", "_rows", "_seconds", "_speed", "_usual")
 
@@ -72,99 +75,101 @@ class AuthorityJump:
         self._noise, self._usual, self._speed = nan, nan, nan
 
     def add(self, time: float, row: FloatArray, speed: float) -> Jump | None:
-        """Take one row (5,) at a time in s and a surge in m/s, NaN where unknown; return a jump where one shows."""
+        """Add one row (5,) at a time in s and a surge in m/s, NaN where unknown; return a jump where one is detected."""
         found = None
         if not self._seconds or floor(time) != floor(self._seconds[-1].begin):
-            found = self._close(time)
+            found = self._end_second(time)
             self._seconds.append(_Sums(time))
         self._speed = speed if isfinite(speed) and speed > 0.0 else self._speed
         self._usual = self._usual if isfinite(self._usual) else self._speed
         faster = self._speed / self._usual if isfinite(self._speed) else 1.0
-        damped, stiff, moved, one, target = row.tolist()
-        self._rows.append((damped * faster, damped * abs(damped), stiff, moved * faster * faster, one, target))
+        rate, stiff, moved, one, target = row.tolist()
+        self._rows.append((rate * faster, rate * abs(rate), stiff, moved * faster * faster, one, target))
         return found
 
     def state(self) -> dict[str, Any]:
-        """Return all of it as plain values; NaN as None."""
-        self._sum_up()
+        """Return the state as plain values, NaN as None."""
+        self._sum_waiting_rows()
         numbers = [v if isfinite(v) else None for v in (self._noise, self._usual, self._speed)]
         return {"numbers": numbers, "sums": [_plain(s) for s in (self._before, *self._seconds)]}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Go on from a state; raises ValueError, TypeError or IndexError where it is none."""
+        """Restore a state; raises ValueError, TypeError or IndexError where it is not valid."""
         self._noise, self._usual, self._speed = (nan if v is None else float(v) for v in state["numbers"])
         self._before, *seconds = (_sums(s) for s in state["sums"])
         self._seconds = deque(seconds)
 
-    def _close(self, time: float) -> Jump | None:
-        """Look for a jump once a second is whole; where the clock starts again all that was is before."""
-        self._sum_up()
+    def _end_second(self, time: float) -> Jump | None:
+        """Look for a jump at the end of a second; where the clock restarts, all earlier seconds are merged into `_before`."""
+        self._sum_waiting_rows()
         seconds = self._seconds
-        while seconds and (len(seconds) >= KEPT_S or time < seconds[-1].begin):
-            gone = seconds.popleft()
-            self._before.products += gone.products
-            self._before.count += gone.count
-        found = self._found()
+        while seconds and (len(seconds) >= SEPARATE_SECONDS or time < seconds[-1].begin):
+            oldest = seconds.popleft()
+            self._before.products += oldest.products
+            self._before.count += oldest.count
+        found = self._detected()
         if found is not None:
             kept = [s for s in seconds if s.begin >= found.time]
             self._before, self._seconds, self._noise = _Sums(), deque(kept), nan
         return found
 
-    def _sum_up(self) -> None:
-        """Take the rows that have come into the sums of their second."""
+    def _sum_waiting_rows(self) -> None:
+        """Add the waiting rows to the sums of their second."""
         if self._rows:
             rows = np.array(self._rows)
             self._seconds[-1].products += rows.T @ rows
             self._seconds[-1].count += len(rows)
             self._rows.clear()
 
-    def _found(self) -> Jump | None:
-        """Return the jump at the place that explains all rows best, once it lies LEAST_S back.
+    def _detected(self) -> Jump | None:
+        """Return the jump at the candidate second that explains all rows best, if it is at least MIN_SECONDS_AFTER ago.
 
-        A second that does not fit lets earlier places explain it too: the latest ones must be among those compared.
+        Seconds less than MIN_SECONDS_AFTER ago are candidates too: without them, one recent second that does not fit would be
+        explained by an earlier candidate.
         """
         sums, keep, free, count = np.array([s.products for s in self._seconds]), self._keep, self._free, len(self._seconds)
         if not count:
             return None
-        places = np.arange(max(count - MOST_S, 0), count)
-        until, so_many = np.cumsum(sums, axis=0), np.cumsum([s.count for s in self._seconds])
-        earlier = until[places] - sums[places]
-        before, after = self._before.products + earlier, until[-1] - earlier
-        since = so_many[-1] - np.append(0.0, so_many)[places]
-        inverse, tells = _inverses(before[:, keep][:, :, keep], LEAST_EXCITED)
+        places = np.arange(max(count - MAX_SECONDS_AFTER, 0), count)
+        cumulative, row_counts = np.cumsum(sums, axis=0), np.cumsum([s.count for s in self._seconds])
+        earlier = cumulative[places] - sums[places]
+        before, after = self._before.products + earlier, cumulative[-1] - earlier
+        since = row_counts[-1] - np.append(0.0, row_counts)[places]
+        inverse, determines_before = _inverses(before[:, keep][:, :, keep], MIN_EXCITATION_BEFORE)
         theta = (inverse @ before[:, keep, -1:])[..., 0]
         noise = self._noises(sums, theta, places)
         products = after[:, keep][:, :, keep]
         solved, _ = _inverses(products[:, free][:, :, free], 0.0)
-        # the new numbers follow from the target, and from drag and stiffness as they were
+        # the new coefficients depend on the target, and on drag and stiffness, which do not change
         slopes = -solved @ products[:, free]
         slopes[:, :, free] = 0.0
         new = theta.copy()
         new[:, free] = (solved @ after[:, keep[free], -1:] + slopes @ theta[..., None])[..., 0]
-        left = np.maximum(before[:, -1, -1] - (theta * before[:, keep, -1]).sum(axis=1), 0.0)
-        left_now = after[:, -1, -1] - 2.0 * (new * after[:, keep, -1]).sum(axis=1) + _squares(new, products)
-        left_now = np.maximum(left_now, 0.0)
-        fin, own = int(np.flatnonzero(keep == FIN)[0]), FREE.index(FIN)
+        rss_before = np.maximum(before[:, -1, -1] - (theta * before[:, keep, -1]).sum(axis=1), 0.0)
+        rss_after = after[:, -1, -1] - 2.0 * (new * after[:, keep, -1]).sum(axis=1) + _squares(new, products)
+        rss_after = np.maximum(rss_after, 0.0)
+        fin, fin_place = int(np.flatnonzero(keep == FIN)[0]), FREE.index(FIN)
         was, is_now = theta[:, fin], new[:, fin]
-        counted = self._before.count + so_many[-1] - since
-        noisier = np.maximum(left_now * counted / np.maximum(left * since, 1e-30), 1.0)
-        moved = slopes[:, own].copy()
+        counted = self._before.count + row_counts[-1] - since
+        noisier = np.maximum(rss_after * counted / np.maximum(rss_before * since, 1e-30), 1.0)
+        moved = slopes[:, fin_place].copy()
         moved[:, fin] -= 1.0
-        error = np.sqrt(noise * np.maximum(_squares(moved, inverse) + noisier * solved[:, own, own], 0.0))
-        _, is_moved = _inverses(after[:, (FIN, ONE)][:, :, (FIN, ONE)], LEAST_MOVED)
-        known_to = np.sqrt(noise * np.maximum(inverse[:, fin, fin], 0.0))
-        is_known = np.maximum(known_to, error) <= KNOWN_SHARE * np.maximum(abs(was), abs(is_now))
-        misfit = OTHER_MOTION + OTHER_POWER * abs(log(self._speed / self._usual) if isfinite(self._speed) else 0.0)
-        jumps = is_moved & is_known & (abs(is_now - was) > misfit * abs(was) + SURE * error)
-        best = int(np.argmin(np.where(tells & np.isfinite(noise), left + left_now, np.inf)))
-        if not jumps[best] or places[best] > count - LEAST_S:
+        error = np.sqrt(noise * np.maximum(_squares(moved, inverse) + noisier * solved[:, fin_place, fin_place], 0.0))
+        _, is_moved = _inverses(after[:, (FIN, ONE)][:, :, (FIN, ONE)], MIN_EXCITATION_AFTER)
+        error_before = np.sqrt(noise * np.maximum(inverse[:, fin, fin], 0.0))
+        is_known = np.maximum(error_before, error) <= MAX_RELATIVE_ERROR * np.maximum(abs(was), abs(is_now))
+        misfit = MOTION_MISFIT + SPEED_POWER_MISFIT * abs(log(self._speed / self._usual) if isfinite(self._speed) else 0.0)
+        jumps = is_moved & is_known & (abs(is_now - was) > misfit * abs(was) + MIN_STD_ERRORS * error)
+        best = int(np.argmin(np.where(determines_before & np.isfinite(noise), rss_before + rss_after, np.inf)))
+        if not jumps[best] or places[best] > count - MIN_SECONDS_AFTER:
             return None
         return Jump(self._seconds[places[best]].begin, float(is_now[best] / was[best]), float(error[best] / abs(was[best])))
 
     def _noises(self, sums: FloatArray, theta: FloatArray, places: IntArray) -> FloatArray:
-        """Return the variance of the scores before each place over that of the columns (P,); before few, that of the last look.
+        """Return the variance of the scores before each candidate over that of the columns (P,).
 
-        It is the noise of a row, with what its neighbours share.
+        It is the variance of a row's residual with its correlation to the neighbouring rows. Where fewer than MIN_DRAWS seconds
+        come before the candidate, the last variance known is returned.
         """
         keep = self._keep
         is_before = np.arange(len(sums)) < places[:, None]
@@ -173,26 +178,26 @@ class AuthorityJump:
         scores = (sums[:, keep, -1] - np.einsum("sij,pj->psi", columns, theta)) * is_before[..., None]
         normal = np.linalg.pinv(np.einsum("ps,sij->pij", is_before.astype(float), columns), hermitian=True)
         spread = np.maximum(np.einsum("psi,pij,psj->p", scores, normal, scores), 0.0) / keep.size
-        noise = np.where(draws >= LEAST_DRAWS, spread * draws / np.maximum(draws - keep.size, 1), self._noise)
+        noise = np.where(draws >= MIN_DRAWS, spread * draws / np.maximum(draws - keep.size, 1), self._noise)
         self._noise = float(noise[-1])
         return noise
 
 
 def _squares(vectors: FloatArray, matrices: FloatArray) -> FloatArray:
-    """Return v' M v of each of some vectors (P, K) and matrices (P, K, K)."""
+    """Return v' M v for each of the vectors (P, K) and matrices (P, K, K)."""
     return np.asarray(np.einsum("pi,pij,pj->p", vectors, matrices, vectors))
 
 
 def _inverses(normals: FloatArray, least: float) -> tuple[FloatArray, BoolArray]:
-    """Return the pseudo-inverse of each normal matrix (P, K, K), each column scaled to one, and whether it tells all numbers.
+    """Return the pseudo-inverse of each normal matrix (P, K, K), and whether it determines all parameters (P,).
 
-    It does where no eigenvalue of the scaled matrix is below `least`.
+    It does where no column is zero and no eigenvalue of the matrix, scaled to a unit diagonal, is below `least`.
     """
     scale = np.sqrt(np.einsum("pii->pi", normals))
-    told, scale = (scale > 0.0).all(axis=1), np.where(scale > 0.0, scale, 1.0)
+    is_determined, scale = (scale > 0.0).all(axis=1), np.where(scale > 0.0, scale, 1.0)
     outer = scale[:, :, None] * scale[:, None, :]
     ones = normals / outer
-    return np.asarray(np.linalg.pinv(ones, hermitian=True) / outer), told & (np.linalg.eigvalsh(ones)[:, 0] >= least)
+    return np.asarray(np.linalg.pinv(ones, hermitian=True) / outer), is_determined & (np.linalg.eigvalsh(ones)[:, 0] >= least)
 
 
 def _plain(sums: _Sums) -> list[Any]:

@@ -1,4 +1,4 @@
-"""What is known of a vehicle under way at one time."""
+"""The estimate of a vehicle's parameters at one time of the flight."""
 
 from __future__ import annotations
 
@@ -18,13 +18,14 @@ from fieldsid.rounding import TWO_SIDED_95
 
 @dataclass(frozen=True, slots=True)
 class OnlineEstimate:
-    """What is known at `time` s: values and standard errors by parameter name, NaN before they exist.
+    """The estimate at `time` s: values and standard errors by parameter name, NaN before they exist.
 
-    `used` counts rows that joined the estimate, `speed` is the mean surge in m/s (NaN where unknown), `counts` what was met:
-    missing, repeated and late samples, gaps, restarts of the clock, spikes. `contradiction` is how the last samples of angle and
-    rate contradict each other, in words, empty where they do not: with a sign turned the values mean nothing. `covariance` (p, p)
-    is in the order of the names, empty before there is one; `speed_now` the surge of the last seconds, `fin_most` (rad) the
-    largest fin. `jump` is the last jump of the fin's authority: the estimate is of what came since.
+    `used` is the number of rows in the estimate, `speed` the mean surge in m/s (NaN where unknown). `counts` are the numbers of
+    missing, repeated and late samples, gaps, restarts of the clock and spikes. `contradiction` says in words how the last samples
+    of angle and rate contradict each other, and is empty where they do not; with a wrong sign the values have no meaning.
+    `covariance` (p, p) is in the order of the names, empty before there is one. `speed_now` is the mean surge of the last
+    seconds, `fin_most` (rad) the largest fin. `jump` is the last jump of the fin's authority; the estimate uses the samples since
+    then.
     """
 
     axis: Axis

@@ -1,4 +1,4 @@
-"""The accuracy that is wanted of a live estimate: what a plan promised at the speed that is flown, or what the user asks for."""
+"""The accuracy goals of a live estimate: those a plan expects at the speed flown, or those the user states."""
 
 from __future__ import annotations
 
@@ -11,17 +11,18 @@ from fieldsid.planning.design.plan import Plan
 from fieldsid.planning.specify.quantities import parse_accuracy_goals
 
 
-def asked_goals(axis: Axis, text: str) -> dict[str, Goal]:
-    """Return the goals of `a22=5%,b2=3%`, the others' as they are without; raises UsageError."""
-    asked = parse_accuracy_goals(text, list(NAMES[axis].base))
-    return default_goals(axis) | {name: Goal(relative=share) for name, share in asked.items()}
+def requested_goals(axis: Axis, text: str) -> dict[str, Goal]:
+    """Return the goals of a text such as `a22=5%,b2=3%`, default goals for the other parameters; raises UsageError."""
+    requested = parse_accuracy_goals(text, list(NAMES[axis].base))
+    return default_goals(axis) | {name: Goal(relative=share) for name, share in requested.items()}
 
 
 def planned_goals(plan: Plan, axis: Axis, speed: float) -> dict[str, Goal]:
-    """Return what a plan promised of the base parameters: on its leg nearest to a speed in m/s, the first where that is NaN.
+    """Return the errors that a plan expects of the base parameters, from the leg whose speed is nearest to `speed` in m/s.
 
-    The promise is the error that 5 of 6 draws of the prior stay below: one flight is one draw. Raises UsageError for a plan of
-    the other axis, DataError for one that promises nothing of these parameters.
+    The first leg is taken where `speed` is NaN. The expected error is the one that 5 of 6 draws of the prior stay below, as one
+    flight is one draw. Raises UsageError for a plan of the other axis, DataError for a plan without expected errors of these
+    parameters.
     """
     if plan.axis is not axis:
         hint = f"add `--axis {plan.axis.value}`, or plan for `{axis.value}`"

@@ -5,9 +5,10 @@
     online.estimate().values                       # {"a22": ..., "b2": ..., "C0": ...}
     online.gains(watch.look(online.estimate()))    # of now, by the design of `sysid schedule design`
 
-The recursion and its filter are those of `--method svf_rls`; errors allow for the residuals' colour as the block estimate's do,
-the bias of white sensor noise is taken out. NumPy and SciPy are enough: with numba a sample takes 12 us, without 31 us;
-an estimate takes 0.8 ms, once in 256 samples twice that, and the look for a jump of authority 3 ms, once a second.
+The recursion and its filter are those of `--method svf_rls`. Standard errors allow for coloured residuals as those of `svf_ls`
+do, and the estimate is corrected for the bias of white sensor noise. It needs NumPy and SciPy only: a sample takes 12 us with
+numba and 31 us without. An estimate takes 0.8 ms, once in 256 samples twice that; the test for a jump of authority takes 3 ms
+once a second.
 """
 
 from __future__ import annotations
@@ -37,16 +38,16 @@ if TYPE_CHECKING:
 
 NOISE_WINDOW = 1024
 NOISE_EVERY = NOISE_WINDOW // 4
-"""Samples that the sensors' noise is learnt from, and samples between two looks."""
+"""Samples from which the sensors' noise is estimated, and samples between two estimates of it."""
 WAIT_FOR_RATE_S = 1.0
-"""Time after which a vehicle that has sent no rate has none."""
+"""Time after which a vehicle that has sent no rate is taken to have no rate sensor."""
 STATE = 5
 """Version of the saved state."""
 _UPPER = np.triu_indices(4)
 
 
 def refuse_unsettled(now: OnlineEstimate, progress: Progress) -> None:
-    """Raise DataError while an estimate is none that gains can be designed for."""
+    """Raise DataError where no gains can be designed for an estimate: it has not settled, or its surge is unknown."""
     if progress.contradiction:
         raise DataError("angle and rate contradict each other", found=progress.contradiction, hint="turn the sign of one")
     moving = [p.name for p in progress.parameters if p.name != NAMES[now.axis].trim and not p.is_settled]
@@ -58,9 +59,10 @@ def refuse_unsettled(now: OnlineEstimate, progress: Progress) -> None:
 
 
 def gains_now(now: OnlineEstimate, progress: Progress, wanted: Wanted | None = None) -> GainsOfOne:
-    """Return the gains of an estimate at the speed of its last seconds: as wanted, else as quick as the fin flown lets them be.
+    """Return the gains for an estimate at the speed of its last seconds, by the `wanted` design.
 
-    Raises DataError as `refuse_unsettled` does, ModelError where no gains hold the loop.
+    Without `wanted` the loop is designed as fast as the largest fin flown allows. Raises DataError as `refuse_unsettled` does,
+    ModelError where no gains stabilise the loop.
     """
     refuse_unsettled(now, progress)
     from fieldsid.schedule.search.of_one_model import gains_of_one, usual
@@ -69,10 +71,11 @@ def gains_now(now: OnlineEstimate, progress: Progress, wanted: Wanted | None = N
 
 
 class OnlineIdentifier:
-    """Yaw or pitch parameters, sample by sample; its memory does not grow with the length of the flight.
+    """Recursive estimation of yaw or pitch parameters; its memory does not grow with the length of the flight.
 
-    bandwidth is the filter's lambda in rad/s, forgetting beta in (0, 1]. by_rate None: by the measured rate where one comes
-    within a second, else by the angle alone. Raises DataError for settings out of bounds.
+    `bandwidth` is the filter's lambda in rad/s, `forgetting` the factor beta in (0, 1]. `by_rate` says whether the regression
+    uses the measured rate or the angle alone; with None it uses the rate where one arrives within a second. Raises DataError for
+    settings out of bounds.
     """
 
     def __init__(
@@ -114,15 +117,16 @@ class OnlineIdentifier:
         fin_is_held: bool = True,
         fin_line: tuple[float, float] | None = None,
     ) -> bool:
-        """Take one sample and return whether it joined the estimate.
+        """Take one sample and return whether a regression row joined the estimate.
 
-        time in s; fin in rad, a command that holds from this time on, or without `fin_is_held` a measurement, straight since the
-        last; fin_line is where the line of mean and first moment of what the fin did since the last starts and ends (rad), where
-        that is known; angle in rad (a heading may wrap); rate in rad/s; surge in m/s. NaN is what was not measured.
-        Samples whose time does not go on are passed over; gaps and restarts are survived.
+        `time` is in s, `angle` in rad (a heading may wrap), `rate` in rad/s, `speed` the surge in m/s, `fin` in rad. NaN stands
+        for a value that was not measured. The fin is a command that holds from this time on; without `fin_is_held` it is a
+        measurement, linear since the last sample. `fin_line` are the start and end (rad) of the line that has the mean and first
+        moment of the fin since the last sample, where these are known. Samples whose time does not increase are ignored; after a
+        gap or a restart of the clock the estimate continues.
         """
         time, fin, angle, rate = float(time), float(fin), float(angle), float(rate)
-        fed = self._chosen(time, angle, rate)
+        fed = self._filter_for(time, angle, rate)
         if fed is None:
             return False
         if isfinite(speed):
@@ -130,10 +134,10 @@ class OnlineIdentifier:
         before = fed.counts["repeated"] + fed.counts["late"]
         used = fed.push(time, fin, angle, rate, is_held=fin_is_held, line=fin_line)
         if fed.counts["repeated"] + fed.counts["late"] == before and isfinite(time):
-            self._hear(time, angle, rate, fin, float(speed))
+            self._store_sample(time, angle, rate, fin, float(speed))
         self._is_held = fin_is_held
         if used and (jump := self._authority.add(fed.row_time, fed.row, float(speed))) is not None:
-            self._begin_at(jump)
+            self._restart_at(jump)
         return used
 
     @property
@@ -142,12 +146,12 @@ class OnlineIdentifier:
         return nan if self._filter is None else self._filter.time
 
     def begin_again(self) -> None:
-        """Tell that the next sample does not follow the last, as in another log: the estimate goes on, the filter starts anew."""
+        """Restart the filter and keep the estimate: the next sample does not follow the last one, as in another log."""
         if self._filter is not None:
             self._filter.begin_again()
 
     def estimate(self) -> OnlineEstimate:
-        """Return values and standard errors now."""
+        """Return the estimate at the newest sample."""
         names = NAMES[self.axis].base
         if self._filter is None:
             empty = dict.fromkeys(names, nan)
@@ -157,7 +161,7 @@ class OnlineIdentifier:
         values = np.array(corrected(fed.memory, fed.packed, noise_of(share)) if share else fed.packed[:4])
         covariance = self._covariance(values, share.gram if share else np.zeros((4, 4)), keep)
         errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) if covariance is not None else np.full(len(keep), nan)
-        # a direction that nothing has excited keeps its start: P says so, its residual's covariance would be zero
+        # a parameter without excitation keeps its start value and start variance P; the covariance by residuals would be zero
         excited = fed.packed[[4, 8, 11, 13]][keep] <= MAX_VARIANCE_SHARE * INITIAL_VARIANCE
         known = np.where(excited & (fed.counts["used"] > 2 * len(keep)), values[keep], nan)
         errors = np.where(excited & (errors > 0.0), errors, nan)
@@ -171,7 +175,7 @@ class OnlineIdentifier:
             used,
             self._speed_sum / self._speeds if self._speeds else nan,
             counts,
-            self._contradicted(),
+            self._find_contradiction(),
             () if covariance is None else tuple(map(tuple, covariance.tolist())),
             self._speed_now(),
             self._fin_most,
@@ -180,11 +184,11 @@ class OnlineIdentifier:
         )
 
     def gains(self, progress: Progress, wanted: Wanted | None = None) -> GainsOfOne:
-        """Return the gains at the speed of the last seconds, for a watch's look of now; see `gains_now`."""
+        """Return the gains at the speed of the last seconds, given the present progress of a `Watch`; see `gains_now`."""
         return gains_now(self.estimate(), progress, wanted)
 
     def state(self) -> dict[str, Any]:
-        """Return all that is known as plain values, which `from_state` goes on from bit by bit."""
+        """Return the state as plain values; an identifier made of it by `from_state` continues with identical numbers."""
         return {
             "version": STATE,
             "axis": self.axis.value,
@@ -203,9 +207,9 @@ class OnlineIdentifier:
 
     @classmethod
     def from_state(cls, state: Mapping[str, Any]) -> Self:
-        """Return the identifier of a state; raises DataError where it is none, or one of another version.
+        """Return the identifier of a state; raises DataError where the state is not valid or of another version.
 
-        What is in it has been looked through by its shape; here its parts must go together, and an estimate come of them.
+        The caller has checked the shape of the state; here its parts must be consistent and give an estimate.
         """
         try:
             if state["version"] != STATE:
@@ -221,20 +225,20 @@ class OnlineIdentifier:
             if state["filter"] is not None:
                 made._filter = made._new_filter()
                 made._filter.restore(state["filter"])
-            made._try()
+            made._check_estimate()
         except (KeyError, TypeError, ValueError, IndexError, AttributeError, ArithmeticError) as error:
             raise DataError("this is no state of an online estimate", found=f"{type(error).__name__}: {error}") from error
         return made
 
-    def _try(self) -> None:
-        """Raise ValueError or ArithmeticError where no estimate comes of what was read from a state."""
+    def _check_estimate(self) -> None:
+        """Raise ValueError or ArithmeticError where a restored state gives no estimate."""
         if self._seen and not np.isfinite(self._recent()[-self._seen :, 0]).all():
             raise ValueError("samples without a time")
         with np.errstate(all="ignore"):
             self.estimate()
 
-    def _chosen(self, time: float, angle: float, rate: float) -> SampleFilter | None:
-        """Return the filter, made at the first sample that says which signals there are."""
+    def _filter_for(self, time: float, angle: float, rate: float) -> SampleFilter | None:
+        """Return the filter, None before the first sample that shows which signals are measured."""
         if self._filter is not None:
             return self._filter
         if not isfinite(time) or not (isfinite(angle) or isfinite(rate)):
@@ -250,8 +254,8 @@ class OnlineIdentifier:
     def _new_filter(self) -> SampleFilter:
         return SampleFilter(stiff=self._stiff, by_rate=bool(self._by_rate), **self._settings)
 
-    def _begin_at(self, jump: Jump) -> None:
-        """Let the estimate begin at a jump: of the samples since then that are kept, as if none had come before."""
+    def _restart_at(self, jump: Jump) -> None:
+        """Restart the estimate at a jump, from the stored samples since then, as if none had come before."""
         old, self._jump = self._filter, jump
         self._filter = fed = self._new_filter()
         recent = self._recent()
@@ -259,27 +263,27 @@ class OnlineIdentifier:
         for time, angle, rate, fin, _ in recent.tolist():
             fed.push(time, fin, angle, rate, is_held=self._is_held)
         if old is not None:
-            fed.take_up(old)
+            fed.continue_from(old)
         speeds = recent[np.isfinite(recent[:, 4]), 4]
         self._speed_sum, self._speeds = float(speeds.sum()), speeds.size
 
     def _speed_now(self) -> float:
-        """Return the mean surge (m/s) of the last seconds, that of all where none came in them."""
+        """Return the mean surge (m/s) of the last seconds, the mean of all samples where they have none."""
         recent = self._window[self._window[:, 0] > self.time - LOOK_BACK_S, 4]
         recent = recent[np.isfinite(recent)]
         return float(recent.mean()) if recent.size else self._speed_sum / self._speeds if self._speeds else nan
 
-    def _hear(self, time: float, angle: float, rate: float, fin: float, speed: float) -> None:
-        """Keep a sample for the noise of the sensors, and learn that now and then."""
+    def _store_sample(self, time: float, angle: float, rate: float, fin: float, speed: float) -> None:
+        """Store a sample, and estimate the noise of the sensors once in NOISE_EVERY samples."""
         self._fin_most = max(self._fin_most, abs(fin)) if isfinite(fin) else self._fin_most
         unwrapped = self._filter.newest_angle if self._filter is not None and isfinite(angle) else nan
         self._window[self._seen % NOISE_WINDOW] = time, unwrapped, rate, fin, speed
         self._seen += 1
         if self._seen % NOISE_EVERY == 0:
             self._contradiction = None
-            # each signal's own samples: where they come as messages of their own no two are in one row
-            own = (c[np.isfinite(c)] for c in self._recent().T[1:3])
-            found = [white_noise_std(c, np.ones(c.size, dtype=np.bool_)) for c in own]
+            # each signal is taken alone: where angle and rate come in separate messages, no sample has both
+            signals = (c[np.isfinite(c)] for c in self._recent().T[1:3])
+            found = [white_noise_std(c, np.ones(c.size, dtype=np.bool_)) for c in signals]
             least = MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S
             self._noise = tuple(max(f, n) if isfinite(f) else n for f, n in zip(found, least, strict=True))  # type: ignore[assignment]
 
@@ -287,12 +291,12 @@ class OnlineIdentifier:
         """Return time, angle, rate, fin and surge of the last samples, (NOISE_WINDOW, 5), NaN before the first."""
         return np.roll(self._window, -(self._seen % NOISE_WINDOW), axis=0)
 
-    def _contradicted(self) -> str:
-        """Return how angle and rate contradict each other, or are taken for the fin: looked for once in NOISE_EVERY samples."""
+    def _find_contradiction(self) -> str:
+        """Return how angle and rate contradict each other, or are mistaken for the fin; tested once in NOISE_EVERY samples."""
         if self._contradiction is None and self._seen >= NOISE_EVERY:
             time, angle, rate, fin, _ = self._recent()[-self._seen :].T
-            begun = int(np.flatnonzero(np.diff(time, prepend=inf) <= 0.0)[-1])  # where its clock last started again
-            names, part = NAMES[self.axis], slice(begun, None)
+            restart = int(np.flatnonzero(np.diff(time, prepend=inf) <= 0.0)[-1])  # where its clock last started again
+            names, part = NAMES[self.axis], slice(restart, None)
             run = Run("live", time[part], {names.angle: angle[part], names.rate: rate[part], names.fin: fin[part]})
             both = run.has(names.angle) and run.has(names.rate)
             self._contradiction = contradiction(run, names.angle, names.rate) if both else ""

@@ -1,4 +1,4 @@
-"""One look at a live estimate as plain values: what `sysid live --json` prints a line, and the sentence that leads it."""
+"""One report of a live estimate: the line that `sysid live --json` prints, and the sentence that gives its verdict."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from fieldsid.schedule.search.of_one_model import GainsOfOne
 
 LONGEST_GUESS_S = 3600.0
-"""A time to the goal beyond which it is not told: the pace of a few seconds says nothing of hours."""
+"""Longest time to the goal that is reported: the progress of a few seconds does not predict hours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +114,7 @@ class Look(Result):
 
 
 def live_gains(now: OnlineEstimate, found: GainsOfOne, method: str = "live") -> LiveGains:
-    """Return gains at the time and speed of an estimate as they are told, and the method that found their model."""
+    """Return the record of gains at the time and speed of an estimate; `method` is that which estimated their model."""
     return LiveGains(
         time=now.time,
         verdict=found.verdict,
@@ -139,14 +139,14 @@ def look_body(
     gains: LiveGains | None = None,
     diagnosed: LiveDiagnosis | None = None,
 ) -> dict[str, Any]:
-    """Return a look as nested plain values, with what was worked out beside the estimate; NaN as None."""
+    """Return a report as nested plain values, with the gains and the diagnosis computed in other processes; NaN as None."""
     bands, units = now.intervals95, units_of(now.axis)
     look = Look(
         axis=now.axis,
         source=source,
         time_s=now.time,
         verdict=progress.verdict,
-        said=said(progress),
+        said=verdict_sentence(progress),
         share=progress.share,
         limited_by=progress.limited_by,
         left_s=progress.left_s,
@@ -172,7 +172,7 @@ def units_of(axis: Axis) -> Mapping[str, str]:
     return {names.damping: "1/s", **stiff, names.authority: "1/s^2", names.trim: "rad/s^2"}
 
 
-def said(progress: Progress) -> str:
+def verdict_sentence(progress: Progress) -> str:
     """Return the verdict in one sentence, its number first."""
     wanted = [p for p in progress.parameters if isfinite(p.goal)]
     share = f"{100.0 * progress.share:.0f} % of the data"
@@ -204,7 +204,7 @@ def _known(p: ParameterProgress) -> str:
 
 
 def _share(error: float, value: float) -> str:
-    """Return an error in per cent of a value, as it is where the value may be zero."""
+    """Return an error in per cent of a value, in the unit of the value where that may be zero."""
     if not isfinite(error):
         return "nothing yet"
     return f"{100.0 * error / abs(value):.1f} %" if value and error < 0.5 * abs(value) else f"+/- {error:.2g}"

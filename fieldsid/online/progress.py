@@ -1,8 +1,8 @@
-"""How far a live estimate is: against the accuracy that is wanted, whether it still moves, whether the fin is worked.
+"""The progress of a live estimate towards the accuracy wanted, whether it has settled, and whether the fin excites the motion.
 
-With information I = 1/se^2 per parameter, the share that is in is I / I_goal = (se_goal / se)^2; its growth over the last seconds
-tells how long the rest takes if the vehicle goes on as it does. A parameter is settled while it has stayed, over those seconds,
-within 5 % of its value or within one standard error.
+With information I = 1/se^2 of a parameter, the share gathered is I / I_goal = (se_goal / se)^2. The growth of I over the last
+seconds gives the time that the rest takes at the same excitation. A parameter has settled where it has stayed, over those
+seconds, within 5 % of its value or within one standard error.
 """
 
 from __future__ import annotations
@@ -20,32 +20,32 @@ from fieldsid.settled import settled_band
 
 Verdict = Literal["starting", "contradicts", "collecting", "not_excited", "moving", "enough"]
 DEFAULT_ACCURACY = 0.05
-"""Relative standard error of damping, stiffness and authority that is asked for where nothing else is."""
+"""Default goal: the relative standard error of damping, stiffness and authority."""
 LOOK_BACK_S = 10.0
-"""Time over which a parameter must stay where it is to be settled, and over which information is seen to grow."""
+"""Time over which a parameter must stay constant to have settled, and over which the growth of information is measured."""
 MOST_LOOKS = 1000
-"""Looks that a watch can have kept: there are some forty in the time that it looks back."""
+"""Most looks in a valid saved state: a watch keeps about forty over the time that it looks back."""
 MIN_WEIGHT = 0.2
-"""Weight of what was heard, reached after two seconds, from which on a root mean square is told."""
+"""Sum of weights, reached after two seconds, from which on a root mean square is given."""
 QUIET_FIN_RAD = 0.005
-"""Root mean square of the fin about its mean (0.3 deg) over the last seconds below which it excites nothing."""
+"""Root mean square of the fin about its mean (0.3 deg) over the last seconds below which it does not excite the motion."""
 
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """What a parameter is to be known to: a standard error in its unit, or as a share of its value."""
+    """The standard error wanted of a parameter: in its unit, or as a share of its value."""
 
     std_error: float = nan
     relative: float = nan
 
     def error_at(self, value: float) -> float:
-        """Return the standard error that is wanted at a value, NaN while there is none."""
+        """Return the standard error that is wanted at a value, NaN where there is no goal or no value."""
         return self.std_error if isfinite(self.std_error) else self.relative * abs(value)
 
 
 @dataclass(frozen=True, slots=True)
 class ParameterProgress:
-    """One parameter: value, standard error, the error wanted (NaN: none), share of the information that is in, settled or not."""
+    """One parameter: value, standard error, the error wanted (NaN: none), share of information gathered, settled or not."""
 
     name: str
     value: Annotated[Number, Key("Its value.")]
@@ -59,11 +59,11 @@ class ParameterProgress:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far the estimate is.
+    """The progress of the estimate.
 
-    share is the least of the parameters' shares, `limited_by` whose it is, `left_s` the time to the goal at the pace of the last
-    seconds (inf where nothing grows, NaN where unknown), `fin_rms` rad and `rate_rms` rad/s the excitation of the last seconds,
-    `contradiction` what angle and rate say against each other.
+    `share` is the least share of the parameters that have a goal, `limited_by` the name of that parameter, `left_s` the time to
+    the goal at the pace of the last seconds (inf where the information does not grow, NaN where unknown). `fin_rms` (rad) and
+    `rate_rms` (rad/s) are the excitation of the last seconds, `contradiction` says how angle and rate contradict each other.
     """
 
     verdict: Verdict
@@ -97,7 +97,7 @@ class RecentExcitation:
         self._weights, self._means, self._squares = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
 
     def hear(self, time: float, fin: float, rate: float) -> None:
-        """Take a sample of fin in rad and rate in rad/s; what is not finite is passed over."""
+        """Add a sample of fin in rad and rate in rad/s; a value that is not finite is ignored."""
         step = time - self._time if isfinite(self._time) else 0.0
         self._time = time
         share = min(max(step, 0.0) / LOOK_BACK_S, 1.0) if isfinite(step) else 0.0
@@ -108,28 +108,28 @@ class RecentExcitation:
                 self._squares[i] += share * (value * value - self._squares[i])
 
     def state(self) -> dict[str, Any]:
-        """Return what it remembers, as plain values."""
+        """Return the averages as plain values."""
         return {"time": self._time, "weights": self._weights, "means": self._means, "squares": self._squares}
 
     def recall(self, state: Mapping[str, Any]) -> None:
-        """Take up what another had remembered."""
+        """Restore the averages of a state."""
         self._time = known(state["time"])
         self._weights, self._means, self._squares = (list(map(float, state[k])) for k in ("weights", "means", "squares"))
 
     def rms(self) -> tuple[float, float]:
-        """Return both, NaN before the first seconds are over."""
+        """Return the root mean squares of fin and rate, NaN in the first two seconds."""
         return self._rms(0), self._rms(1)
 
-    def _rms(self, place: int) -> float:
-        weight = self._weights[place]
+    def _rms(self, channel: int) -> float:
+        weight = self._weights[channel]
         if weight < MIN_WEIGHT:
             return nan
-        mean = self._means[place] / weight
-        return sqrt(max(self._squares[place] / weight - mean * mean, 0.0))
+        mean = self._means[channel] / weight
+        return sqrt(max(self._squares[channel] / weight - mean * mean, 0.0))
 
 
 class Watch:
-    """Looks at an estimate now and then, and says how far it is; keeps the looks of the last seconds only."""
+    """The progress of an estimate that is looked at repeatedly; keeps the looks of the last seconds only."""
 
     __slots__ = ("_looks", "excitation", "goals")
 
@@ -139,7 +139,7 @@ class Watch:
         self._looks: list[OnlineEstimate] = []
 
     def state(self) -> dict[str, Any]:
-        """Return the looks of the last seconds as plain values, so that a program that was killed need not look for them anew."""
+        """Return the looks of the last seconds as plain values, so that a program that was killed can continue with them."""
         looks = [
             {"time": e.time, "values": dict(e.values), "std_errors": dict(e.std_errors), "used": e.used, "speed": e.speed}
             for e in self._looks
@@ -147,12 +147,12 @@ class Watch:
         return {"looks": looks, "excitation": self.excitation.state()}
 
     def forget(self) -> None:
-        """Begin anew: what was seen was of another source."""
+        """Delete all looks, as they are of another source."""
         self.excitation = RecentExcitation()
         self._looks.clear()
 
     def recall(self, state: Mapping[str, Any], axis: Axis) -> None:
-        """Take up the looks of another watch over the same source; raises ValueError where they are none of the axis."""
+        """Restore the looks of a state of the same source; raises ValueError where they are not of this axis."""
         wrong = [e for e in state["looks"] if {*e["values"]} != {*NAMES[axis].base} or {*e["std_errors"]} != {*NAMES[axis].base}]
         if wrong or len(state["looks"]) > MOST_LOOKS:
             raise ValueError(f"{len(state['looks'])} looks, {len(wrong)} of them of other parameters")
@@ -171,7 +171,7 @@ class Watch:
         ]
 
     def look(self, now: OnlineEstimate) -> Progress:
-        """Return how far an estimate is, by itself and by the looks before it."""
+        """Return the progress of an estimate, from its errors and from the looks of the last seconds."""
         looks = self._looks
         if looks and not (looks[-1].time <= now.time and looks[-1].jump == now.jump):
             looks.clear()
@@ -179,17 +179,17 @@ class Watch:
             looks.pop(0)
         if not looks or now.time - looks[-1].time >= LOOK_BACK_S / 20.0:
             looks.append(now)
-        known = tuple(self._of(name, now) for name in now.values)
+        known = tuple(self._progress_of(name, now) for name in now.values)
         wanted = [p for p in known if p.name in self.goals]
         least = min(wanted, key=lambda p: p.share, default=None)
         fin, rate = self.excitation.rms()
         if now.contradiction:
             return Progress("contradicts", 0.0, "", nan, fin, rate, known, now.contradiction)
-        left = self._left(least, now) if least else nan
+        left = self._seconds_to_goal(least, now) if least else nan
         share = least.share if least else 0.0
         return Progress(self._verdict(known, share, fin), share, least.name if least else "", left, fin, rate, known)
 
-    def _of(self, name: str, now: OnlineEstimate) -> ParameterProgress:
+    def _progress_of(self, name: str, now: OnlineEstimate) -> ParameterProgress:
         value, error = now.values[name], now.std_errors[name]
         goal = self.goals[name].error_at(value) if name in self.goals else nan
         share = min((goal / error) ** 2, 1.0) if isfinite(goal) and isfinite(error) and error > 0.0 else 0.0
@@ -202,8 +202,8 @@ class Watch:
         band = settled_band(value, error)
         return all(abs(look.values[name] - value) <= band for look in self._looks)
 
-    def _left(self, least: ParameterProgress, now: OnlineEstimate) -> float:
-        """Return the seconds until the goal of the parameter that limits, at the pace at which its information grows."""
+    def _seconds_to_goal(self, least: ParameterProgress, now: OnlineEstimate) -> float:
+        """Return the seconds until the limiting parameter reaches its goal, at the present growth of its information."""
         then = self._looks[0]
         before = then.std_errors[least.name]
         if least.share >= 1.0:

@@ -1,10 +1,10 @@
-"""Covariance of the recursive estimate under coloured residuals, from lagged products of the rows: constant memory.
+"""Covariance of the recursive estimate under coloured residuals, from lagged products of the rows, in constant memory.
 
 Cov = N^-1 (F' S F) N^-1 as for the block estimate, with F' S F = sum_j (C_j + C_j') gamma_j over lags j. Rows w = [phi, q] are
-averaged in bins of half a filter time constant, over which the filtered phi hardly change; M_j = sum_B w_B w_(B-j)' holds the
-columns' C_j and, for any Theta, the residual's autocovariance [-Theta, 1] M_j [-Theta, 1]': the colour is that of the present
-estimate's residual, though no row is kept. An autoregression smooths gamma, Parzen's window keeps the sum positive.
-Source: Ljung 1999, section 9.5; Newey and West 1987, Econometrica 55(3); Priestley 1981, section 6.2.3 (window).
+averaged in bins of half a filter time constant, over which the filtered phi hardly change. M_j = sum_B w_B w_(B-j)' contains the
+C_j of the columns and, for any Theta, the autocovariance [-Theta, 1] M_j [-Theta, 1]' of the residual: the colour is that of the
+residual of the present estimate, though no row is stored. An autoregression smooths gamma, Parzen's window keeps the sum
+positive. Source: Ljung 1999, section 9.5; Newey and West 1987, Econometrica 55(3); Priestley 1981, section 6.2.3 (window).
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ FEWEST_BINS = 20
 """Bins below which no colour is estimated."""
 WIDTH = 5
 AKAIKE = 2.0
-"""Price of a coefficient of the residual's autoregression: Schwarz's order is too low for a slow disturbance beside noise."""
+"""Penalty of a coefficient of the residual's autoregression; Schwarz's would give too low an order for a slow disturbance in
+addition to white noise."""
 
 
 class RowColour:
@@ -37,7 +38,7 @@ class RowColour:
         self._count, self._samples, self._weight = 0.0, 0.0, 0.0
 
     def add(self, time: float, row: FloatArray) -> None:
-        """Take one row (5,) of phi and target at a time in s."""
+        """Add one row (5,) of phi and target at a time in s."""
         index = float(np.floor(time / self._bin_s))
         if index != self._index:
             self._close()
@@ -49,9 +50,9 @@ class RowColour:
         self._rows += 1.0
 
     def covariance(self, theta: FloatArray, inverse: FloatArray) -> FloatArray | None:
-        """Return the covariance (p, p) of an estimate (4,) with inverse normal matrix (p, p); None from too few bins.
+        """Return the covariance (p, p) of an estimate (4,) with inverse normal matrix (p, p); None where there are too few bins.
 
-        p is 4, or 3 where the second of the four columns has no parameter.
+        p is 4, or 3 where the model has no stiffness.
         """
         size = inverse.shape[0]
         if self._count < max(FEWEST_BINS, 2 * size + 2):
@@ -62,29 +63,29 @@ class RowColour:
         colour = autoregression(power, self._count, AKAIKE)
         if colour.variance == 0.0:
             return np.zeros((size, size))
-        gamma = extended(power, colour.denominator, LAGS + 1) * PARZEN
+        gamma = extended_autocovariance(power, colour.denominator, LAGS + 1) * PARZEN
         keep = [0, 1, 2, 3] if size == 4 else [0, 2, 3]
         lagged = self.products[:, keep][:, :, keep]
-        half = np.einsum("j,jik->ik", gamma[1:], lagged[1:])
+        one_sided = np.einsum("j,jik->ik", gamma[1:], lagged[1:])
         per_bin = self._samples / self._count
-        score = per_bin * per_bin * (gamma[0] * lagged[0] + half + half.T)
+        score = per_bin * per_bin * (gamma[0] * lagged[0] + one_sided + one_sided.T)
         independent = max(self._count / max(colour.long_run, 1e-3), 2.0 * size)
         return np.asarray(inverse @ score @ inverse * (independent / (independent - size)))
 
     def state(self) -> dict[str, object]:
-        """Return all of it as plain values."""
+        """Return the state as plain values."""
         numbers = (self._rows, self._index, self._count, self._samples, self._weight)
         arrays = (self._sum, self._recent, self.products)
         return {"numbers": list(numbers), **{str(i): a.ravel().tolist() for i, a in enumerate(arrays)}}
 
     def restore(self, state: dict[str, list[float]]) -> None:
-        """Go on from a state; raises ValueError or KeyError where it is none."""
+        """Restore a state; raises ValueError or KeyError where it is not valid."""
         self._rows, self._index, self._count, self._samples, self._weight = (float(v) for v in state["numbers"])
         for i, array in enumerate((self._sum, self._recent, self.products)):
             array[...] = np.reshape(np.array(state[str(i)], dtype=np.float64), array.shape)
 
     def _close(self) -> None:
-        """Take the mean of the bin that is full into all products; one with few of its rows is left out."""
+        """Add the mean of the finished bin to all lagged products; a bin with less than half the usual rows is left out."""
         rows = self._rows
         if rows and (not self._count or rows >= 0.5 * self._samples / self._count):
             decay = self._forget**rows
@@ -93,7 +94,7 @@ class RowColour:
             self._shift(1)
             self._recent[0] = mean = self._sum / rows
             self.products += mean[None, :, None] * self._recent[:, None, :]
-            # counts fade too: what is forgotten tells no colour
+            # the counts are forgotten as well: they are the effective number of bins
             self._count, self._samples = self._count * decay + 1.0, self._samples * decay + rows
         elif rows:
             self._shift(1)
@@ -104,8 +105,8 @@ class RowColour:
         self._recent[:by] = 0.0
 
 
-def extended(power: FloatArray, denominator: FloatArray, count: int) -> FloatArray:
-    """Return the autocovariances (count,) of an autoregression, those up to its order being power's own."""
+def extended_autocovariance(power: FloatArray, denominator: FloatArray, count: int) -> FloatArray:
+    """Return the autocovariances (count,) of an autoregression; those up to its order are those of `power`."""
     order = denominator.size - 1
     gamma = np.zeros(count)
     gamma[: order + 1] = power[: order + 1]

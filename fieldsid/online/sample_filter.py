@@ -1,8 +1,8 @@
-"""Samples as they come, into the recursion: repeated stamps, gaps, wrapped headings and restarted clocks.
+"""Feed samples into the recursion, despite repeated time stamps, gaps, wrapped headings and restarts of the clock.
 
-The recursion's filter needs time that goes on and signals without holes. A short gap is bridged by straight lines, as in the
-block estimate; after a long one, or where the clock starts again, the filter begins anew while the estimate stays. Two samples
-late, so that spikes can be told: by the rule of `convert/faults/spikes.py` on a window.
+The filter of the recursion needs increasing time and signals without gaps. A short gap is bridged by linear interpolation, as in
+the block estimate. After a long gap, or where the clock restarts, the filter starts again while the estimate is kept. Samples
+enter two samples late, so that spikes can be detected, by the rule of `convert/faults/spikes.py` on a window.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ from fieldsid.logs.convert.faults.spikes import spike_limit
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.online.row_colour import RowColour
 
-LOOKED_AT = 256
-EVERY = LOOKED_AT // 2
-"""Samples that the limit is learnt from, and samples between two looks."""
+SPIKE_WINDOW = 256
+SPIKE_LIMIT_EVERY = SPIKE_WINDOW // 2
+"""Samples from which the spike limit is estimated, and samples between two estimates."""
 
 
 class SpikeGate:
-    """The last samples of one signal: `push` takes the newest value and returns the one before the last, NaN for a spike."""
+    """Spike removal in one signal: `push` takes the newest value and returns that of two samples before, NaN for a spike."""
 
     __slots__ = ("_limit", "_recent", "_seen", "spikes")
 
     def __init__(self) -> None:
-        self._recent, self._seen, self._limit, self.spikes = np.full(LOOKED_AT, nan), 0, inf, 0
+        self._recent, self._seen, self._limit, self.spikes = np.full(SPIKE_WINDOW, nan), 0, inf, 0
 
     def push(self, value: float) -> float:
         """Take a value, NaN where nothing was measured; return that of two samples before."""
@@ -50,9 +50,9 @@ class SpikeGate:
         recent[:-1] = recent[1:]
         recent[-1] = value
         self._seen += 1
-        if self._seen % EVERY == 0:
+        if self._seen % SPIKE_LIMIT_EVERY == 0:
             known = recent[np.isfinite(recent)]
-            self._limit = spike_limit(known) if known.size >= EVERY else inf
+            self._limit = spike_limit(known) if known.size >= SPIKE_LIMIT_EVERY else inf
         middle = float(recent[-3])
         if self._limit < inf and self._is_spike(recent[-5:]):
             self.spikes += 1
@@ -61,13 +61,13 @@ class SpikeGate:
         return middle
 
     def state(self) -> dict[str, object]:
-        """Return all of it as plain values; NaN as None."""
+        """Return the state as plain values, NaN as None."""
         limit = self._limit if isfinite(self._limit) else None
         values = [v if isfinite(v) else None for v in self._recent.tolist()]
         return {"recent": values, "seen": self._seen, "limit": limit, "spikes": self.spikes}
 
     def restore(self, state: dict[str, object]) -> None:
-        """Go on from a state; raises ValueError, TypeError or KeyError where it is none."""
+        """Restore a state; raises ValueError, TypeError or KeyError where it is not valid."""
         self._recent[:] = np.array(state["recent"], dtype=np.float64)
         self._seen, self.spikes = int(state["seen"]), int(state["spikes"])  # type: ignore[call-overload]
         self._limit = inf if state["limit"] is None else float(state["limit"])  # type: ignore[arg-type]
@@ -83,19 +83,20 @@ class SpikeGate:
 
 
 CLOCK_RESTART_S = 1.0
-"""A stamp so far before the last is a clock that started again; one less far is a sample that came late, and is left out."""
-HELD = 2
-"""Samples that wait until it can be told whether they are spikes."""
+"""A time stamp at least this far before the last one means that the clock restarted; one less far is a late sample, which is left
+out."""
+DELAY_SAMPLES = 2
+"""Samples that wait until it can be decided whether they are spikes."""
 MOST_MOVES = 64
-"""Moves of the fin that a bridged gap may hold; with more it counts as a long one."""
+"""Most fin positions within a bridged gap; a gap with more counts as a long one."""
 
 
 Line = tuple[float, float]
-"""Where the fin's line since the sample before starts and ends, in rad."""
+"""Start and end, in rad, of the line that the fin follows from the previous sample to this one."""
 
 
 class SampleFilter:
-    """The filter's memory `memory`, Theta and packed P `packed`, the rows' colour `colour`, and what was met on the way."""
+    """The state of the filter `memory`, Theta and P in `packed`, the colour of the rows `colour`, and the `counts` of faults."""
 
     __slots__ = (
         "_fin", "_last_angle", "_late", "_moves", "_order", "_row", "_sample", "_settings", "_stiff", "angle_gate",
@@ -116,7 +117,10 @@ class SampleFilter:
         self.counts = {"used": 0, "missing": 0, "repeated": 0, "gaps": 0, "restarts": 0, "late": 0}
 
     def push(self, time: float, fin: float, angle: float, rate: float, *, is_held: bool, line: Line | None = None) -> bool:
-        """Take one sample, whose fin since the last held, went there straight or along a line; return whether a row joined."""
+        """Take one sample and return whether a row joined the estimate.
+
+        Since the last sample the fin was constant (`is_held`), or moved linearly to `fin`, or followed `line`.
+        """
         if not isfinite(time):
             self.counts["missing"] += 1
             return False
@@ -130,13 +134,13 @@ class SampleFilter:
         self._late.append((time, fin, is_held, line))
         unwrapped = self._unwrapped(angle)
         ready = self.angle_gate.push(unwrapped), self.rate_gate.push(rate)
-        if len(self._late) <= HELD:
+        if len(self._late) <= DELAY_SAMPLES:
             return False
         time, fin, is_held, line = self._late.pop(0)
         return self._take(time, fin, *ready, is_held=is_held, line=line)
 
     def begin_again(self) -> None:
-        """Let the filter start anew at the next sample; the estimate and its errors stay."""
+        """Restart the filter at the next sample; the estimate and its errors stay."""
         forget_filter(self.memory)
         self._late.clear()
         self._moves.clear()
@@ -163,8 +167,8 @@ class SampleFilter:
         """Stamp in s of the newest row."""
         return float(self.memory[TIME])
 
-    def take_up(self, other: SampleFilter) -> None:
-        """Go on where another was: the heading's turns, the spikes' limits and what was met; the rows that joined are its own."""
+    def continue_from(self, other: SampleFilter) -> None:
+        """Continue from another filter: take its unwrapped heading, spike limits and counts, except the count of rows used."""
         self._last_angle, self.angle_gate, self.rate_gate = other.newest_angle, other.angle_gate, other.rate_gate
         self.counts = {**other.counts, "used": self.counts["used"]}
 
@@ -198,7 +202,7 @@ class SampleFilter:
         return used
 
     def _angle(self, time: float, angle: float, rate: float) -> float:
-        """Return the angle, where none was measured that of the rate since the last."""
+        """Return the angle; where none was measured, the last one plus the integral of the rate."""
         memory = self.memory
         if isfinite(angle):
             return angle
@@ -207,9 +211,10 @@ class SampleFilter:
         return float(memory[ANGLE] + 0.5 * (rate + memory[RATE]) * (time - memory[TIME]))
 
     def _through_moves(self, time: float, fin: float, angle: float, rate: float, *, is_held: bool, line: Line | None) -> bool:
-        """Step to a measured sample through the moves of the fin since the last.
+        """Step to a measured sample through the moves of the fin since the last measured sample.
 
-        Inside a usual step by the moves' own line, on straight lines of the signals where samples are missing.
+        Within a usual step the moves are replaced by one line of the fin. Where samples are missing, there is one step for each
+        move, with angle and rate interpolated linearly.
         """
         memory, moves = self.memory, self._moves
         if memory[SAMPLES] and moves and line is None and time - memory[TIME] <= SLOWER * memory[H]:
@@ -220,20 +225,20 @@ class SampleFilter:
             for at, then, along in moves:
                 share = (at - begin) / (time - begin)
                 straight = angle0 + share * (angle - angle0), rate0 + share * (rate - rate0)
-                self._step(at, along or self._since(then, is_held=is_held), *straight, counts=False)
+                self._step(at, along or self._simple_line(then, is_held=is_held), *straight, counts=False)
                 self._fin = then
         moves.clear()
-        return self._step(time, line or self._since(fin, is_held=is_held), angle, rate, counts=True)
+        return self._step(time, line or self._simple_line(fin, is_held=is_held), angle, rate, counts=True)
 
     def _line_of_moves(self, time: float, fin: float, *, is_held: bool) -> Line | None:
-        """Return the fin's line over the step to a sample: a fin that is told by itself moves between the samples."""
+        """Return the line of the fin over the step to a sample: a fin that is logged in messages alone moves between samples."""
         begin = float(self.memory[TIME])
-        told = [(begin, self._fin), *((at, then) for at, then, _ in self._moves), *([] if is_held else [(time, fin)])]
-        found = line_over_steps(Track(*np.array(told).T), np.array([begin, time]), inf, is_held=is_held)
+        track = [(begin, self._fin), *((at, then) for at, then, _ in self._moves), *([] if is_held else [(time, fin)])]
+        found = line_over_steps(Track(*np.array(track).T), np.array([begin, time]), inf, is_held=is_held)
         return None if found is None else (float(found[0, 0]), float(found[1, 0]))
 
-    def _since(self, fin: float, *, is_held: bool) -> Line:
-        """Return the line of a fin that held since the last sample, or went straight."""
+    def _simple_line(self, fin: float, *, is_held: bool) -> Line:
+        """Return the line of a fin that was constant since the last sample (`is_held`), or moved linearly to `fin`."""
         before = self._fin if isfinite(self._fin) else fin
         return before, before if is_held else fin
 
@@ -246,7 +251,7 @@ class SampleFilter:
         return True
 
     def state(self) -> dict[str, Any]:
-        """Return all of it as plain values."""
+        """Return the state as plain values."""
         numbers = {"fin": self._fin, "last_angle": self._last_angle}
         return {
             "memory": self.memory.tolist(),
@@ -261,7 +266,7 @@ class SampleFilter:
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Go on from a state; raises ValueError, TypeError or KeyError where it is none."""
+        """Restore a state; raises ValueError, TypeError or KeyError where it is not valid."""
         _check_times(state)
         self.memory[:], self.packed[:] = state["memory"], state["packed"]
         self._late = [(float(t), nan if f is None else float(f), bool(h), _line(line)) for t, f, h, line in state["late"]]
@@ -275,10 +280,10 @@ class SampleFilter:
 
 
 def _check_times(state: Mapping[str, Any]) -> None:
-    """Raise ValueError where the times that a state holds do not go on: the filter divides by what lies between them."""
+    """Raise ValueError where the times of a state do not increase: the filter divides by their differences."""
     begin = float(state["memory"][TIME]) if state["memory"][SAMPLES] else -inf
     moves, late = ([float(row[0]) for row in state[k]] for k in ("moves", "late"))
-    if len(late) > HELD or len(moves) > MOST_MOVES + 1:
+    if len(late) > DELAY_SAMPLES or len(moves) > MOST_MOVES + 1:
         raise ValueError(f"{len(late)} samples and {len(moves)} moves of the fin that wait")
     if any(b <= a for a, b in pairwise([begin, *moves, *late])):
         raise ValueError("times that do not go on")

@@ -1,4 +1,4 @@
-"""One sample of an axis, and what a message of canonical names (`rudder_deg`, `yaw_rate_rad_s`) says in SI."""
+"""One sample of an axis, and messages with canonical names (`rudder_deg`, `yaw_rate_rad_s`) converted to SI."""
 
 from __future__ import annotations
 
@@ -22,15 +22,16 @@ from fieldsid.records.reading import read_json
 
 SURGE = "surge_m_s"
 LONGEST_LINE = 1 << 14
-"""Bytes of a line or datagram that are read: a vehicle's whole state has some hundred numbers."""
+"""Most bytes of a line or datagram that is read: the full state of a vehicle has some hundred numbers."""
 LARGEST = 1e18
-"""A time in ns since 1970 is as large; of what lies beyond no sum of squares would be a number."""
+"""Largest number accepted: a time in ns since 1970 is about as large, and sums of squares of larger numbers may overflow."""
 
 
 class Sample(NamedTuple):
-    """Time s, fin rad, angle rad, rate rad/s and surge m/s of one axis, NaN where not measured; the fin held or is measured.
+    """Time (s), fin (rad), angle (rad), rate (rad/s) and surge (m/s) of one axis, NaN where not measured.
 
-    `fin_line` is where the fin's line since the last sample starts and ends, in rad, where the log has the fin between them.
+    `fin_is_held`: whether the fin is a command, constant between samples, and not a measurement. `fin_line` are the start and end
+    (rad) of the line of the fin since the last sample, where the log has the fin between samples.
     """
 
     time: float
@@ -67,9 +68,9 @@ def samples_of(run: Run, axis: Axis, after: float = -np.inf) -> Iterator[Sample]
 
 
 class MessageReader:
-    """JSON objects of canonical names, one a line, as samples of one axis; counts those that are none in `unreadable`.
+    """Lines of JSON objects with canonical names, read as samples of one axis; `unreadable` counts the lines that are not.
 
-    With `keeps` all they say is kept in `columns`, by canonical name, where their time goes on.
+    With `keeps`, the signals of all messages whose time increases are stored in `columns` by canonical name.
     """
 
     def __init__(self, axis: Axis, *, keeps: bool = False) -> None:
@@ -79,7 +80,7 @@ class MessageReader:
         self.fin_is_measured: bool | None = None
 
     def read(self, line: bytes) -> Sample | None:
-        """Return the sample of a line; None for one that is too long, no JSON object or without a time, and for a blank one."""
+        """Return the sample of a line; None for a line that is blank, too long, not a JSON object, or without a time."""
         if not line.strip():
             return None
         signals = _signals(line) if len(line) <= LONGEST_LINE else None
@@ -92,10 +93,10 @@ class MessageReader:
         fin = signals.get(names.fin_measured if self.fin_is_measured else names.fin, nan)
         angle, rate, speed = (signals.get(name, nan) for name in (names.angle, names.rate, SURGE))
         if self._keeps:
-            self._keep(signals)
+            self._store(signals)
         return Sample(signals[TIME], fin, angle, rate, speed, not self.fin_is_measured)
 
-    def _keep(self, signals: Mapping[str, float]) -> None:
+    def _store(self, signals: Mapping[str, float]) -> None:
         times = self.columns[TIME]
         if len(times) and signals[TIME] <= times[-1]:
             return
@@ -107,7 +108,7 @@ class MessageReader:
 
 
 def _signals(line: bytes) -> dict[str, float] | None:
-    """Return what a line says by canonical signal in SI; None where it is no JSON object, or a number is none of a vehicle."""
+    """Return the values of a line by canonical signal in SI; None where it is not a JSON object or has an impossible value."""
     try:
         body = read_json(line)
     except ValueError:
@@ -116,13 +117,13 @@ def _signals(line: bytes) -> dict[str, float] | None:
         return None
     found: dict[str, float] = {}
     for key, value in body.items():
-        said = canonical(key)
-        if said is None or value is None:
+        column = canonical(key)
+        if column is None or value is None:
             continue
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             return None
-        factor = UNITS[said.unit].factor if said.signal == TIME else factor_to(said.signal, said.unit)
+        factor = UNITS[column.unit].factor if column.signal == TIME else factor_to(column.signal, column.unit)
         if abs(value) > LARGEST:
             return None
-        found[said.signal] = float(value) * factor
+        found[column.signal] = float(value) * factor
     return found

@@ -1,6 +1,6 @@
-"""Where live samples come from: a log replayed, a log that grows, lines on a stream, datagrams on this machine.
+"""Sources of live samples: a log that is replayed, a log that grows, lines of a stream, datagrams on this machine.
 
-Each is an iterator of samples; None says that nothing has come for a moment, so that a view can go on.
+Each is an iterator of samples; it yields None where no sample has come for a moment, so that the caller can update its display.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from fieldsid.online.samples import LONGEST_LINE, MessageReader, Sample, samples
 TICK_S = 0.2
 POLL_S = 0.5
 READING_SHARE = 0.25
-"""Share of the time that reading a log that grows may take: it is read again as a whole, less often the longer that takes."""
+"""Share of the time spent on reading a log that grows: it is read in full each time, less often the longer that takes."""
 LOCALHOST = "127.0.0.1"
 WAITING_LINES = 10_000
 PIECE_BYTES = 1 << 18
 
 
 def replayed(run: Run, axis: Axis, factor: float, after: float = -inf) -> Iterator[Sample | None]:
-    """Yield the samples of a run after a time in s, `factor` times as fast as they were logged; inf does not wait."""
+    """Yield the samples of a run after a time in s, `factor` times as fast as they were logged; with inf without waiting."""
     begin: float | None = None
     started = clock.monotonic()
     for sample in samples_of(run, axis, after):
@@ -53,37 +53,37 @@ def followed(
 ) -> Iterator[Sample | None]:
     """Yield the samples of a log or bag folder as it grows, until nothing has come for idle_s.
 
-    The newest row waits for the one behind it, for it may be half written. Raises MappingError and LogError as reading does;
-    a log that holds nothing yet is waited for.
+    The newest row is used only once another follows it, as it may be half written. A log without samples is waited for. Raises
+    MappingError and LogError as reading does.
     """
     seen, grown, pause = (-1, -1), clock.monotonic(), POLL_S
     while clock.monotonic() - grown < idle_s:
         size = _size(path)
         if size != seen:
             begin = clock.monotonic()
-            run = _so_far(path, mapping)
+            run = _present_run(path, mapping)
             pause = max(POLL_S, (clock.monotonic() - begin) / READING_SHARE)
             seen = size
             if run is not None:
-                for sample in samples_of(run.between(-inf, _complete(run, axis)), axis, after):
+                for sample in samples_of(run.between(-inf, _complete_until(run, axis)), axis, after):
                     after, grown = sample.time, clock.monotonic()
                     yield sample
         yield None
         clock.sleep(min(pause, max(idle_s - (clock.monotonic() - grown), 0.01)))
-    run = _so_far(path, mapping)
+    run = _present_run(path, mapping)
     if run is not None:
         yield from samples_of(run, axis, after)
 
 
 def lines_of(stream: BufferedIOBase, reader: MessageReader) -> Iterator[Sample | None]:
-    """Yield the samples of a stream of JSON lines until it ends, or cannot be read any more."""
+    """Yield the samples of a stream of JSON lines until it ends or reading it fails."""
     waiting: queue.Queue[bytes | None] = queue.Queue(WAITING_LINES)
 
     def listen() -> None:
         try:
             for line in _lines(stream):
                 waiting.put(line)
-        except OSError:  # what was at the other end is gone
+        except OSError:  # the process at the other end has ended
             return
         finally:
             waiting.put(None)
@@ -102,51 +102,51 @@ def lines_of(stream: BufferedIOBase, reader: MessageReader) -> Iterator[Sample |
 
 
 def _lines(stream: BufferedIOBase) -> Iterator[bytes]:
-    """Yield lines as their ends come; of one that is too long no more is kept than shows that."""
-    kept, piece = b"", bytearray(PIECE_BYTES)
+    """Yield each line when it is complete, a line that is too long cut to LONGEST_LINE + 1 bytes."""
+    partial, piece = b"", bytearray(PIECE_BYTES)
     while size := stream.readinto1(piece):
-        if len(kept) > LONGEST_LINE and piece.find(b"\n", 0, size) < 0:
+        if len(partial) > LONGEST_LINE and piece.find(b"\n", 0, size) < 0:
             continue
         first, *others = bytes(memoryview(piece)[:size]).split(b"\n")
-        kept = (kept + first)[: LONGEST_LINE + 1]
+        partial = (partial + first)[: LONGEST_LINE + 1]
         for line in others:
-            yield kept
-            kept = line[: LONGEST_LINE + 1]
-    yield kept
+            yield partial
+            partial = line[: LONGEST_LINE + 1]
+    yield partial
 
 
 def datagrams(port: int, reader: MessageReader, *, idle_s: float = inf) -> Iterator[Sample | None]:
     """Yield the samples of JSON lines that come as UDP datagrams on this machine, until nothing has come for idle_s.
 
-    Raises UsageError where the port cannot be had.
+    Raises UsageError where the port cannot be opened.
     """
-    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as door:
+    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as receiver:
         try:
-            door.bind((LOCALHOST, port))
+            receiver.bind((LOCALHOST, port))
         except (OSError, OverflowError) as error:
             hint = "end what uses it, or name another port"
             raise UsageError(f"UDP port {port} cannot be had", found=str(error), hint=hint) from error
-        door.settimeout(TICK_S)
-        heard = clock.monotonic()
-        while clock.monotonic() - heard < idle_s:
+        receiver.settimeout(TICK_S)
+        last_received = clock.monotonic()
+        while clock.monotonic() - last_received < idle_s:
             try:
-                data = door.recv(PIECE_BYTES)
+                data = receiver.recv(PIECE_BYTES)
             except TimeoutError:
                 yield None
                 continue
-            heard = clock.monotonic()
+            last_received = clock.monotonic()
             yield from (sample for line in data.splitlines() if (sample := reader.read(line)) is not None)
 
 
 def _size(path: Path) -> tuple[int, int]:
-    """Return bytes and newest change of a file, or of all in a folder."""
+    """Return the size in bytes and the newest modification time in ns of a file, or of all files in a folder."""
     files = [p for p in path.rglob("*") if p.is_file()] if path.is_dir() else [path]
     found = [p.stat() for p in files if p.exists()]
     return sum(s.st_size for s in found), max((s.st_mtime_ns for s in found), default=0)
 
 
-def _so_far(path: Path, mapping: ChannelMap | Path | None) -> Run | None:
-    """Return what a log holds now, None where that is nothing yet."""
+def _present_run(path: Path, mapping: ChannelMap | Path | None) -> Run | None:
+    """Return the run that a log contains at present, None where it has no samples yet."""
     options = ReadOptions(salvage=True)
     try:
         reader = reader_of(path)
@@ -158,8 +158,8 @@ def _so_far(path: Path, mapping: ChannelMap | Path | None) -> Run | None:
         return None
 
 
-def _complete(run: Run, axis: Axis) -> float:
-    """Return the time up to which every signal of the axis has come, before the last row."""
+def _complete_until(run: Run, axis: Axis) -> float:
+    """Return the time up to which all signals of the axis are present, without the last row."""
     names = NAMES[axis]
     used = [s for s in (names.fin, names.fin_measured, names.angle, names.rate) if run.has(s)]
     last = [float(run.time[np.flatnonzero(np.isfinite(run[s]))[-1]]) for s in used]

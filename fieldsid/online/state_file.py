@@ -1,4 +1,4 @@
-"""The state of a live estimate as a file: written whole now and then, so that a restart goes on where it was."""
+"""The state of a live estimate as a file, written repeatedly in full, so that a restarted program continues where it was."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ SCHEMA = "fieldsid/online/1"
 
 
 def save_state(path: Path, identifier: OnlineIdentifier, watch: Watch, source: str) -> Path:
-    """Write the state of an identifier fed from a source, and of the watch over it; raises ArtifactError."""
+    """Write the states of an identifier and its watch, with the name of the source of the samples; raises ArtifactError."""
     states = {"state": identifier.state(), "watch": plain(watch.state())}
     body = {"schema": SCHEMA, "tool": f"fieldsid {__version__}", "source": source, **states}
     return write_text(path, json.dumps(body, allow_nan=False), force=True)
 
 
 def load_state(path: Path, axis: Axis, watch: Watch) -> tuple[OnlineIdentifier, str]:
-    """Return the identifier of a file and the source it was fed from; the watch takes up what it had seen.
+    """Return the identifier of a state file and the name of the source of its samples; restore the watch in place.
 
-    Raises ArtifactError for a file that is no such state, UsageError for one of the other axis.
+    Raises ArtifactError for a file that is not a valid state, UsageError for a state of the other axis.
     """
     hint = "name another file with `--state`, or remove this one"
     try:

@@ -118,7 +118,7 @@ def _check_source(log: Path | None, udp: int | None, *, follow: bool) -> None:
 
 def _goals(axis: AxisOption, plan: Path | None, want: str | None) -> tuple[Callable[[float], Mapping[str, Goal]], str]:
     """Return the goals at a speed in m/s, and where they are from."""
-    from fieldsid.online.goals import asked_goals, planned_goals
+    from fieldsid.online.goals import planned_goals, requested_goals
     from fieldsid.online.progress import DEFAULT_ACCURACY, default_goals
 
     if plan is not None and want is not None:
@@ -130,7 +130,7 @@ def _goals(axis: AxisOption, plan: Path | None, want: str | None) -> tuple[Calla
         planned_goals(promised, axis, float("nan"))
         return (lambda speed: planned_goals(promised, axis, speed)), f"`{plan}`"
     if want is not None:
-        asked = asked_goals(axis, want)
+        asked = requested_goals(axis, want)
         return (lambda _speed: asked), "`--want`"
     return (lambda _speed: default_goals(axis)), f"{100.0 * DEFAULT_ACCURACY:.0f} % of each value"
 

@@ -11,8 +11,8 @@ from online_flights import fed, flown
 from fieldsid.errors import UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.online import OnlineEstimate, OnlineIdentifier
-from fieldsid.online.goals import asked_goals
-from fieldsid.online.look import look_body, said
+from fieldsid.online.goals import requested_goals
+from fieldsid.online.look import look_body, verdict_sentence
 from fieldsid.online.progress import Goal, RecentExcitation, Watch, default_goals
 
 
@@ -49,9 +49,9 @@ def test_a_trim_has_no_goal_unless_it_is_asked_for():
     watch = Watch(default_goals(Axis.YAW))
     looks = [watch.look(estimate(t, -1.0, 0.02, trim=t)).verdict for t in [float(i) for i in range(15)]]
     assert looks[-1] == "enough"
-    assert asked_goals(Axis.YAW, "C0=10%")["C0"] == Goal(relative=0.1)
+    assert requested_goals(Axis.YAW, "C0=10%")["C0"] == Goal(relative=0.1)
     with pytest.raises(UsageError, match="no parameter"):
-        asked_goals(Axis.YAW, "c22=5%")
+        requested_goals(Axis.YAW, "c22=5%")
 
 
 def test_a_fin_that_is_still_is_said():
@@ -60,7 +60,7 @@ def test_a_fin_that_is_still_is_said():
         watch.excitation.hear(0.1 * i, 0.1, 0.0)
     found = watch.look(estimate(20.0, -1.0, 0.2))
     assert found.verdict == "not_excited"
-    assert "fin is still (0.0 deg rms)" in said(found)
+    assert "fin is still (0.0 deg rms)" in verdict_sentence(found)
 
 
 def test_the_excitation_of_the_last_seconds_is_a_root_mean_square():
@@ -99,5 +99,5 @@ def test_nothing_is_enough_where_angle_and_rate_contradict_each_other():
     for time in range(30):
         found = watch.look(replace(estimate(float(time), -1.0, 0.02), contradiction="the slope is -1, should be 1"))
     assert (found.verdict, found.share) == ("contradicts", 0.0)
-    assert said(found) == "0 % of the data can be used: the slope is -1, should be 1"
+    assert verdict_sentence(found) == "0 % of the data can be used: the slope is -1, should be 1"
     assert watch.look(estimate(30.0, -1.0, 0.02)).verdict == "enough"
