@@ -1,11 +1,11 @@
 """Why an authority is not significant: feedback, little excitation, correlation with other parameters, or a misfit.
 
-Its standard error is compared with what it would be without each cause:
-    a controller moves the fin after the motion                                  -> feedback
-    most of the motion does not follow the fin's history                         -> little excitation
+The standard error of the authority is compared with what it would be without each cause:
+    a controller moves the fin in response to the motion                         -> feedback
+    the fin's history explains little of the motion's power                      -> little excitation
     with the other parameters known, 1 / sqrt((C^-1)_bb), it is significant      -> collinear, with the one that helps most
     with the sensors' noise alone, sqrt((J' W J)^-1_bb), it is significant       -> misfit: the residuals exceed that noise
-C is the covariance of the shared parameters under the noise that the residuals show.
+C is the covariance of the shared parameters under the noise model fitted to the residuals.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from fieldsid.rounding import beside
 MIN_STD_ERRORS = 3.0
 """Standard errors below which an authority is not significant."""
 MIN_FIN_SHARE = 1.0 / 3.0
-"""Share of the motion's power that follows the fin, below which other causes dominate. By chance a disturbance of one second
-correlation time shows up to a quarter in half a minute of record."""
+"""Share of the motion's power explained by the fin, below which other causes dominate. By chance the fin explains up to a quarter
+of a disturbance with a correlation time of one second in a record of half a minute."""
 MAX_CONFOUNDED = 3
 
 
@@ -37,50 +37,52 @@ def authority_check(problem: Problem, solution: Solution, floor: Noise, slot: in
     value, error = float(solution.x[slot]), float(np.sqrt(max(solution.covariance[slot, slot], 0.0)))
     if error == 0.0 or abs(value) >= MIN_STD_ERRORS * error:
         return None
-    said = f"{problem.layout.shown(problem.layout.names[slot])} = {value:.2g} +/- {error:.2g} 1/s^2 {far_from_zero(value, error)}"
+    shown = (
+        f"{problem.layout.shown(problem.layout.names[slot])} = {value:.2g} +/- {error:.2g} 1/s^2 {far_from_zero(value, error)}"
+    )
     data = {"parameter": problem.layout.names[slot], "value": value, "std_error": error, "limit": MIN_STD_ERRORS}
-    led = [problem.records[run].name for run in _runs_of(problem, slot) if any(closed_loop_note(problem.records[run]))]
-    if led:
+    closed = [problem.records[run].name for run in _runs_of(problem, slot) if any(closed_loop_note(problem.records[run]))]
+    if closed:
         return Note(
             "authority_unclear",
-            f"{said}: a controller flies the fin of {', '.join(led)}, and what it did is not told from what it answered to; "
+            f"{shown}: a controller flies the fin of {', '.join(closed)}, and what it did is not told from what it answered to; "
             "fly pulses on top of it, or with it off",
-            {**data, "causes": ["feedback"], "runs": led},
+            {**data, "causes": ["feedback"], "runs": closed},
         )
     share = max(share_of_fin(problem.records[run]) for run in _runs_of(problem, slot))
     if share < MIN_FIN_SHARE:
         return Note(
             "not_excited",
-            f"{said}: the fin hardly moved the vehicle, at most {100 * share:.0f} % of the motion's power follows it (limit "
+            f"{shown}: the fin hardly moved the vehicle, at most {100 * share:.0f} % of the motion's power follows it (limit "
             f"{100 * MIN_FIN_SHARE:.0f} %); fly larger or longer pulses",
             {**data, "causes": ["not_excited"], "share": share},
         )
     causes = dict(_causes(problem, solution, floor, slot))
-    return Note("authority_unclear", f"{said}: {'; '.join(causes.values())}", {**data, "causes": list(causes)})
+    return Note("authority_unclear", f"{shown}: {'; '.join(causes.values())}", {**data, "causes": list(causes)})
 
 
 def far_from_zero(value: float, error: float) -> str:
-    """Return how far a value that is not significant is from zero in words, in standard errors where they say so."""
+    """Return in words how far a value that is not significant is from zero."""
     if abs(value) < 2.0 * error:  # its 95 % interval holds zero
         return "cannot be told from zero"
     return f"is {beside(abs(value) / error, MIN_STD_ERRORS)} standard errors from zero, less than {MIN_STD_ERRORS:g}"
 
 
 def _causes(problem: Problem, solution: Solution, floor: Noise, slot: int) -> Iterator[tuple[str, str]]:
-    """Yield in words each cause that, taken away alone, would leave the authority clear of zero; where none would, that."""
+    """Yield a code and a sentence for each cause without which the authority would be significant, else for little excitation."""
     enough = abs(float(solution.x[slot])) / MIN_STD_ERRORS
-    twins, known = confounded_with(solution.covariance, slot, enough)
-    names = " and ".join(problem.layout.shown(problem.layout.names[i]) for i in twins)
+    confounded, known = confounded_with(solution.covariance, slot, enough)
+    names = " and ".join(problem.layout.shown(problem.layout.names[i]) for i in confounded)
     sensors = levenberg_marquardt(problem, solution.x, floor, max_iterations=0)
     alone = float(np.sqrt(covariance(sensors.normal)[slot, slot]))
     if known <= enough:
         yield "collinear", f"this motion does not tell it from {names} (its error is {known:.2g} with {names} known)"
     if alone <= enough:
-        left = np.sqrt(sensors.cost / max(sum(int(r.ok.sum()) for r in problem.records), 1))
-        remains = f"the model leaves {left:.1f} x the sensors' noise (its error is {alone:.2g} at that noise alone)"
+        error_ratio = np.sqrt(sensors.cost / max(sum(int(r.ok.sum()) for r in problem.records), 1))
+        remains = f"the model leaves {error_ratio:.1f} x the sensors' noise (its error is {alone:.2g} at that noise alone)"
         yield "misfit", f"{remains}, and `sysid diagnose` tells whether an effect is missing"
     if min(known, alone) > enough:
-        together = f", and {known:.2g} with {names} known" if twins else ""
+        together = f", and {known:.2g} with {names} known" if confounded else ""
         yield "too_little", f"its error is {alone:.2g} even at the sensors' noise alone{together}; fly larger or longer pulses"
 
 
@@ -104,6 +106,6 @@ def confounded_with(known: FloatArray, slot: int, enough: float) -> tuple[list[i
 
 
 def _runs_of(problem: Problem, slot: int) -> list[int]:
-    """Return the runs that an authority belongs to."""
+    """Return the runs whose authority is the parameter at `slot`."""
     name = problem.layout.names[slot]
     return [run for run in range(len(problem.records)) if problem.authority_of(run) == name]

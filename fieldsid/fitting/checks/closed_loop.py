@@ -1,11 +1,10 @@
-"""Is the fin flown by a controller? Its changes explained by changes of angle and rate a delay before.
+"""Whether a controller moves the fin: a regression of its changes on the changes of angle and rate a delay earlier.
 
     fin(t) - fin(t - W) = k_angle [angle(t - d) - angle(t - d - W)] + k_rate [rate(t - d) - rate(t - d - W)]
-Changes, so that a commanded heading that stays does not matter; the few largest, where it moves, are left out, and so is
-what starts or ends where the fin is at its stop, where no controller moves it. Where the log has the goal, the angle is what
-is left to it the short way round, and no change is left out; a goal that moves excites the vehicle, and is no ground for refusal.
-Under feedback the fin follows noise and
-disturbance, and an estimate without it can mistake the controller for the vehicle.
+Changes are used so that a constant goal heading does not matter. The few largest changes, where the goal moves, are left out, and
+so are changes that start or end with the fin at its stop. Where the log has the goal, the angle is its deviation from the goal,
+the short way round, and no change is left out; a goal that moves excites the vehicle, and the run is not refused. Under feedback
+the fin follows noise and disturbance, and an estimate may mistake the controller for the vehicle.
 """
 
 from __future__ import annotations
@@ -27,21 +26,21 @@ SMOOTHING_WINDOW_S = 0.3
 MAX_DELAY_S = 1.0
 MIN_EXPLAINED_SHARE = 0.9
 TRIMMED_SHARE = 0.05
-MAX_OF_NOISE = 0.5
-"""Half of the variance that noise the fin does not follow would leave at least; noise that it does follow leaves none."""
+MAX_NOISE_SHARE = 0.5
+"""Share of the least residual variance under independent sensor noise, below which the fin follows the sensor noise."""
 MIN_MOVING_SHARE = 0.5
-"""Share of the record over which the fin must move for a controller to be looked for; one that has reached its goal rests."""
+"""Share of the record over which the fin must move for the regression: a controller that has reached its goal is at rest."""
 
 
 def closed_loop_note(record: Record) -> Iterator[Note]:
-    """Yield the finding that the angle explains the fin, with gain and delay."""
+    """Yield the finding that a controller moves the fin, with its gains and delay."""
     best = controller(record)
     if best is None or best[0] < MIN_EXPLAINED_SHARE:
         return
     share, gain, damping, delay = best
     yield Note(
         "feedback",
-        f"run {record.name!r}: {100 * share:.0f} % of the fin's changes follow {_followed(record)} {delay:.2f} s before (limit "
+        f"run {record.name!r}: {100 * share:.0f} % of the fin's changes follow {_tracked(record)} {delay:.2f} s before (limit "
         f"{100 * MIN_EXPLAINED_SHARE:.0f} %), {gain:+.2f} rad per rad and {damping:+.2f} rad per rad/s: a controller flies the "
         "fin; "
         "fly pulses on top of it, or with it off",
@@ -57,22 +56,22 @@ def closed_loop_note(record: Record) -> Iterator[Note]:
 
 
 def controller(record: Record) -> tuple[float, float, float, float] | None:
-    """Return the share explained, gains on angle and rate (s) and delay (s) of the best controller; None where none can be."""
+    """Return the share explained, gains on angle and rate (s), and delay (s) of the best controller; None where none fits."""
     best = (
         _best(record, record.angle, TRIMMED_SHARE, MIN_MOVING_SHARE)
         if record.goal is None
-        else _best(record, _off_goal(record), 0.0, 0.0)
+        else _best(record, _deviation_from_goal(record), 0.0, 0.0)
     )
     return None if best is None else (best[0].share, *best[0].gains, best[1])
 
 
 def refuse_feedback_alone(records: Sequence[Record]) -> None:
-    """Raise DataError where in every one of the runs fitted together the fin is feedback of what the log holds, and nothing else.
+    """Raise DataError where in every run of a joint fit the fin is feedback of the logged angle and rate and nothing else.
 
-    Two conditions, both without leaving out any change. At least MIN_EXPLAINED_SHARE of the fin's changes is explained. What is
-    left, less the rounding of the fin, is smaller than what the sensor's noise alone must leave where the fin does not follow
-    it: of a fin y regressed on x + n with gain k, n independent of y, at least k^2 var n is left. Slow open-loop motion that
-    happens to resemble the fin meets the first condition and not the second.
+    There are two conditions, both on all changes of the fin. First, at least MIN_EXPLAINED_SHARE of the changes is explained.
+    Second, the residual variance, less that of the fin's rounding, is smaller than sensor noise would leave if the fin did not
+    follow the noise: a fin y regressed on x + n with gain k, n independent of y, has a residual variance of at least k^2 var n.
+    Slow open-loop motion that happens to resemble the fin meets the first condition but not the second.
     """
     errors = [_feedback_alone(record) for record in records]
     alone = [error for error in errors if error is not None]
@@ -82,7 +81,7 @@ def refuse_feedback_alone(records: Sequence[Record]) -> None:
 
 def _feedback_alone(record: Record) -> DataError | None:
     best = _best(record, record.angle, 0.0, MIN_MOVING_SHARE)
-    if best is None or best[0].share < MIN_EXPLAINED_SHARE or not best[0].left < MAX_OF_NOISE * best[0].noise:
+    if best is None or best[0].share < MIN_EXPLAINED_SHARE or not best[0].residual < MAX_NOISE_SHARE * best[0].noise:
         return None
     found, delay = best
     names = NAMES[record.axis]
@@ -94,23 +93,23 @@ def _feedback_alone(record: Record) -> DataError | None:
     )
 
 
-def _followed(record: Record) -> str:
-    """Return what a controller of a record answers to, in words."""
+def _tracked(record: Record) -> str:
+    """Return the input of a record's controller in words."""
     names = NAMES[record.axis]
     return f"`{names.angle}`" if record.goal is None else f"`{names.angle}` less `{names.goal}`"
 
 
-def _off_goal(record: Record) -> FloatArray:
-    """Return the angle (n,) in rad, from its goal the short way round where the log has one."""
+def _deviation_from_goal(record: Record) -> FloatArray:
+    """Return the angle (n,) in rad; where the log has a goal, the deviation from it, the short way round."""
     if record.goal is None:
         return record.angle
     off = record.angle - record.goal
-    # a turn past the far side of the goal is no change of what is left to it
+    # unwrapped, as the deviation jumps by a full turn where the vehicle passes the heading opposite to the goal
     return np.unwrap(np.asarray(off - 2.0 * np.pi * np.round(off / (2.0 * np.pi))))
 
 
 def _best(record: Record, angle: FloatArray, trimmed: float, moving: float) -> tuple[_Explained, float] | None:
-    """Return the best controller of an angle (n,) in rad with its delay in s; None where none can be looked for."""
+    """Return the best controller of an angle (n,) in rad with its delay in s; None where the regression is not possible."""
     if not record.angle_ok.all() or (record.rate_ok.any() and not record.rate_ok.all()):
         return None
     step = float(np.median(record.steps))
@@ -127,18 +126,18 @@ def _best(record: Record, angle: FloatArray, trimmed: float, moving: float) -> t
 
 @dataclass(frozen=True, slots=True)
 class _Explained:
-    """Share of the fin's changes explained, gains on angle and rate (s), variance left, and what sensor noise would leave."""
+    """Share of the fin's changes explained, gains on angle and rate (s), residual variance, and least one under sensor noise."""
 
     share: float
     gains: tuple[float, float]
-    left: float
+    residual: float
     noise: float
 
 
 def _explained(
     record: Record, angle: FloatArray, moved: FloatArray, width: int, lag: int, longest: int, trimmed: float
 ) -> _Explained:
-    """Return what the motion a lag before explains of the fin's changes, the largest left out to a share."""
+    """Return the regression of the fin's changes on the motion `lag` samples earlier, without the share `trimmed` of largest."""
     target = moved[longest:]
     step = float(np.median(record.steps))
     measured = bool(record.rate_ok.any())
@@ -151,17 +150,17 @@ def _explained(
         return _Explained(0.0, (0.0, 0.0), 0.0, 0.0)
     keep = free & (np.abs(target) <= np.quantile(np.abs(target[free]), 1.0 - trimmed))
     gains = np.linalg.lstsq(columns[keep], target[keep], rcond=1e-9)[0]
-    left = target[keep] - columns[keep] @ gains
+    residual = target[keep] - columns[keep] @ gains
     power = float(target[keep] @ target[keep])
     on_angle, on_rate = float(gains[0]), float(gains[1])
-    of_angle = white_noise_std(record.angle, record.angle_ok) ** 2
+    angle_variance = white_noise_std(record.angle, record.angle_ok) ** 2
     if measured:
-        noise = on_angle**2 * of_angle + on_rate**2 * white_noise_std(record.rate, record.rate_ok) ** 2
+        noise = on_angle**2 * angle_variance + on_rate**2 * white_noise_std(record.rate, record.rate_ok) ** 2
     else:
-        noise = ((on_angle + on_rate / step) ** 2 + (on_rate / step) ** 2) * of_angle
+        noise = ((on_angle + on_rate / step) ** 2 + (on_rate / step) ** 2) * angle_variance
     return _Explained(
-        1.0 - float(left @ left) / power if power > 0.0 else 0.0,
+        1.0 - float(residual @ residual) / power if power > 0.0 else 0.0,
         (on_angle, on_rate),
-        max(float(np.mean(left**2)) - last_digit(record.fin) ** 2 / 6.0, 0.0),
+        max(float(np.mean(residual**2)) - last_digit(record.fin) ** 2 / 6.0, 0.0),
         2.0 * noise,
     )

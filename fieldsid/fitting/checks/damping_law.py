@@ -1,11 +1,11 @@
-"""Whether a vehicle turns by itself, asked of damping that goes with a free power of the rate, not of one law that is assumed.
+"""Whether a vehicle is unstable at rest, from a fit with damping by a free power of the rate instead of one assumed law.
 
-a22 is the slope at rest of a curve fitted to turns: -a22 r - q r |r|^(p - 1). The power p decides where the curve goes between
-the turns and rest: a hull that is stable and damped by r^3 looks unstable to a fit by r |r|. The likelihood is maximised over all
-else at each power (its profile); the slope's error at the best power is that of a fit with it and, by the profile's curvature,
-that of the power itself, with samples whose residuals are correlated counted once. At an end of the powers' range the law is
-not known, and the whole range within reach of it counts.
-Source: Norrbin 1971, Theory and observations on the use of a mathematical model for ship manoeuvring (the cubic form).
+a22 is the slope at rest of the damping curve -a22 r - q r |r|^(p - 1), which is fitted to turns. The power p determines the curve
+between the turns and rest: a stable hull with damping by r^3 looks unstable in a fit with r |r|. The profile likelihood,
+maximised over all other parameters, gives the best power. The error of the slope combines that of the fit at this power with that
+of the power, which follows from the curvature of the profile; correlated samples are counted once. Where the best power is at a
+bound of its range, the error of the power is the width of the range. Source: Norrbin 1971, Theory and observations on the use of
+a mathematical model for ship manoeuvring (the cubic form).
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from fieldsid.models.model import Noise
 from fieldsid.numerics.arrays import FloatArray
 
 POWERS = (1.4, 4.0)
-"""Powers of the rate that are tried: below the first, damping is next to linear and no slope can be told from it."""
+"""Bounds of the power of the rate: below the first, the damping is nearly linear and cannot be separated from the slope."""
 SQUARE = 2.0
-APART = 0.1
-"""Half the distance over which the profile's curvature is taken."""
+POWER_STEP = 0.1
+"""Half width of the difference that gives the curvature of the profile."""
 CLEAR_STD_ERRORS = 2.0
 """Standard errors from which a value's sign is clear."""
 
 
 @dataclass(frozen=True, slots=True)
 class SlopeAtRest:
-    """The damping at rest under damping of a free power of the rate, 1/s, its error, the power, and the log likelihood gained."""
+    """The damping at rest (1/s) in a fit with a free power of the rate, its error, the power, and the log likelihood gained."""
 
     value: float
     std_error: float
@@ -45,20 +45,20 @@ class SlopeAtRest:
 
     @property
     def is_negative(self) -> bool:
-        """Whether it is so clearly."""
+        """Whether the slope is significantly negative."""
         return self.value < -CLEAR_STD_ERRORS * self.std_error
 
     @property
     def is_positive(self) -> bool:
-        """Whether it is so clearly."""
+        """Whether the slope is significantly positive."""
         return self.value > CLEAR_STD_ERRORS * self.std_error
 
 
 def slope_at_rest(problem: Problem, x: FloatArray) -> SlopeAtRest | None:
-    """Return the slope at rest that refits of a fit x give with damping of a free power; None where they do not converge."""
+    """Return the slope at rest from refits of a fit x with damping by a free power; None where they do not converge."""
     try:
         return _Profile(problem, x).best()
-    except FieldsidError:  # no refit, no answer
+    except FieldsidError:  # a refit failed
         return None
 
 
@@ -89,23 +89,23 @@ class _Profile:
         return negative_log_likelihood(self.problem, found.x), float(found.x[self.slope]), error
 
     def best(self) -> SlopeAtRest | None:
-        """Return what the power of the largest likelihood gives."""
+        """Return the slope at rest at the power of the largest likelihood."""
         from scipy.optimize import minimize_scalar
 
         found = minimize_scalar(lambda p: self.refit(float(p))[0], bounds=POWERS, method="bounded", options={"xatol": 0.02})
-        power = float(np.clip(found.x, POWERS[0] + APART, POWERS[1] - APART))
-        low, high = self.refit(power - APART), self.refit(power + APART)
+        power = float(np.clip(found.x, POWERS[0] + POWER_STEP, POWERS[1] - POWER_STEP))
+        low, high = self.refit(power - POWER_STEP), self.refit(power + POWER_STEP)
         middle = self.refit(power)
-        at_end = power != found.x
-        bend = max((low[0] - 2.0 * middle[0] + high[0]) / APART**2, 1e-12)
-        repeated = self._correlated()
-        of_power = POWERS[1] - POWERS[0] if at_end else np.sqrt(repeated / bend)
-        error = float(np.hypot(np.sqrt(repeated) * middle[2], (high[1] - low[1]) / (2.0 * APART) * of_power))
+        is_at_bound = power != found.x
+        curvature = max((low[0] - 2.0 * middle[0] + high[0]) / POWER_STEP**2, 1e-12)
+        correlation = self._correlation_length()
+        power_error = POWERS[1] - POWERS[0] if is_at_bound else np.sqrt(correlation / curvature)
+        error = float(np.hypot(np.sqrt(correlation) * middle[2], (high[1] - low[1]) / (2.0 * POWER_STEP) * power_error))
         gained = self.before - middle[0]
         return SlopeAtRest(middle[1], error, power, gained) if np.isfinite([gained, error, middle[1]]).all() else None
 
-    def _correlated(self) -> float:
-        """Return how many samples of what is left count once."""
+    def _correlation_length(self) -> float:
+        """Return the correlation length of the residuals in samples, the largest over runs and channels."""
         lengths = [1.0]
         for run, record in enumerate(self.problem.records):
             residual, _ = self.problem.residual(self.at, run)

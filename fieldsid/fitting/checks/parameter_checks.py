@@ -1,4 +1,4 @@
-"""What a fit must say first: parameters on a bound, correlated, not identifiable, of impossible sign, unstable."""
+"""Checks of the parameters of a fit: on a bound, correlated, not identifiable, of impossible sign, unstable."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from fieldsid.rounding import in_unit
 
 MAX_CORRELATION = 0.95
 CLEAR_GAIN = 10.0
-"""Log likelihood that a law of damping must be worse by not to count."""
+"""Log likelihood by which a damping law must be worse than another to be disregarded."""
 
 
 def parameter_checks(problem: Problem, solution: Solution, floor: Noise) -> tuple[Note, ...]:
-    """Return the remarks of a solution, the gravest first."""
+    """Return the notes on the parameters of a solution, the most serious first."""
     return (
         *_stability(problem, solution),
         *_bounds(problem, solution),
@@ -52,7 +52,7 @@ def _stability(problem: Problem, solution: Solution) -> Iterator[Note]:
 
 
 def _slope(problem: Problem, solution: Solution, values: Mapping[str, float], error: float) -> Note:
-    """Return what a negative damping says: of the vehicle only where no other law of damping that fits as well says otherwise."""
+    """Return the note on a negative damping; the vehicle is unstable only where no damping law that fits as well denies it."""
     name = NAMES[problem.layout.axis].damping
     damping, shown = values[name], problem.layout.shown(name)
     data = {"value": damping, "limit": 0.0} | ({} if "quadratic" in values else {"hint": "--effects quadratic_damping"})

@@ -1,4 +1,4 @@
-"""Judge the data of a fit: each finding with its own code, the measured number, the limit, and what to change."""
+"""Checks of the data of a fit: each note has a code, the measured number, its limit, and what to change."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ MAX_GAP_STEPS = 5.0
 MIN_CLIPPED_S = 0.2
 MAX_CLIPPED_SHARE = 0.005
 MAX_FILTERED_NOISE = 1e-4
-"""Noise floor over the signal's own size, below which a sensor's noise was filtered away before it was logged."""
+"""Ratio of noise floor to standard deviation of a signal, below which it was filtered before it was logged."""
 
 
 def record_checks(problem: Problem, solution: Solution) -> tuple[Note, ...]:
-    """Return what is wrong with the data of a fit, the gravest first."""
+    """Return the notes on the data of a fit, the most serious first in each run."""
     damping = [problem.base_of(solution.x, run).damping for run in range(len(problem.records))]
     known = {e.name for e in problem.layout.effects}
     return tuple(
         note
         for record, a in zip(problem.records, damping, strict=True)
-        for note in (*closed_loop_note(record), *_clipped(record), *_gaps(record), *_of_motion(record, a, known))
+        for note in (*closed_loop_note(record), *_clipped(record), *_gaps(record), *_motion_checks(record, a, known))
     )
 
 
-def _of_motion(record: Record, damping: float, effects: set[str]) -> Iterator[Note]:
+def _motion_checks(record: Record, damping: float, effects: set[str]) -> Iterator[Note]:
     yield from _short(record, damping)
     yield from _speed(record, effects)
     yield from _filtered(record)
@@ -103,10 +103,10 @@ def _channels(record: Record) -> Sequence[tuple[str, FloatArray, npt.NDArray[np.
 
 
 def clipped_share(values: FloatArray, shortest: int) -> tuple[float, float]:
-    """Return the level of the worse extreme and the share of samples (n,) that stay at it in stretches of `shortest`.
+    """Return the level of the worse extreme, and the share of samples (n,) in stretches of at least `shortest` at that level.
 
-    A stretch that is entered by less than three of the signal's smallest changes among numbers as large, which of three digits
-    have steps as large, is a rounded peak, not a limit.
+    A stretch counts only where the signal enters it by at least three times its smallest change among values of similar size. A
+    smaller change is a peak of a signal that was rounded, for example to three digits, and no saturation.
     """
     worst = (0.0, 0.0)
     moves = np.abs(np.diff(values))
@@ -115,11 +115,11 @@ def clipped_share(values: FloatArray, shortest: int) -> tuple[float, float]:
     for level in (float(values.max()), float(values.min())):
         edges = np.flatnonzero(np.diff(np.concatenate([[False], values == level, [False]]).astype(int)))
         starts, ends = edges[::2], edges[1::2]
-        among = moves[(moves > 0) & (np.abs(values[1:]) >= 0.5 * abs(level))]
-        smallest = float(among.min() if among.size else moves[moves > 0].min())
-        long = (ends - starts >= shortest) & (starts > 0)
-        entered = np.array([abs(values[s] - values[s - 1]) >= 3.0 * smallest for s in starts[long]], dtype=bool)
-        share = float((ends - starts)[long][entered].sum()) / values.size
+        similar = moves[(moves > 0) & (np.abs(values[1:]) >= 0.5 * abs(level))]
+        smallest = float(similar.min() if similar.size else moves[moves > 0].min())
+        is_long = (ends - starts >= shortest) & (starts > 0)
+        entered = np.array([abs(values[s] - values[s - 1]) >= 3.0 * smallest for s in starts[is_long]], dtype=bool)
+        share = float((ends - starts)[is_long][entered].sum()) / values.size
         worst = max(worst, (level, share), key=lambda item: item[1])
     return worst
 

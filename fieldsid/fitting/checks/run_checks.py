@@ -1,4 +1,4 @@
-"""Judge a run before its axis is fitted: the fin that is used, its limits, the other axis, a gain of impossible sign."""
+"""Checks of a run before its axis is fitted: which fin is used, its limit, the other axis, an authority of impossible sign."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SIGNS = {"port": -1.0, "starboard": 1.0, "nose_down": -1.0, "nose_up": 1.0}
 
 
 def run_checks(run: Run, axis: Axis, vehicle: Vehicle | None = None) -> tuple[Note, ...]:
-    """Return what speaks against fitting an axis to a run; the fin's limit is that of the vehicle, where one is given."""
+    """Return the notes on a run whose axis is to be fitted; the fin's limit is that of the vehicle, where one is given."""
     return (*fin_holes(run, axis), *_fins(run, axis), *_limit(run, axis, vehicle), *_speed(run), *_other_axis(run, axis))
 
 
@@ -34,14 +34,14 @@ def _fins(run: Run, axis: Axis) -> Iterator[Note]:
     both = np.isfinite(command) & np.isfinite(fin)
     if not both.any():
         return
-    apart = float(np.sqrt(np.mean((command[both] - fin[both]) ** 2)) / max(float(np.std(command[both])), 1e-9))
-    if apart > MAX_FIN_DISAGREEMENT:
+    difference = float(np.sqrt(np.mean((command[both] - fin[both]) ** 2)) / max(float(np.std(command[both])), 1e-9))
+    if difference > MAX_FIN_DISAGREEMENT:
         yield Note(
             "fin_measured_used",
-            f"run {run.name!r}: the measured fin is used, it is {100 * apart:.0f} % of the command away from it (rms, limit "
+            f"run {run.name!r}: the measured fin is used, it is {100 * difference:.0f} % of the command away from it (rms, limit "
             f"{100 * MAX_FIN_DISAGREEMENT:.0f} %): the model knows nothing of the servo; for one from the command, leave "
             f"`{names.fin_measured}` out of the mapping",
-            {"value": apart, "limit": MAX_FIN_DISAGREEMENT, "signal": names.fin_measured, "run": run.name},
+            {"value": difference, "limit": MAX_FIN_DISAGREEMENT, "signal": names.fin_measured, "run": run.name},
         )
 
 
@@ -61,10 +61,10 @@ def _limit(run: Run, axis: Axis, vehicle: Vehicle | None) -> Iterator[Note]:
 
 
 def _speed(run: Run) -> Iterator[Note]:
-    beyond = speed_beyond(run)
-    if beyond is None:
+    refused_speed = speed_beyond(run)
+    if refused_speed is None:
         return
-    (middle, limit), why = beyond, speed_refused(run)
+    (middle, limit), why = refused_speed, speed_refused(run)
     yield Note(
         "no_speed",
         f"run {run.name!r}: {why}, so the speed is taken as not measured; correct its sign or unit, or map another one",
@@ -88,7 +88,7 @@ def _other_axis(run: Run, axis: Axis) -> Iterator[Note]:
 
 
 def _motion(run: Run, name: str) -> float:
-    """Return the standard deviation of a rate with its white noise taken out."""
+    """Return the standard deviation of a rate less that of its white noise."""
     ok = np.isfinite(run[name])
     values = run[name][ok]
     floor = white_noise_std(np.where(ok, run[name], 0.0), ok)
@@ -96,16 +96,18 @@ def _motion(run: Run, name: str) -> float:
 
 
 def offset_findings(model: Model, vehicle: Vehicle | None) -> tuple[Note, ...]:
-    """Return the finding that the fin which the trim moment stands for is beyond any that was flown, or that the vehicle has."""
+    """Return the finding that the fin offset is larger than the vehicle's fin limit, or than the largest fin of the runs."""
     stated = None if vehicle is None else vehicle.fin_max_rad(model.axis.value)
     largest = stated if stated is not None else model.trained["fin_max"]
     offset = offset_of(model)
     if not abs(offset.value) > largest:
         return ()
     of = "the vehicle's limit" if stated is not None else "the largest fin of the runs"
-    told = abs(offset.value) - 2.0 * offset.std_error > largest
+    is_certain = abs(offset.value) - 2.0 * offset.std_error > largest
     straight = "straight" if model.axis is Axis.YAW else "level"
-    says = f"by this model no such fin holds the vehicle {straight}" if told else "these data do not tell it from one within"
+    says = (
+        f"by this model no such fin holds the vehicle {straight}" if is_certain else "these data do not tell it from one within"
+    )
     return (
         Note(
             "offset_beyond_fin",
@@ -117,7 +119,7 @@ def offset_findings(model: Model, vehicle: Vehicle | None) -> tuple[Note, ...]:
 
 
 def sign_findings(model: Model, vehicle: Vehicle | None) -> tuple[Note, ...]:
-    """Return the finding that the fin's gain has the sign its vehicle says it cannot have."""
+    """Return the finding that the authority has the opposite sign of the one that the vehicle file states."""
     side = None if vehicle is None else vehicle.positive_rudder if model.axis is Axis.YAW else vehicle.positive_elevator
     name = NAMES[model.axis].authority
     value, error = model.values[name], model.std_error(name)

@@ -1,7 +1,7 @@
-"""What a fit's residual says of the path from the log to the fin: an ignored delay, a clock that is off, a hidden instability.
+"""Score tests of a fit's residual for an ignored delay, a clock offset between fin and motion, and a hidden instability.
 
-Each is suspected by one Gauss-Newton step from the fit with one effect more, under the noise of the fit: a score test.
-What is said is that of a refit with the effect: a step tells whether, not how far.
+Each test is one Gauss-Newton step from the fit with one effect more, under the noise of the fit. Where it is significant, the
+model is refitted with the effect, and the note reports the refit: the step shows whether there is an effect, but not how large.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from fieldsid.noise.whiten import noise_vector
 from fieldsid.rounding import TWO_SIDED_95
 
 CLEAR_STD_ERRORS = 4.0
-"""Standard errors from which an estimate counts."""
+"""Standard errors from which an estimate is significant."""
 STEP_AT_S, MAX_INITIAL_DELAY_S = 0.01, 0.2
-"""The delay that a first-order step is taken at, and the largest that a refit starts from: the larger a step, the less reliable
-it is."""
+"""The delay at which the Gauss-Newton step is taken, and the largest delay from which a refit starts: a larger step is less
+reliable."""
 MIN_BIAS = 0.005
-"""Share of the damping by which an ignored delay moves it at least to be reported: no plan asks for a closer one."""
+"""Least relative change of the damping by an ignored delay that is reported: no plan asks for a higher accuracy."""
 MIN_DRAG_LIKELIHOOD_GAIN = 10.0
-"""Log likelihood the refit with damping that grows with the rate must gain."""
+"""Least gain of log likelihood by the refit with damping that grows with the rate."""
 FIN_TIMING = ("delay", "servo_lag", "rate_limit", "backlash", "clock_offset")
 
 
 def score_tests(problem: Problem, solution: Solution) -> tuple[Note, ...]:
-    """Return the suspicions a fit's residual raises."""
+    """Return the notes of the score tests on a fit's residual."""
     problem, known = problem.first(MAX_NOISE_SAMPLES // len(problem.records)), {e.name for e in problem.layout.effects}
     notes: list[Note] = []
     if not known & set(FIN_TIMING):
@@ -48,7 +48,7 @@ def score_tests(problem: Problem, solution: Solution) -> tuple[Note, ...]:
 
 
 def score_test(problem: Problem, solution: Solution, effect: str, name: str, at: float) -> tuple[float, float]:
-    """Return what one step gives for a coefficient of an effect that is not in the fit, and its error."""
+    """Return the estimate of a coefficient of an absent effect after one Gauss-Newton step from `at`, and its error."""
     longer, x = with_effect(problem, solution.x, effect_named(effect), {name: at})
     step, inverse = gls_step(linearise_runs(longer, x), len(x), noise_vector(solution.noise))
     slot = longer.layout.names.index(name)
@@ -57,7 +57,7 @@ def score_test(problem: Problem, solution: Solution, effect: str, name: str, at:
 
 @dataclass(frozen=True, slots=True)
 class Lateness:
-    """A refit with the fin late (s > 0) or early: how late, the damping with it, its error, and without it in the same fit."""
+    """A refit with a delay `late` of the response to the fin (s, negative: early), and the damping with and without it."""
 
     late: float
     damping: float
@@ -66,15 +66,15 @@ class Lateness:
 
     @property
     def moves(self) -> float:
-        """By how much the damping is another one without it, 1/s."""
+        """The absolute change of the damping where the delay is left out, 1/s."""
         return abs(self.without - self.damping)
 
 
 def lateness(problem: Problem, solution: Solution, begin: float) -> Lateness | None:
-    """Return how late the vehicle answers the logged fin, from a refit that begins at a lateness in s of either sign.
+    """Return the delay of the vehicle's response to the logged fin, from a refit that starts at `begin` in s, of either sign.
 
-    Early can only be a clock. None where the refit does not settle within the coefficient's bounds, clear of zero, at a lower
-    error: then nothing is known of how late it is.
+    A negative delay can only be a clock offset. None where the refit does not converge within the bounds of the coefficient, to a
+    significant delay and a lower cost.
     """
     effect, name = ("delay", "delay") if begin > 0.0 else ("clock_offset", "offset")
     weights = solution.weights or white_weights(problem, solution.x)
@@ -95,7 +95,7 @@ def lateness(problem: Problem, solution: Solution, begin: float) -> Lateness | N
 def _timing(problem: Problem, solution: Solution) -> Iterator[Note]:
     value, error = score_test(problem, solution, "delay", "delay", STEP_AT_S)
     found = lateness(problem, solution, value) if np.isfinite(value) and abs(value) >= CLEAR_STD_ERRORS * error else None
-    # a delay that leaves the damping within its band is no matter, however clear it is
+    # a delay that changes the damping by less than its error is not reported, however significant it is
     if found is None or found.moves < max(TWO_SIDED_95 * found.damping_error, MIN_BIAS * abs(found.damping)):
         return
     name = NAMES[problem.layout.axis].damping
@@ -125,7 +125,7 @@ def _timing(problem: Problem, solution: Solution) -> Iterator[Note]:
 
 
 def _instability(problem: Problem, solution: Solution) -> Iterator[Note]:
-    """Yield the finding that damping which grows with the rate holds a vehicle whose linear yaw is unstable."""
+    """Yield the finding that the vehicle is unstable at rest and bounded by damping that grows with the rate."""
     value, error = score_test(problem, solution, "quadratic_damping", "quadratic", 0.05)
     if not value > CLEAR_STD_ERRORS * error:
         return

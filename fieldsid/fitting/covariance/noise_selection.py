@@ -1,4 +1,4 @@
-"""Which noise the residuals of a free run show: white, a disturbance moment, coloured sensor noise, or both."""
+"""Selection of the kind of noise of free-run residuals: white, a disturbance moment, coloured sensor noise, or both."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def residual_whiteness(problem: Problem, x: FloatArray, noise: Noise) -> float:
 
 
 def chosen_noise(problem: Problem, x: FloatArray, weights: Noise) -> tuple[str, Noise, tuple[Note, ...]]:
-    """Return the noise the standard errors are computed with, and its family: white when the residuals are."""
+    """Return the kind of noise for the standard errors, the noise, and notes; white where the residuals are white."""
     p = residual_whiteness(problem, x, weights)
     if p >= MIN_WHITENESS_P and is_white(weights):
         return "white", weights, ()

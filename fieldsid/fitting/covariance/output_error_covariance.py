@@ -2,8 +2,8 @@
 
     P = N^-1 (sum over runs of J' W S W J) N^-1,  N = J' W J,
 
-with Jacobian J, weights W and the covariance S of coloured noise, to which moments of the runs' own of standard deviation s add
-s^2 r r', r the response to a unit moment. Source: Ljung 1999, section 9.4.
+with Jacobian J, weights W and the covariance S of coloured noise. A random moment of each run, of standard deviation s, adds s^2
+r r' to S, where r is the response to a unit moment. Source: Ljung 1999, section 9.4.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def white_weight_covariance(
 ) -> FloatArray:  # fmt: skip
     """Return the covariance (F, F) of an estimate under a noise vector (7,); normal and results are those at the minimum.
 
-    own_moment is the standard deviation of the moments of the runs' own, rad/s^2.
+    own_moment is the standard deviation of the random moment of each run, rad/s^2.
     """
     sigma = np.array([weights.angle, weights.rate])
     place = {slot: i for i, slot in enumerate(found.free)}

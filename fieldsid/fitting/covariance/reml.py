@@ -22,14 +22,14 @@ from fieldsid.numerics.ljung_box import MIN_WHITENESS_P, ljung_box_p
 PENALTY_PER_PARAMETER = 4.0
 """Log likelihood that a noise kind must gain over a simpler one for each further parameter (Akaike's criterion asks for 1)."""
 MIN_INFORMATION_SHARE = 1e-9
-"""Share of a sensitivity's size that the others leave of it, below which it says nothing of its own."""
+"""Least norm of a sensitivity after projection on the others, as a share of its norm: below, it is linearly dependent."""
 MAX_NOISE_SAMPLES = 30_000
-"""Samples over all runs that noise is estimated from; of longer records the first part is taken."""
+"""Most samples of all runs from which noise is estimated; of longer records the first part is used."""
 
 
 @dataclass(frozen=True, slots=True)
 class LinearisedRun:
-    """One run at x: base dynamics, residual and sensitivities stacked (1 + P, 2, n), and where those belong (P,)."""
+    """One run at x: base dynamics, residual and sensitivities stacked (1 + P, 2, n), and the parameters of these (P,)."""
 
     record: Record
     damping: float
@@ -72,11 +72,11 @@ def whitened_products(lines: list[LinearisedRun], count: int, noise: FloatArray)
 
 @dataclass(frozen=True, slots=True)
 class RestrictedLikelihood:
-    """The restricted log likelihood, up to its constant, of a noise vector (7,): call it.
+    """The restricted log likelihood, up to its constant, as a function of a noise vector (7,).
 
-    The runs' sensitivities are combined so that no two say the same where noise is white; `log_size` is the logarithm of the
-    determinant of what they were combined by. Products of sensitivities as they come, of which several say nearly the same, lose
-    twice the digits of that, and the likelihood becomes too rough to have slopes. Source: Patterson and Thompson 1971,
+    The sensitivities have been combined linearly to be orthonormal under white noise; `log_size` is the logarithm of the
+    determinant of the inverse combination. Without that, the normal matrix of nearly dependent sensitivities would square their
+    condition number, and the rounding errors of the likelihood would spoil its differences. Source: Patterson and Thompson 1971,
     Biometrika 58(3); Golub and Van Loan 2013, section 5.3.8, on normal equations.
     """
 
@@ -85,61 +85,65 @@ class RestrictedLikelihood:
     log_size: float
 
     def __call__(self, noise: FloatArray) -> float:
-        """Return it at a noise."""
+        """Return the restricted log likelihood at a noise vector (7,)."""
         square, logs = whitened_products(self.lines, self.count, noise)
-        normal, seen = square[1:, 1:], square[1:, 0]
-        left = square[0, 0] - seen @ np.linalg.solve(normal, seen)
+        normal, projection = square[1:, 1:], square[1:, 0]
+        left = square[0, 0] - projection @ np.linalg.solve(normal, projection)
         return -0.5 * (logs + float(left + np.linalg.slogdet(normal)[1]) + 2.0 * self.log_size)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of a motion without bound, whose noise `estimate_noise` refuses
 def restricted_likelihood(lines: list[LinearisedRun], count: int) -> RestrictedLikelihood:
-    """Return the restricted likelihood of linearised runs with so many parameters; one that nothing tells of is left out.
+    """Return the restricted likelihood of linearised runs with `count` parameters, without those that have no information.
 
-    Columns of one run alone are made orthonormal first, then what they leave of those that runs share: each run keeps its own.
+    The sensitivities of each run to its own parameters are made orthonormal first. They are projected out of the sensitivities to
+    the parameters that runs share, which are then made orthonormal over all runs.
     """
     runs_of = np.bincount(np.concatenate([line.place for line in lines]), minlength=count)
     shared = np.flatnonzero(runs_of > 1)
     weights = _channel_weights(lines)
-    alone, common, logs = [], [], 0.0
+    own_stacks, common, logs = [], [], 0.0
     for line in lines:
         is_own = runs_of[line.place] == 1
-        whole = np.zeros((shared.size, *line.stack.shape[1:]))
-        whole[np.searchsorted(shared, line.place[~is_own])] = line.stack[1:][~is_own]
+        of_shared = np.zeros((shared.size, *line.stack.shape[1:]))
+        of_shared[np.searchsorted(shared, line.place[~is_own])] = line.stack[1:][~is_own]
         weighted = [
             (s * line.record.ok * weights[:, None]).reshape(s.shape[0], line.residual.size).T
-            for s in (line.stack[1:][is_own], whole)
+            for s in (line.stack[1:][is_own], of_shared)
         ]
         sizes = np.linalg.norm(weighted[1], axis=0)
         inverse, size = _orthonormal(weighted[0], np.linalg.norm(weighted[0], axis=0))
-        twice = weighted[0] @ inverse
-        for _ in range(2):  # once more takes away what rounding left the first time
-            told = twice.T @ weighted[1]
-            weighted[1], whole = weighted[1] - twice @ told, whole - np.tensordot((inverse @ told).T, line.stack[1:][is_own], 1)
-        alone.append(np.tensordot(inverse.T, line.stack[1:][is_own], 1))
-        common.append((whole, weighted[1], sizes))
+        basis = weighted[0] @ inverse
+        for _ in range(2):  # the second pass removes the rounding errors of the first
+            share = basis.T @ weighted[1]
+            weighted[1], of_shared = (
+                weighted[1] - basis @ share,
+                of_shared - np.tensordot((inverse @ share).T, line.stack[1:][is_own], 1),
+            )
+        own_stacks.append(np.tensordot(inverse.T, line.stack[1:][is_own], 1))
+        common.append((of_shared, weighted[1], sizes))
         logs += size
     inverse, size = _orthonormal(np.concatenate([w for _, w, _ in common]), np.sqrt(sum(s**2 for _, _, s in common)))
-    last, made = inverse.shape[1], []
-    for line, own, (whole, _, _) in zip(lines, alone, common, strict=True):
+    last, combined = inverse.shape[1], []
+    for line, own, (of_shared, _, _) in zip(lines, own_stacks, common, strict=True):
         place = np.concatenate([np.arange(last, last + len(own)), np.arange(inverse.shape[1])])
-        stack = np.concatenate([line.stack[:1], own, np.tensordot(inverse.T, whole, 1)])
-        made.append(replace(line, stack=stack, place=place))
+        stack = np.concatenate([line.stack[:1], own, np.tensordot(inverse.T, of_shared, 1)])
+        combined.append(replace(line, stack=stack, place=place))
         last += len(own)
-    return RestrictedLikelihood(made, last, logs + size)
+    return RestrictedLikelihood(combined, last, logs + size)
 
 
 def _channel_weights(lines: list[LinearisedRun]) -> FloatArray:
-    """Return one over the root mean square (2,) of all residuals of each channel."""
+    """Return the inverse of the root mean square residual of each channel (2,), over all runs."""
     squares = np.array([(line.residual**2 * line.record.ok).sum(axis=1) for line in lines]).sum(axis=0)
     counts = np.array([line.record.ok.sum(axis=1) for line in lines]).sum(axis=0)
     return np.asarray(np.sqrt(np.maximum(counts, 1) / np.maximum(squares, np.finfo(float).tiny)))
 
 
 def _orthonormal(columns: FloatArray, sizes: FloatArray) -> tuple[FloatArray, float]:
-    """Return what (P, Q) makes columns (m, P) orthonormal, and the log determinant of its inverse.
+    """Return the matrix (P, Q) that makes columns (m, P) orthonormal, and the log determinant of its inverse.
 
-    A column of which the others leave less than MIN_INFORMATION_SHARE of its size is left out.
+    A column whose norm after projection on the others is below MIN_INFORMATION_SHARE of its size is left out.
     """
     upper = np.asarray(np.linalg.qr(columns, mode="r"))
     left = np.concatenate([np.abs(np.diag(upper)), np.zeros(columns.shape[1] - upper.shape[0])])
@@ -152,7 +156,7 @@ def _orthonormal(columns: FloatArray, sizes: FloatArray) -> tuple[FloatArray, fl
 
 
 def gls_step(lines: list[LinearisedRun], count: int, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the step (F,) to the generalised least squares under a noise vector (7,), and its covariance (F, F)."""
+    """Return the step (F,) to the generalised least-squares estimate under a noise vector (7,), and its covariance (F, F)."""
     square, _ = whitened_products(lines, count, noise)
     inverse = covariance(square[1:, 1:])
     return inverse @ square[1:, 0], inverse
@@ -161,7 +165,7 @@ def gls_step(lines: list[LinearisedRun], count: int, noise: FloatArray) -> tuple
 def reml_noise(
     problem: Problem, lines: list[LinearisedRun], likelihood: RestrictedLikelihood, noise_kind: str, start: Noise
 ) -> tuple[Noise, float]:
-    """Return the noise of a family of highest restricted likelihood, that of the lines, and that log likelihood."""
+    """Return the noise of a kind with the highest restricted likelihood of linearised runs, and that log likelihood."""
     dynamics, residuals = [(line.damping, line.stiffness) for line in lines], [line.residual for line in lines]
     return estimate_noise(
         [line.record for line in lines],

@@ -29,15 +29,16 @@ from fieldsid.rounding import nine_digits
 MAX_SCAN_POINTS = 12
 MAX_BACKTRACKS = 4
 MAX_SETTLING_ITERATIONS, SETTLED_COST_SHARE = 4, 1e-3
-"""Iterations in which all but an event moves to where the effect leads it, and the share of the cost that each must gain."""
+"""Iterations that fit all parameters except the times of events, and the share of the cost that each must gain."""
 WEAK_START_SHARE = 0.03
-"""Coefficients of either sign are also tried at this share of their scan value: a slow ship's are far below a small vehicle's. So
-are lags and dead times: beside a dead band no first-order step from a long one leads back to one within a sample."""
+"""Coefficients of either sign are also tried at this share of their scan value: those of a slow ship are far below those of a
+small vehicle. So are lags and dead times: with a dead band, no first-order step from a long lag reaches one shorter than a
+sample."""
 EVENT_REFINEMENT = 7
-"""Points at which the time of an event is searched for between the neighbours of its best grid point."""
+"""Points of the refined grid between the neighbours of an event's best grid point."""
 MIN_COLUMN_NORM, MIN_INDEPENDENT_SHARE = 1e-9, 1e-8
 MIN_HULL_RATE_1_S = 1e-3
-"""1/s; a base model that lacks an effect may have almost no damping."""
+"""Least hull rate in 1/s: a base model that lacks an effect may have almost no damping."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +56,8 @@ class ScreenResult:
 class Linearisation:
     """A model linearised at x: its residuals (2, n), and an orthonormal basis (rows, rank) of its whitened sensitivities.
 
-    For each run also a basis of the sensitivities to its nuisances, and the sensitivities to the shared parameters (S, rows).
+    For each run it also has a basis of the sensitivities to its nuisances, and the sensitivities to the shared parameters (S,
+    rows).
     """
 
     problem: Problem
@@ -74,7 +76,7 @@ def with_effect(parent: Problem, x: FloatArray, effect: Effect, values: Mapping[
     layout = problem.layout
     start = carry_parameters(layout, (parent.layout, x), otherwise=values)
     if effect.extra_states and "damping_exponent" in layout.names:
-        # a hidden state that is missing drives the exponent far from physics, and a descent does not come back
+        # a model without the hidden state has an unphysical exponent, from which a descent does not return
         place = layout.names.index("damping_exponent")
         start[place] = np.clip(start[place], 0.0, 1.2)
     return problem, start
@@ -83,9 +85,9 @@ def with_effect(parent: Problem, x: FloatArray, effect: Effect, values: Mapping[
 def carry_parameters(
     to: ParameterLayout, *of: tuple[ParameterLayout, FloatArray], otherwise: Mapping[str, float] = MappingProxyType({})
 ) -> FloatArray:
-    """Return the vector of a layout with each parameter of the first of some layouts and vectors that has it.
+    """Return the vector of layout `to`, each parameter taken from the first of the layouts and vectors `of` that has it.
 
-    What none of them has takes the value given for its name otherwise, else its start value.
+    A parameter that none of them has takes its value from `otherwise`, else its start value.
     """
     known = {(s.name, s.run): v for layout, x in reversed(of) for s, v in zip(layout.parameters, x, strict=True)}
     return np.array([known.get((s.name, s.run), otherwise.get(s.name, s.start)) for s in to.parameters])
@@ -105,28 +107,28 @@ def under_other_speed_law(problem: Problem, x: FloatArray) -> tuple[Problem, Flo
 
 
 def under_speed_groups(problem: Problem, x: FloatArray, groups: SpeedGroups) -> tuple[Problem, FloatArray]:
-    """Return a problem with its runs' speeds taken in another way, and x carried over."""
+    """Return a problem with other speed groups, and x carried over."""
     old = problem.layout
     new = layout_of(problem.records, old.axis, old.effects, groups)
     authority = NAMES[old.axis].authority
     shared = float(x[old.names.index(authority)])
-    lifted = {group_name(authority, groups, g): shared * groups.over_reference(g) ** 2 for g in range(len(groups.speeds))}
-    return replace(problem, layout=new), carry_parameters(new, (old, x), otherwise=lifted)
+    authorities = {group_name(authority, groups, g): shared * groups.over_reference(g) ** 2 for g in range(len(groups.speeds))}
+    return replace(problem, layout=new), carry_parameters(new, (old, x), otherwise=authorities)
 
 
 def equivalent_solution(problem: Problem, x: FloatArray, effect: Effect) -> FloatArray | None:
-    """Return x at the equivalent solution of an effect, of the same response at one speed; None where there is none."""
+    """Return x at the equivalent solution of an effect, which has the same response at one speed; None where there is none."""
     layout = problem.layout
     values = dict(zip(layout.names, x[: layout.shared].tolist(), strict=True))
-    twin = None if effect.equivalent_solution is None else effect.equivalent_solution(values, layout.axis)
-    if twin is None:
+    equivalent = None if effect.equivalent_solution is None else effect.equivalent_solution(values, layout.axis)
+    if equivalent is None:
         return None
     names, start = NAMES[layout.axis], x.copy()
     for i, slot in enumerate(layout.parameters):
-        if slot.name in twin:
-            start[i] = np.clip(twin[slot.name], slot.low, slot.high)
+        if slot.name in equivalent:
+            start[i] = np.clip(equivalent[slot.name], slot.low, slot.high)
         elif slot.name.startswith(f"{names.authority}@") and values[names.authority] != 0.0:
-            start[i] *= twin.get(names.authority, values[names.authority]) / values[names.authority]
+            start[i] *= equivalent.get(names.authority, values[names.authority]) / values[names.authority]
     return start
 
 
@@ -153,7 +155,7 @@ def linearise_at(problem: Problem, x: FloatArray, noise: Noise) -> Linearisation
 def _orthonormal(columns: FloatArray) -> FloatArray:
     """Return an orthonormal basis (rows, rank) of columns (rows, k), some of which may depend on others.
 
-    Where one does, the decomposition makes up a direction for it and keeps those after it from that: it is done again without.
+    For a dependent column the decomposition returns an arbitrary direction, which spoils the later ones: it is repeated without.
     """
     size = np.linalg.norm(columns, axis=0)
     kept = columns[:, size > 0] / size[size > 0]
@@ -172,12 +174,12 @@ def screen_effect(linearisation: Linearisation, effect: Effect) -> ScreenResult:
 
 def screen_points(linearisation: Linearisation, effect: Effect) -> list[ScreenResult]:
     """Return the screen results at every point of an effect's shared scan grid, the best first."""
-    problem, begun = with_effect(linearisation.problem, linearisation.x, effect, {})
-    formed = problem.layout.effects[-1]  # beside another with a cross state it is in its variant without one
-    new, screened_points = _new_slots(problem, formed), []
+    problem, initial = with_effect(linearisation.problem, linearisation.x, effect, {})
+    variant = problem.layout.effects[-1]  # next to another effect with a cross state it is its variant without one
+    new, screened_points = _new_slots(problem, variant), []
     low, high = problem.layout.low[new], problem.layout.high[new]
-    for values in scan_points(linearisation, formed):
-        x = begun.copy()
+    for values in scan_points(linearisation, variant):
+        x = initial.copy()
         x[new] = np.clip([values.get(problem.layout.every[i], x[i]) for i in new], low, high)
         for c in effect.nuisance:
             x = _best_per_run(linearisation, problem, x, new, c)
@@ -192,8 +194,8 @@ def scan_points(linearisation: Linearisation, effect: Effect) -> list[dict[str, 
     )
     if suggested and not any(c.scan for c in effect.shared):
         return suggested
-    pace = hull_rate(linearisation.problem, linearisation.x)
-    scans = [[np.clip(v * pace**c.rate_exponent, c.low, c.high) for v in c.scan] or [_screen_value(c)] for c in effect.shared]
+    rate = hull_rate(linearisation.problem, linearisation.x)
+    scans = [[np.clip(v * rate**c.rate_exponent, c.low, c.high) for v in c.scan] or [_screen_value(c)] for c in effect.shared]
     grids = [tuple(dict.fromkeys(scan)) for scan in scans]
     points = [dict(zip([c.name for c in effect.shared], p, strict=True)) for p in product(*grids)]
     step = -(-len(points) // MAX_SCAN_POINTS)
@@ -210,9 +212,9 @@ def shifts_time(effect: Effect) -> bool:
 
 
 def _screen_value(c: Coefficient) -> float:
-    """Return where the screen takes a coefficient without a grid: zero for one of either sign, where its slope is exact.
+    """Return the value at which a coefficient without a grid is screened: zero for one of either sign, else its start value.
 
-    Its declared start is typical of a small vehicle; on a slow ship it is as wrong as a moment of the size of the heading's own.
+    The declared start is typical of a small vehicle; on a slow ship it would dominate the moments.
     """
     return 0.0 if c.low < 0.0 < c.high else c.start
 
@@ -220,7 +222,7 @@ def _screen_value(c: Coefficient) -> float:
 def hull_rate(problem: Problem, x: FloatArray) -> float:
     """Return the characteristic rate of the hull at the reference speed, 1/s, from its damping and stiffness.
 
-    Nonlinear drag may leave the linear damping near zero: then the rate that the fin's moment keeps up gives a lower bound.
+    With nonlinear drag the linear damping may be near zero: then the ratio of the fin's moment to the rate is a lower bound.
     """
     layout = problem.layout
     names, values = NAMES[layout.axis], dict(zip(layout.names, x[: layout.shared].tolist(), strict=True))
@@ -228,8 +230,8 @@ def hull_rate(problem: Problem, x: FloatArray) -> float:
     fin = np.concatenate([r.fin[r.rate_ok] for r in problem.records])
     rate = np.concatenate([r.rate[r.rate_ok] for r in problem.records])
     swing = float(np.std(rate)) if rate.size else 0.0
-    kept_up = abs(values[names.authority]) * float(np.std(fin)) / swing if swing > 0.0 else 0.0
-    return float(max(abs(values[names.damping]) + np.sqrt(abs(stiffness)), kept_up, MIN_HULL_RATE_1_S))
+    sustained = abs(values[names.authority]) * float(np.std(fin)) / swing if swing > 0.0 else 0.0
+    return float(max(abs(values[names.damping]) + np.sqrt(abs(stiffness)), sustained, MIN_HULL_RATE_1_S))
 
 
 def _new_slots(problem: Problem, effect: Effect) -> list[int]:
@@ -272,9 +274,9 @@ def _first_order(
     step = _gauss_newton_step(left, np.einsum("ij,ij->i", rows, rows)[1:])
     low, high = problem.layout.low[index], problem.layout.high[index]
     start = x.copy()
-    wished = x[index] + step
-    start[index] = np.clip(wished, low + 1e-3 * (x[index] - low), high - 1e-3 * (high - x[index]))
-    if np.any((wished < low) | (wished > high)):
+    unbounded = x[index] + step
+    start[index] = np.clip(unbounded, low + 1e-3 * (x[index] - low), high - 1e-3 * (high - x[index]))
+    if np.any((unbounded < low) | (unbounded > high)):
         step = start[index] - x[index]
     after = left[0] - step @ left[1:]
     return float(after @ after), x, start
@@ -293,8 +295,8 @@ def _gauss_newton_step(left: FloatArray, before: FloatArray) -> FloatArray:
 def backtrack(linearisation: Linearisation, screened: ScreenResult) -> ScreenResult:
     """Return a screen result with its start moved back towards the scan point until its cost is no higher than there.
 
-    An event stays at its best grid point while everything else moves to where the effect leads it: from the parent's parameters,
-    which its lack has biased, the first step of an event's time leads to another event, or to none.
+    The times of events then stay fixed while all other parameters are fitted: the parameters of the parent are biased as it lacks
+    the effect, and a step of an event's time from there may end at another event or at none.
     """
     problem, x, start = screened.problem, screened.point, screened.start
     limit = cost_of(problem, x, linearisation.noise)
@@ -321,10 +323,11 @@ def project_out(basis: FloatArray, rows: FloatArray) -> FloatArray:
 def _best_per_run(
     linearisation: Linearisation, problem: Problem, x: FloatArray, new: Sequence[int], c: Coefficient
 ) -> FloatArray:
-    """Return x with one nuisance at the best grid point of each run, under shared numbers that are equal for all runs.
+    """Return x with one nuisance at the best grid point of each run, for shared parameters that are common to all runs.
 
-    Alone, each run would choose the event that suits it best, large or small; a run without an event would still find one. The
-    time of an event is then searched for between its neighbours on the grid: a pulse of the fin is shorter than their distance.
+    With shared parameters of its own, each run would choose an event of another size, and a run without an event would find one.
+    The time of an event is then refined between its neighbours on the grid, as a pulse of the fin may be shorter than their
+    distance.
     """
     grid = c.scan or (c.start,)
     runs = range(len(linearisation.problem.records))
@@ -333,18 +336,18 @@ def _best_per_run(
     x = _at_best_points(linearisation, problem, x, new, places, np.tile(grid, (len(places), 1)))
     if not slots[places[0]].is_event or len(grid) < 2:
         return x
-    apart = grid[1] - grid[0]
-    finer = [
-        event_times(record, EVENT_REFINEMENT, max(t - apart, c.low), min(t + apart, c.high))
+    spacing = grid[1] - grid[0]
+    refined = [
+        event_times(record, EVENT_REFINEMENT, max(t - spacing, c.low), min(t + spacing, c.high))
         for record, t in zip(problem.records, x[places], strict=True)
     ]
-    return _at_best_points(linearisation, problem, x, new, places, np.array(finer))
+    return _at_best_points(linearisation, problem, x, new, places, np.array(refined))
 
 
 def _at_best_points(
     linearisation: Linearisation, problem: Problem, x: FloatArray, new: Sequence[int], places: Sequence[int], grids: FloatArray
 ) -> FloatArray:
-    """Return x with the nuisance at `places`, one a run, at the best of each run's own grid points (R, G)."""
+    """Return x with the nuisance at `places`, one for each run, at the best of the run's grid points (R, G)."""
     x = x.copy()
     shared, squares = [i for i in new if problem.layout.parameters[i].run < 0], []
     for run, (slot, grid) in enumerate(zip(places, grids, strict=True)):
@@ -355,9 +358,9 @@ def _at_best_points(
         for value in grid:
             x[slot] = value
             rows = project_out(basis, whitened_rows_of_run(linearisation, problem, x, run, [*shared, *own]))
-            first, beside = rows[: 1 + len(shared)], rows[1 + len(shared) :]
-            if beside.any():
-                left = project_out(_orthonormal(beside.T), np.concatenate([first, parent]))
+            first, of_nuisances = rows[: 1 + len(shared)], rows[1 + len(shared) :]
+            if of_nuisances.any():
+                left = project_out(_orthonormal(of_nuisances.T), np.concatenate([first, parent]))
                 squares.append(left @ left.T)
             else:
                 cross = first @ parent.T

@@ -2,7 +2,8 @@
 
 A hidden cross state is the measured rate through a first-order lag, so at each damping of a grid its moment is one more column:
     x' = -d f x - k f^2 p,  x(0) = -(k/d) f p(0)     =>     x = -k f^2 [p through 1/(s + d f), from its steady state at p(0)]
-(effects/_cross_state.py). Without it the hull's damping is that of both modes, far from either where the cross flow is strong.
+(effects/_cross_state.py). Without the column, the estimated damping is a mixture of both modes, far from either where the cross
+flow is strong.
 """
 
 from __future__ import annotations
@@ -24,18 +25,18 @@ from fieldsid.rounding import nine_digits
 
 INTEGRATION_WINDOW_S = 0.6
 FALLBACK_DAMPING, FALLBACK_STIFFNESS = 0.3, 0.0
-"""Damping in 1/s and stiffness in 1/s^2 to start from where the equation asks for an unstable vehicle."""
+"""Damping in 1/s and stiffness in 1/s^2 of the start where equation error gives an unstable vehicle."""
 MAX_GROWTH = 1e6
-"""Largest growth of a start within a record: no sensor resolves a start to a millionth, so a free run that grows more
+"""Largest growth of the initial state within a record: no sensor resolves it to a millionth, so a free run that grows more
 diverges."""
 CROSS_STATE, CROSS_DAMPINGS = ("cross_damping", "cross_rate"), 13
-"""The numbers of a cross state whose moment is the state itself, and the points of the grid of its damping: bounds a factor of a
-hundred apart, by a half each."""
+"""The coefficients of a cross state whose moment is the state itself, and the number of grid points of its damping: its bounds
+are a factor of a hundred apart, neighbours a factor of about 1.5."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Windows:
-    """The windows of all runs: columns (m, k) of the base parameters named, targets (m,), and the parameters' declared start."""
+    """The windows of all runs: columns (m, k) of the base parameters `names`, targets (m,), and the declared start values."""
 
     matrix: FloatArray
     target: FloatArray
@@ -46,23 +47,23 @@ class _Windows:
 def equation_error_start(
     records: Sequence[Record], layout: ParameterLayout, values: Mapping[str, float] = MappingProxyType({})
 ) -> FloatArray:
-    """Return a start vector with the base parameters from windowed equation error, the fin moved as the actuators then move it.
+    """Return a start vector with the base parameters from windowed equation error, with the fin as the actuator effects move it.
 
-    What is not of the base has the value given for its name, otherwise the layout's start.
+    All other parameters have their value in `values`, otherwise the start value of the layout.
     """
     windows = _windows_of(records, layout, values)
-    return windows.declared if _unusable(windows) else _plain(records, layout, windows)
+    return windows.declared if _unusable(windows) else _base_start(records, layout, windows)
 
 
 def equation_error_starts(records: Sequence[Record], layout: ParameterLayout) -> tuple[FloatArray, ...]:
-    """Return the start vectors that equation error has: without a cross state's moment, and with it where the layout has one.
+    """Return the start vectors of equation error: without a cross state, and with one where the layout has a cross state.
 
-    Noise in the rate and whatever else is missing bend the second more than the first, and it may lie far from any hull.
+    Noise of the rate and missing effects bias the second more than the first; it may be far from any real hull.
     """
     windows = _windows_of(records, layout, {})
     if _unusable(windows):
         return (windows.declared,)
-    return (_plain(records, layout, windows), *_with_cross_state(records, layout, windows))
+    return (_base_start(records, layout, windows), *_with_cross_state(records, layout, windows))
 
 
 def _windows_of(records: Sequence[Record], layout: ParameterLayout, values: Mapping[str, float]) -> _Windows:
@@ -89,19 +90,19 @@ def _windows_of(records: Sequence[Record], layout: ParameterLayout, values: Mapp
 
 
 def _unusable(windows: _Windows) -> bool:
-    """Return whether there is no least squares: too few windows, or numbers whose squares no float holds, garbage in a log."""
+    """Return whether least squares is impossible: too few windows, or values in a log whose squares overflow."""
     with np.errstate(over="ignore", invalid="ignore"):
         length = float(np.linalg.norm(windows.matrix) + np.linalg.norm(windows.target))
     return len(windows.target) < len(windows.names) or not np.isfinite(length)
 
 
-def _plain(records: Sequence[Record], layout: ParameterLayout, windows: _Windows) -> FloatArray:
+def _base_start(records: Sequence[Record], layout: ParameterLayout, windows: _Windows) -> FloatArray:
     longest = max(float(r.time[-1] - r.time[0]) for r in records)
     solution = _stable(windows.matrix, windows.target, longest, stiff=NAMES[layout.axis].stiffness is not None)
-    return _placed(layout, windows, dict(zip(windows.names, solution.tolist(), strict=True)))
+    return _start_with(layout, windows, dict(zip(windows.names, solution.tolist(), strict=True)))
 
 
-def _placed(layout: ParameterLayout, windows: _Windows, found: Mapping[str, float]) -> FloatArray:
+def _start_with(layout: ParameterLayout, windows: _Windows, found: Mapping[str, float]) -> FloatArray:
     """Return the declared start with the numbers found, within their bounds."""
     x, columns = windows.declared.copy(), [s.name for s in layout.parameters[: layout.shared]]
     for name, value in found.items():
@@ -111,9 +112,9 @@ def _placed(layout: ParameterLayout, windows: _Windows, found: Mapping[str, floa
 
 
 def _with_cross_state(records: Sequence[Record], layout: ParameterLayout, windows: _Windows) -> list[FloatArray]:
-    """Return the start whose base parameters and cross state fit the windows best together; none where the layout has no such.
+    """Return the start whose base parameters and cross state jointly fit the windows best; empty without a cross state.
 
-    Hull and cross flow may each be unstable alone, so neither's damping is held.
+    Hull and cross flow may each be unstable alone, so that neither damping is constrained.
     """
     columns = [s.name for s in layout.parameters[: layout.shared]]
     if not {*CROSS_STATE} <= {*columns} or "strip_munk" in columns:
@@ -124,11 +125,11 @@ def _with_cross_state(records: Sequence[Record], layout: ParameterLayout, window
         column = [_cross_windows(r, layout, run, float(damping)) for run, r in enumerate(records)]
         full = np.column_stack([windows.matrix, np.concatenate(column)])
         solution = _solved(full, windows.target)
-        left = nine_digits(float(np.sum((windows.target - full @ solution) ** 2)))
-        if left < least:
-            least = left
+        cost = nine_digits(float(np.sum((windows.target - full @ solution) ** 2)))
+        if cost < least:
+            least = cost
             best = dict(zip((*windows.names, CROSS_STATE[1]), solution.tolist(), strict=True)) | {CROSS_STATE[0]: float(damping)}
-    return [_placed(layout, windows, best)]
+    return [_start_with(layout, windows, best)]
 
 
 def _cross_windows(record: Record, layout: ParameterLayout, run: int, damping: float) -> FloatArray:
@@ -142,29 +143,29 @@ def _cross_windows(record: Record, layout: ParameterLayout, run: int, damping: f
     count = _window(record)
     if len(record) <= count + 2:
         return np.zeros(0)
-    return np.asarray(-(share**2) * (sums[count:] - sums[:-count])[_whole(ok, count)])
+    return np.asarray(-(share**2) * (sums[count:] - sums[:-count])[_mostly_measured(ok, count)])
 
 
 def _stable(matrix: FloatArray, target: FloatArray, length: float, *, stiff: bool) -> FloatArray:
-    """Return the least-squares solution (k,) with damping, and stiffness if any, fixed where it grows over a record of length s.
+    """Return the least-squares solution (k,), with damping or stiffness fixed where the motion would grow within `length` s.
 
-    From measurements that are late or early a stable vehicle looks unstable, and an unstable start diverges.
+    Measurements that are late or early make a stable vehicle look unstable, and a descent from an unstable start diverges.
     """
-    held: dict[int, float] = {}
+    fixed: dict[int, float] = {}
     while True:
-        rest = [i for i in range(matrix.shape[1]) if i not in held]
+        rest = [i for i in range(matrix.shape[1]) if i not in fixed]
         solution = np.zeros(matrix.shape[1])
-        solution[list(held)] = list(held.values())
+        solution[list(fixed)] = list(fixed.values())
         solution[rest] = _solved(matrix[:, rest], target - matrix @ solution)
-        if 0 not in held and solution[0] <= 0.0:
-            held[0] = FALLBACK_DAMPING
-        elif stiff and 1 not in held and _pace_of_growth(solution[0], solution[1]) * length > np.log(MAX_GROWTH):
-            held[1] = FALLBACK_STIFFNESS
+        if 0 not in fixed and solution[0] <= 0.0:
+            fixed[0] = FALLBACK_DAMPING
+        elif stiff and 1 not in fixed and _growth_rate(solution[0], solution[1]) * length > np.log(MAX_GROWTH):
+            fixed[1] = FALLBACK_STIFFNESS
         else:
             return solution
 
 
-def _pace_of_growth(damping: float, stiffness: float) -> float:
+def _growth_rate(damping: float, stiffness: float) -> float:
     """Return the real part of the fastest growing motion of y'' = -damping y' - stiffness y, 1/s."""
     return 0.5 * (float(np.sqrt(max(damping**2 - 4.0 * stiffness, 0.0))) - damping)
 
@@ -196,7 +197,7 @@ def integrated_windows(record: Record, path: FinPath, *, stiff: bool) -> tuple[F
     parts = [s[span[0]] - s[span[1]] for s in (*sums, fin, time)]
     smooth = _smoothed(rate)
     target = smooth[span[0]] - smooth[span[1]]
-    good = _whole(ok, count)
+    good = _mostly_measured(ok, count)
     block = np.column_stack([-parts[0], -parts[1] if stiff else 0 * parts[1], parts[2], parts[3]])
     return block[good], target[good]
 
@@ -223,7 +224,7 @@ def _smoothed(values: FloatArray, width: int = 5) -> FloatArray:
     return np.asarray(np.convolve(values, kernel, mode="same") / weight)
 
 
-def _whole(ok: BoolArray, count: int) -> BoolArray:
+def _mostly_measured(ok: BoolArray, count: int) -> BoolArray:
     missing = _integral((~ok).astype(float))[: ok.size]
     total = np.append(missing, missing[-1] + float(not ok[-1]))[: ok.size + 1]
     return np.asarray((total[count : ok.size] - total[: ok.size - count]) < 0.2 * count)

@@ -35,16 +35,16 @@ Fin servos follow within 0.03 to 0.3 s; hulls answer within 0.3 s (1 m) to a min
 
 
 def forward_build(problem: Problem, floor: Noise) -> FloatArray:
-    """Return the start vector of a problem's layout; the base parameters' own where it has no effects."""
+    """Return the start vector of a problem; without effects it is that of equation error."""
     layout = problem.layout
     if not layout.effects:
         return equation_error_start(problem.records, layout)
     current = problem.with_effects(())
     x = _refined(current, equation_error_start(current.records, current.layout), floor)
-    left = list(layout.effects)
-    while left:
+    remaining = list(layout.effects)
+    while remaining:
         linearisation = linearise_at(current, x, white_weights(current, x))
-        points = min((screen_points(linearisation, effect) for effect in left), key=lambda p: p[0].predicted_cost)[
+        points = min((screen_points(linearisation, effect) for effect in remaining), key=lambda p: p[0].predicted_cost)[
             :MAX_SCAN_POINTS
         ]
         effect, current = points[0].effect, points[0].problem
@@ -52,19 +52,20 @@ def forward_build(problem: Problem, floor: Noise) -> FloatArray:
         if effect.fin is not None:
             starts.append(_by_equation_error(linearisation, current, effect))
         x = _best(current, [_refined(current, start, linearisation.noise) for start in starts])
-        twin = equivalent_solution(current, x, effect)
-        if twin is not None:
-            x = _best(current, [x, _refined(current, twin, linearisation.noise)])
-        left.remove(effect)
-    anew = (_refined(problem, start, floor) for start in equation_error_starts(problem.records, layout))
-    x = _best(problem, [carry_parameters(layout, (current.layout, x)), *anew])
+        equivalent = equivalent_solution(current, x, effect)
+        if equivalent is not None:
+            x = _best(current, [x, _refined(current, equivalent, linearisation.noise)])
+        remaining.remove(effect)
+    by_equation_error = (_refined(problem, start, floor) for start in equation_error_starts(problem.records, layout))
+    x = _best(problem, [carry_parameters(layout, (current.layout, x)), *by_equation_error])
     return plausible(problem, x, floor)
 
 
 def _by_equation_error(linearisation: Linearisation, problem: Problem, effect: Effect) -> FloatArray:
-    """Return the start of least cost that equation error has at an actuator's scan points, the other effects as they are.
+    """Return the equation-error start of least cost over the scan points of an actuator effect, the other effects fixed.
 
-    Where a model without the actuator fits next to nothing its parameters are no start: no first-order step leads from there.
+    It is needed where the model without the actuator effect fits hardly at all: a first-order step from its parameters does not
+    reach the solution.
     """
     known = dict(zip(linearisation.problem.layout.names, linearisation.x.tolist(), strict=False))
     starts = (equation_error_start(problem.records, problem.layout, known | v) for v in scan_points(linearisation, effect))
@@ -72,17 +73,18 @@ def _by_equation_error(linearisation: Linearisation, problem: Problem, effect: E
 
 
 def plausible(problem: Problem, x: FloatArray, floor: Noise) -> FloatArray:
-    """Return x, or an equivalent solution with the smaller effect that the data do not exclude: a servo is faster than its hull.
+    """Return x, or an equivalent solution with a smaller effect where the data do not exclude it: servos are faster than hulls.
 
-    At one speed a lag and the hull's time constant are exchangeable but for what is nonlinear. Residuals of a model that is
-    not exact are coloured, and white weights make much of little: the two are compared under the noise that fits each best.
+    At one speed, a servo lag and the time constant of the hull can be exchanged, apart from nonlinear terms. The residuals of an
+    inexact model are coloured, and under white weights small differences look significant: the two solutions are therefore
+    compared under the noise that fits each best.
     """
     for effect in problem.layout.effects:
-        twin = equivalent_solution(problem, x, effect)
+        equivalent = equivalent_solution(problem, x, effect)
         place = problem.layout.names.index(effect.coefficients[0].name)
-        if twin is None or twin[place] >= x[place]:
+        if equivalent is None or equivalent[place] >= x[place]:
             continue
-        other = _refined(problem, twin, floor)
+        other = _refined(problem, equivalent, floor)
         if other[place] >= x[place]:
             continue
         if negative_log_likelihood(problem, other) <= negative_log_likelihood(problem, x) or (
@@ -93,7 +95,7 @@ def plausible(problem: Problem, x: FloatArray, floor: Noise) -> FloatArray:
 
 
 def coloured_log_likelihood(problem: Problem, x: FloatArray) -> float:
-    """Return the log likelihood, up to its constant, that the minimum next to x reaches under the noise its residuals show."""
+    """Return the log likelihood, up to its constant, of the minimum near x under the noise selected for its residuals."""
     part = problem.first(MAX_NOISE_SAMPLES // len(problem.records))
     noise = select_noise(part, x, white_weights(part, x))[1]
     found = levenberg_marquardt(part, x, noise, max_iterations=MAX_BUILD_ITERATIONS, tolerance=RELATIVE_COST_TOLERANCE)

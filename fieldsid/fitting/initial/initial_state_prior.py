@@ -15,10 +15,10 @@ FEWEST_SAMPLES = 5
 
 
 def initial_state_prior(problem: Problem, run: int, floor: Noise) -> GaussianPrior | None:
-    """Return the prior of a run's angle0 and rate0, None where a sensor effect stands between motion and log.
+    """Return the prior of a run's angle0 and rate0; None where the model has a sensor effect between motion and log.
 
-    The rate is the start of a line through its first second, the angle that of a line after the turn is taken out;
-    floor gives the smallest noise they can have.
+    rate0 is the initial value of a line through the first second of the rate. angle0 is that of a line through the angle less the
+    integral of the rate. `floor` is the least noise of both.
     """
     if any(e.measure is not None for e in problem.layout.effects):
         return None

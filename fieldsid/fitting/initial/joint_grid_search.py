@@ -21,13 +21,17 @@ much."""
 def joint_grid_search(square: FloatArray, low: FloatArray, high: FloatArray) -> npt.NDArray[np.intp]:
     """Return the grid points (R,) with the least total cost after one common step, within its bounds (k,).
 
-    square (R, G, 1 + k + S, 1 + k + S) are each run's products at each grid point, the parent's shared parameters last. From the
-    step that each run alone would take at each point, with the parent's shared parameters projected out of it, step and grid
-    points alternate; at last with the parent's shared parameters common to all runs, because an event at a run's start that
-    persists is to that run alone equivalent to another trim. The least cost of all these ends counts: runs that had the event all
-    along and runs that never had it change places at little cost. From each end one run's grid point after another goes to where
-    the total cost is least with a step that goes along: a step that one run alone would take, its other parameters its own, may
-    lie far from the common one, and what alternates with a step that is held ends where that lies.
+    square (R, G, 1 + k + S, 1 + k + S) are the products of each run at each grid point, with the parent's shared parameters last.
+    The search has three stages:
+    1. From the step that each run alone would take at each point, with the parent's shared parameters projected out, the common
+       step and the grid points of the runs are improved in turn.
+    2. From each result this is repeated with the parent's shared parameters common to all runs. An event that persists from the
+       start of a run is, in that run alone, equivalent to another trim.
+    3. From each result the grid point of one run after another is moved to where the total cost is least after the common step
+       has been solved for again. The single-run steps of stage 1 may be far from the common step, and an alternation with a fixed
+       step ends near the step it started from.
+    The result of the least cost is returned: runs with an event throughout and runs without any are exchanged at little cost, so
+    that there are several local minima.
     """
     alone, runs = _schur_complement(square, 1 + low.size), np.arange(square.shape[0])
     starts = _distinct(_first_least(_costs(alone, step)) for step in _single_run_steps(alone, low, high))
@@ -44,7 +48,7 @@ def joint_grid_search(square: FloatArray, low: FloatArray, high: FloatArray) -> 
 def _descend_run_by_run(
     square: FloatArray, chosen: npt.NDArray[np.intp], low: FloatArray, high: FloatArray
 ) -> npt.NDArray[np.intp]:  # fmt: skip
-    """Return the grid points (R,) from which no run's own leads to a lower total cost, the step taken anew at each."""
+    """Return grid points (R,) at which no change of one run's point lowers the total cost after the common step."""
     runs, chosen = np.arange(square.shape[0]), chosen.copy()
     for _ in range(MAX_GRID_ITERATIONS):
         before = chosen.copy()
@@ -58,7 +62,7 @@ def _descend_run_by_run(
 
 
 def _least_costs(square: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return the costs (G,) of products (G, 1 + K, 1 + K) after their own steps, their first numbers within their bounds (k,)."""
+    """Return the costs (G,) of products (G, 1 + K, 1 + K), each after its best step; its first k numbers are within bounds."""
     gram, right = square[:, 1:, 1:], square[:, 1:, 0]
     size = np.sqrt(np.einsum("gii->gi", gram))
     size[size == 0.0] = 1.0
@@ -70,7 +74,7 @@ def _least_costs(square: FloatArray, low: FloatArray, high: FloatArray) -> Float
 
 
 def _distinct(points: Iterable[npt.NDArray[np.intp]]) -> list[npt.NDArray[np.intp]]:
-    """Return grid points (R,) each once, in the order they come."""
+    """Return the distinct grid points (R,), in order of first occurrence."""
     return list({tuple(p.tolist()): p for p in points}.values())
 
 
@@ -90,27 +94,27 @@ def _costs(square: FloatArray, step: FloatArray) -> FloatArray:
 
 
 def _bounded_step(one: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return the step of products (1 + K, 1 + K), its first numbers within their bounds (k,)."""
+    """Return the Gauss-Newton step of products (1 + K, 1 + K); its first k numbers are within bounds (k,)."""
     step = solve_normal_equations(one[1:, 1:], one[1:, 0])
     step[: low.size] = np.clip(step[: low.size], low, high)
     return step
 
 
 def _single_run_steps(square: FloatArray, low: FloatArray, high: FloatArray) -> Iterator[FloatArray]:
-    """Yield the steps that single runs would take at a grid point, that of the least cost to all runs first."""
+    """Yield the steps that single runs would take at each grid point, ordered by their cost to all runs."""
     steps = [_bounded_step(one, low, high) for one in square.reshape(-1, *square.shape[2:])]
     yield from sorted(steps, key=lambda step: nine_digits(float(_costs(square, step).min(axis=1).sum())))
 
 
 def _first_least(costs: FloatArray) -> npt.NDArray[np.intp]:
-    """Return the first of each row's grid points that cost the least (R,): while a fin rests, an event's time changes nothing."""
+    """Return the first grid point of least cost in each row (R,): while the fin is at rest, many points have the same cost."""
     return np.asarray((costs <= (1.0 + COST_ROUNDING_SHARE) * costs.min(axis=1, keepdims=True)).argmax(axis=1))
 
 
 def _alternate_grid_and_step(
     square: FloatArray, chosen: npt.NDArray[np.intp], low: FloatArray, high: FloatArray
 ) -> npt.NDArray[np.intp]:  # fmt: skip
-    """Return the grid points (R,) at which the common step of all runs and each run's best grid point agree."""
+    """Return grid points (R,) that are each run's best after the common step that is the best at these points."""
     runs = np.arange(square.shape[0])
     for _ in range(MAX_GRID_ITERATIONS):
         again = _first_least(_costs(square, _bounded_step(square[runs, chosen].sum(axis=0), low, high)))

@@ -1,4 +1,4 @@
-"""Starts with one run's event, or the phase of its wave, in another basin of the cost, and other parameters a step along."""
+"""Starts with the time of one run's event, or the phase of its wave, in another basin of attraction of the cost."""
 
 from __future__ import annotations
 
@@ -19,17 +19,18 @@ from fieldsid.numerics.gram_least_squares import SINGULAR_EIGENVALUE_SHARE
 from fieldsid.rounding import nine_digits
 
 SAME_COST_SHARE = 1e-7
-"""Share of the cost within which two predictions are of one basin: while the fin rests, an event's time changes nothing."""
+"""Relative difference of predicted costs within which two minima count as one: while the fin is at rest, the time of an event
+does not change the cost."""
 
 
 def starts_at_other_times(
     problem: Problem, x: FloatArray, noise: Noise, most: int, free: Sequence[int] | None = None
 ) -> list[FloatArray]:
-    """Return up to `most` starts (N,), each with one event's time where a minimum is predicted, the least predicted cost first.
+    """Return up to `most` starts (N,), each with the time of one event at a predicted minimum, the least predicted cost first.
 
-    From each point of a grid a Gauss-Newton step of the `free` parameters (all by default) is taken, the time among them, under
-    `noise`. A minimum is predicted where the time stays between the grid's neighbours of its point, and between two neighbours
-    that lead to each other: beside an edge of the fin it is narrower than the grid.
+    From each point of a grid of times a Gauss-Newton step of the `free` parameters (all by default), including the time, is taken
+    under `noise`. A minimum is predicted where the time stays between the neighbouring grid points, and between two neighbours
+    whose steps point at each other: near an edge of the fin a minimum is narrower than the grid.
     """
     layout, runs = problem.layout, range(len(problem.records))
     low, high = x.copy(), x.copy()
@@ -60,7 +61,7 @@ def starts_at_other_times(
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """A step from a point of a grid: predicted cost, begin and end, and the side to which it goes as far as it may, else 0."""
+    """A step from a grid point: predicted cost, begin and end, and +1 or -1 where the time reaches the next neighbour, else 0."""
 
     cost: float
     begin: FloatArray
@@ -69,7 +70,7 @@ class _Step:
 
 
 def _basins(steps: Sequence[_Step]) -> Iterator[tuple[float, FloatArray]]:
-    """Yield predicted cost and start of each minimum: where a step ends, or halfway along the better of two that meet."""
+    """Yield predicted cost and start of each minimum: the end of a step, or halfway along the better of two opposed steps."""
     seen = list[float]()
     for one in steps:
         if one.side == 0 and all(abs(one.cost - cost) > SAME_COST_SHARE * cost for cost in seen):
@@ -97,7 +98,7 @@ def _products(problem: Problem, x: FloatArray, run: int, noise: Noise, free: Seq
 
 
 def _stepped(x: FloatArray, products: FloatArray, low: FloatArray, high: FloatArray) -> tuple[float, FloatArray]:
-    """Return the predicted cost after a Gauss-Newton step within bounds (N,), and where it leads."""
+    """Return the predicted cost after a Gauss-Newton step within bounds (N,), and the end of the step."""
     normal, gradient = products[1:, 1:], products[1:, 0]
     step = bounded_step(normal, gradient, SINGULAR_EIGENVALUE_SHARE, x, low, high)
     return float(products[0, 0] - 2.0 * gradient @ step + step @ normal @ step), np.clip(x + step, low, high)

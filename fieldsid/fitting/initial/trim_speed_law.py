@@ -15,27 +15,28 @@ from fieldsid.models.record import Record
 from fieldsid.noise.white_floor import white_noise_floor
 
 SPEED_SCATTER_SHARE = 0.003
-"""Share by which runs of one speed differ as measured, without that meaning anything."""
+"""Relative difference of measured speeds within which runs count as flown at one speed."""
 MIN_TRIM_LAW_ERROR_GAIN = 2.0
-"""What the product of both channels' errors must fall by for a trim that does not go with the speed as it does as a rule."""
+"""Factor by which the product of both channels' errors must fall for the unusual speed law of the trim to be taken."""
 
 
 def possible_trims(groups: SpeedGroups, *, varying: bool = False) -> tuple[bool, ...]:
-    """Return whether the trim may go with the authority, what it does as a rule first: in yaw it does and need not.
+    """Return the possible answers to whether the trim scales with the authority, the usual one first.
 
-    In pitch a moment that goes with the speed is an effect of its own. At one speed nothing tells, unless the runs miss it by
-    more than a speed sensor does, or an effect lets the authority vary within a run.
+    In yaw it usually does but need not; in pitch a moment that depends on the speed is an effect. At one speed only the usual
+    answer is returned, unless the speeds of the runs differ by more than a speed sensor's error (or `varying`: an effect lets the
+    authority vary within a run).
     """
     return (True, False) if groups.trim_of_fin and (varying or speeds_differ_in_group(groups)) else (groups.trim_of_fin,)
 
 
 def speeds_differ_in_group(groups: SpeedGroups) -> bool:
-    """Whether the runs were flown at speeds that differ by more than they do as measured."""
+    """Whether the speeds of the runs differ by more than the error of their measurement."""
     return float(np.ptp(groups.run_speeds)) > SPEED_SCATTER_SHARE * groups.speeds[groups.reference]
 
 
 def groups_by_trim(records: Sequence[Record]) -> SpeedGroups:
-    """Return the speed groups of records with the trim's law under which the base model's free run errs least."""
+    """Return the speed groups of records, with the speed law of the trim under which the base model has the least error."""
     usual = speed_groups(records)
     trims = possible_trims(usual)
     if len(trims) == 1:

@@ -22,8 +22,8 @@ MAX_LM_ITERATIONS = 40
 INITIAL_DAMPING = 1e-4
 MAX_DAMPING = 1e9
 MAX_RELATIVE_LAST_STEP = 0.1
-"""Largest relative change of a parameter in a last step that is not evaluated: a parameter that the data hardly determine would
-be moved far for almost no gain, to where the linearisation no longer holds."""
+"""Largest relative change of a parameter in a last step whose cost is not evaluated: a parameter that the data hardly determine
+would move far for almost no gain, out of the range of the linearisation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class GaussianPrior:
     precision: FloatArray
 
     def cost(self, x: FloatArray) -> float:
-        """Return the sum of squares it adds at x."""
+        """Return the sum of squares that the prior adds at x."""
         return float(self.precision @ (x - self.centre) ** 2)
 
 
@@ -42,7 +42,7 @@ class GaussianPrior:
 class Minimum:
     """The minimum found: vector (N,), weighted sum of squares, and its normal matrix (F, F) over the `free` parameters.
 
-    The sum is infinite where the motion at the start grows without bound: then the vector is the start.
+    Where the motion at the start grows without bound, the sum of squares is infinite and the vector is the start.
     """
 
     x: FloatArray
@@ -67,7 +67,7 @@ def dynamics_of(problem: Problem, x: FloatArray) -> list[tuple[float, float]]:
 def cost_of(problem: Problem, x: FloatArray, noise: Noise, dynamics: Dynamics | None = None) -> float:
     """Return the whitened sum of squares at x, infinite where the motion diverges or an effect refuses its values.
 
-    dynamics are those that the noise is whitened through, by default the ones at x.
+    dynamics are those of the whitening filter, by default the ones at x.
     """
     total = 0.0
     for run, record in enumerate(problem.records):
@@ -124,20 +124,20 @@ def levenberg_marquardt(
 ) -> Minimum:  # fmt: skip
     """Return the minimum of the whitened sum of squares that a start x converges to.
 
-    Residuals are whitened through the dynamics at the start throughout: the sum of squares without the determinant of the noise
-    covariance would otherwise be lowered by dynamics that make the noise look larger. `damping` is that of the first step, small
-    where x is near the minimum. A parameter at a bound whose gradient points outward is fixed for the step; so are the times of
-    events after a step that was refused, where the others alone promise to lower the cost. Source:
+    The residuals are always whitened with the dynamics at the start: as the sum of squares lacks the determinant of the noise
+    covariance, it could otherwise be lowered by dynamics that make the noise look larger. `damping` is that of the first step,
+    small where x is near the minimum. A parameter at a bound whose gradient points outward is fixed for the step. After a refused
+    step the times of events are fixed too, where a step of the other parameters promises to lower the cost. Source:
     Levenberg-Marquardt with Marquardt's scaling and projected bounds (Nocedal and Wright 2006, section 10.3).
     """
     slots = tuple(range(len(x)) if free is None else free)
     low, high = problem.layout.low[list(slots)], problem.layout.high[list(slots)]
     index, x = list(slots), x.copy()
     x[index] = np.clip(x[index], low, high)
-    hill = _Objective(problem, noise, slots, dynamics_of(problem, x), prior, linear_white(problem, noise, slots))
-    cost, normal, gradient = hill.linear(x)
+    objective = _Objective(problem, noise, slots, dynamics_of(problem, x), prior, linear_white(problem, noise, slots))
+    cost, normal, gradient = objective.linear(x)
     done, fell, fell_before, count = False, True, True, 0
-    # beside an edge of the fin the cost has a kink in an event's time: no step of all parameters leads along it
+    # near an edge of the fin the cost has a kink in the time of an event, along which no step of all parameters makes progress
     events, hold = np.array([problem.layout.parameters[i].is_event for i in slots], dtype=bool), False
     every, dampings = np.full(len(slots), True), np.full(len(slots), damping)
     while count < max_iterations and not done and np.isfinite(cost):
@@ -154,21 +154,21 @@ def levenberg_marquardt(
             and (dampings <= INITIAL_DAMPING).all()
             and (np.abs(moved) <= MAX_RELATIVE_LAST_STEP * np.abs(x[index])).all()
         ):
-            # no step was refused: where so little is left to gain it is there, and nobody need look
+            # no step was refused and almost nothing is left to gain: the last step is taken without evaluating its cost
             x, cost, done = trial, cost - expected, True
             break
-        # in a bent valley every second step is refused, elsewhere hardly any: the cost falls where it fell two steps before, and
-        # there the equations come with it
-        new, equations = hill.at(trial, whole=fell_before and expected > tolerance * cost)
+        # in a curved valley every second step is refused, elsewhere hardly any: where the cost fell two steps before it is
+        # expected to fall again, and the normal equations are computed together with the cost
+        new, equations = objective.at(trial, with_equations=fell_before and expected > tolerance * cost)
         fell, fell_before = new < cost, fell
         if fell:
             done = cost - new <= tolerance * cost or expected <= tolerance * cost
             x, hold = trial, False
             dampings[stepped] = np.maximum(dampings[stepped] * (0.1 if new < cost - 0.5 * expected else 1.0), 1e-12)
-            if equations is None and done and (hill.long or _at_rest(dampings, cost - new, tolerance * cost)):
+            if equations is None and done and (objective.long or _at_rest(dampings, cost - new, tolerance * cost)):
                 cost = new
                 break
-            cost, normal, gradient = hill.linear(x) if equations is None else (new, *equations)
+            cost, normal, gradient = objective.linear(x) if equations is None else (new, *equations)
         else:
             done = abs(expected) <= tolerance * cost
             hold = not hold and bool(events.any())
@@ -186,7 +186,7 @@ def _stepped(
     dampings: FloatArray,
     bounds: tuple[FloatArray, FloatArray],
 ) -> tuple[FloatArray, float]:
-    """Return where a step of the parameters at `index` leads, and the fall of the cost that the normal equations promise."""
+    """Return x after a step of the parameters at `index`, and the decrease of the cost that the normal equations predict."""
     low, high = bounds
     trial = x.copy()
     trial[index] = np.clip(x[index] + bounded_step(normal, gradient, dampings, x[index], low, high), low, high)
@@ -194,9 +194,9 @@ def _stepped(
     return trial, float(2 * gradient @ moved - moved @ normal @ moved)
 
 
-def _at_rest(dampings: FloatArray, gained: float, worth: float) -> bool:
-    """Whether a step gained so little that the normal equations before it are those after it."""
-    return bool((dampings <= INITIAL_DAMPING).all()) and gained <= 1e-3 * worth
+def _at_rest(dampings: FloatArray, gained: float, least_gain: float) -> bool:
+    """Whether a step gained so little that the normal equations need not be computed again after it."""
+    return bool((dampings <= INITIAL_DAMPING).all()) and gained <= 1e-3 * least_gain
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,13 +206,13 @@ class _Objective:
     problem: Problem
     noise: Noise
     free: tuple[int, ...]
-    held: Dynamics
+    whitening: Dynamics
     prior: GaussianPrior | None
     lean: LinearWhite | None
 
     @property
     def long(self) -> bool:
-        """Whether the normal equations are dear: those of one step before the end then stand for those at the end."""
+        """Whether the normal equations are costly: those before the last step are then used for the minimum."""
         return is_chunked(self.problem, self.noise)
 
     def linear(self, x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
@@ -222,26 +222,26 @@ class _Objective:
         elif is_chunked(self.problem, self.noise):
             cost, normal, gradient = chunked_normal_equations(self.problem, x, self.noise, self.free)
         else:
-            cost, normal, gradient, _ = normal_equations(self.problem, x, self.noise, self.free, self.held)
+            cost, normal, gradient, _ = normal_equations(self.problem, x, self.noise, self.free, self.whitening)
         if self.prior is None:
             return cost, normal, gradient
         index = list(self.free)
         pull = self.prior.precision * (self.prior.centre - x)
         return cost + self.prior.cost(x), normal + np.diag(self.prior.precision[index]), gradient + pull[index]
 
-    def at(self, x: FloatArray, *, whole: bool) -> tuple[float, tuple[FloatArray, FloatArray] | None]:
-        """Return the cost at x, with the normal equations where they are wanted or come with it."""
-        if self.lean is not None or (whole and not self.long):
+    def at(self, x: FloatArray, *, with_equations: bool) -> tuple[float, tuple[FloatArray, FloatArray] | None]:
+        """Return the cost at x, and the normal equations where they are wanted or computed anyway."""
+        if self.lean is not None or (with_equations and not self.long):
             try:
                 cost, normal, gradient = self.linear(x)
             except EffectError:
                 return float("inf"), None
             return cost, (normal, gradient)
-        return cost_of(self.problem, x, self.noise, self.held) + (0.0 if self.prior is None else self.prior.cost(x)), None
+        return cost_of(self.problem, x, self.noise, self.whitening) + (0.0 if self.prior is None else self.prior.cost(x)), None
 
 
 def covariance(normal: FloatArray) -> FloatArray:
-    """Return the inverse of a normal matrix, computed in its own scale; a direction without information is infinite."""
+    """Return the inverse of a normal matrix, computed with unit diagonal; without information a variance is very large."""
     scale, values, vectors, floor = _directions(normal)
     inverse = (vectors / np.maximum(values, floor)) @ vectors.T
     return np.asarray(inverse / np.outer(scale, scale))
@@ -250,9 +250,9 @@ def covariance(normal: FloatArray) -> FloatArray:
 def sandwich(normal: FloatArray, centre: FloatArray) -> FloatArray:
     """Return N^-1 C N^-1 of a normal matrix and a centre C, as the square of a root: a covariance of any conditioning.
 
-    The centre is taken into the directions of N first, where it is the noise's power over that of the weights: multiplied out
-    as it stands, the rounding of C would be raised by the square of what a direction lacks in information, above its own
-    variance or below zero. In a direction without any, the noise is taken to be the strongest of the others'.
+    C is first transformed to the eigenvectors of N, where its diagonal is the power of the noise relative to the weights. In the
+    direct product, the rounding errors of C would be multiplied by the squared condition number of N, and a variance might become
+    negative. In a direction without information, the largest relative power of the other directions is used.
     """
     scale, values, vectors, floor = _directions(normal)
     root, known = vectors / np.sqrt(np.maximum(values, floor)), values > floor
@@ -265,8 +265,8 @@ def sandwich(normal: FloatArray, centre: FloatArray) -> FloatArray:
 
 
 def _directions(normal: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Return a normal matrix's scale (F,), its eigenvalues and eigenvectors in that, and the least information there can be."""
-    # not smaller: the inverse of a direction without information must stay a number
+    """Return the scale (F,) of a normal matrix, eigenvalues and eigenvectors of the scaled matrix, and the least eigenvalue."""
+    # the least eigenvalue keeps the inverse finite in a direction without information
     if not bool(np.isfinite(normal).all()):
         raise DivergenceError(
             "the fit came to sensitivities that are no numbers", found="the model grows beyond all bounds on this run",
