@@ -12,5 +12,5 @@ ComplexArray = npt.NDArray[np.complex128]
 
 
 def known(value: float | None) -> float:
-    """Return a number as it was before it was written: NaN is written as nothing."""
+    """Return a number read from a file, NaN for None, as which NaN is written."""
     return float("nan") if value is None else float(value)

@@ -1,4 +1,4 @@
-"""Means over successive blocks of samples: white noise falls with the root of a block's length, slow motion and colour stay."""
+"""Means over successive blocks of samples: they reduce white noise by the root of the block length, but not slow motion."""
 
 from __future__ import annotations
 
@@ -14,5 +14,5 @@ def block_means(values: FloatArray, width: int) -> FloatArray:
 
 
 def block_width(steps: FloatArray, seconds: float) -> int:
-    """Return the samples of a block of so many seconds, at least one; steps (n-1,) are the times between samples, in s."""
+    """Return the number of samples in a block of `seconds`, at least one; steps (n-1,) are the sampling intervals in s."""
     return max(1, round(seconds / float(np.median(steps))))

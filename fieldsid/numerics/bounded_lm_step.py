@@ -1,4 +1,4 @@
-"""One Levenberg-Marquardt step within bounds, for whoever climbs or descends with normal equations."""
+"""One Levenberg-Marquardt step within bounds, from normal equations."""
 
 from __future__ import annotations
 
@@ -12,12 +12,11 @@ from fieldsid.numerics.arrays import FloatArray
 def bounded_step(
     normal: FloatArray, gradient: FloatArray, damping: float | FloatArray, x: FloatArray, low: FloatArray, high: FloatArray
 ) -> FloatArray:
-    """Return the step (F,) from a normal matrix (F, F) and the gradient (F,) that points where to go.
+    """Return the step (F,) from a normal matrix (F, F) and the gradient (F,) in the direction of improvement.
 
-    damping, one for all or one for each (F,), is relative to the normal matrix's diagonal. What is at its bound and would leave
-    it, or carries no information, stays; what would cross its bound goes just there, and the rest makes the best of that.
-    Raises DivergenceError where the equations hold what is no number: there is nowhere to go.
-    Source: Marquardt 1963, SIAM J. 11(2).
+    damping, one number or (F,), is relative to the diagonal of the normal matrix. A parameter does not move where it is at a
+    bound and would leave it, or has no information. One that would cross a bound stops there, and the others are solved for given
+    that. Raises DivergenceError where the equations are not finite. Source: Marquardt 1963, SIAM J. 11(2).
     """
     diagonal = normal.diagonal()
     scale = np.sqrt(np.maximum(diagonal, 1e-30))
@@ -29,8 +28,8 @@ def bounded_step(
         if free.all():
             step = _solved(scaled, gradient / scale) / scale
         else:
-            wish = (gradient[free] - normal[free][:, ~free] @ step[~free]) / scale[free]
-            step[free] = _solved(scaled[free][:, free], wish) / scale[free]
+            target = (gradient[free] - normal[free][:, ~free] @ step[~free]) / scale[free]
+            step[free] = _solved(scaled[free][:, free], target) / scale[free]
         end = x + step
         if not np.isfinite(end).all():
             raise DivergenceError(

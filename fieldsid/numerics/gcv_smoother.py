@@ -1,12 +1,12 @@
-"""A measured helper signal without its noise: a penalised least-squares smoother that finds its own bandwidth.
+"""Smoothing of a measured helper signal: a penalised least-squares smoother with its bandwidth by cross-validation.
 
     min_z  sum_i w_i (v_i - z_i)^2 + (T/h)^4 sum_i (z_(i-1) - 2 z_i + z_(i+1))^2
-which passes what is slower than T and leaves out what is faster, without phase. T is the one of least generalised
-cross-validation error; the trace of the smoother comes from one random vector of fixed seed.
-What is known to move the signal may be given as columns: the smoother then only has to follow what they leave, unless that
-validates worse than chance, and passes less noise.
-Sources: Whittaker 1923, On a new method of graduation; Craven and Wahba 1979; Girard 1989, Numer. Math. 56 (the trace);
-Green and Silverman 1994, Nonparametric Regression and Generalized Linear Models, chapter 4 (columns beside a smoother).
+which is a low-pass filter of time constant T without phase. T has the least generalised cross-validation error; the trace of the
+smoother is estimated with one random vector of fixed seed. Signals that are known to explain the signal may be given as columns:
+the smoother is then applied to the residual of a regression on them, and passes less noise, unless its cross-validation error is
+larger by more than chance. Sources: Whittaker 1923, On a new method of graduation; Craven and Wahba 1979; Girard 1989, Numer.
+Math. 56 (the trace); Green and Silverman 1994, Nonparametric Regression and Generalized Linear Models, chapter 4 (columns in
+addition to a smoother).
 """
 
 from __future__ import annotations
@@ -22,28 +22,28 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.white_noise import MEDIAN_OF_NORMAL
 
 LONGEST_TIME_CONSTANT_S = 10.0
-"""Largest T; what changes more slowly than that over a run is no noise of a sensor."""
+"""Largest T; slower changes over a run are not sensor noise."""
 FEWEST_SAMPLES = 8
-"""Measured samples below which a signal is left as it is."""
+"""Measured samples below which a signal is not smoothed."""
 LONGEST_HELD_VALUE_S = 1.0
-"""A value repeated for no longer than this was held by the log until the sensor's next one."""
+"""Longest time over which a log repeats a value of the sensor until the next one."""
 MEDIAN_WIDTH, OUTLIER_SPREADS, OUTLIER_RANGE_SHARE = 9, 8.0, 0.1
-"""Values a running median is taken over; spreads, and share of the signal's own range, beyond which one is wild."""
+"""Width of the running median; and the distance from it, in spreads and as a share of the signal's range, of an outlier."""
 CHANCE_GAIN_SAMPLES = 12.0
-"""Samples' worth of noise that two smoothers' errors differ by by chance: what is known to move a signal is left out beyond."""
+"""Difference of two smoothers' errors by chance, in samples of noise: columns that validate worse by more are not used."""
 ROUNDING_SHARE = 1e-9
-"""Share of its size that no sensor resolves: a signal that is straight but for that has no noise, only rounding."""
+"""Relative deviation from a straight line below which a signal has no noise but only rounding errors."""
 MAX_SELECTION_SAMPLES = 20_000
-"""Samples from whose first part a longer signal's T is found, and which columns it goes with."""
+"""Number of first samples from which T and the columns of a longer signal are selected."""
 
 
 def gcv_smooth(
-    time: FloatArray, values: FloatArray, *, fastest_s: float = 0.0, beside: Iterable[FloatArray] | None = None
+    time: FloatArray, values: FloatArray, *, fastest_s: float = 0.0, regressors: Iterable[FloatArray] | None = None
 ) -> FloatArray:  # fmt: skip
-    """Return a signal (n,) without its noise and its gaps (NaN), at times (n,) s; T is at least `fastest_s` s.
+    """Return a signal (n,) at times (n,) s smoothed and with its gaps (NaN) filled; T is at least `fastest_s` s.
 
-    Values that a log repeats until the sensor's next one count once, and wild ones not at all. `beside` are rival sets of
-    columns (n, k), made as they are asked for, that the signal may be a sum of, but for what is smoothed.
+    Values that a log repeats until the next one of the sensor count once, and outliers not at all. `regressors` are alternative
+    sets of columns (n, k), evaluated lazily: the signal may be a linear combination of one set plus a smooth residual.
     """
     ok = np.isfinite(values)
     full = np.interp(time, time[ok], values[ok])
@@ -58,9 +58,12 @@ def gcv_smooth(
         return full
     weight, part = seen.astype(np.float64), slice(0, MAX_SELECTION_SAMPLES)
     trends = [(line, 0)]
-    if beside is not None:
-        # of all that is left beside the columns of each set, not of its slow part alone: sets differ in little else
-        best = min(beside, key=lambda columns: _left(np.column_stack([straight[part], columns[part]]), full[part], seen[part]))
+    if regressors is not None:
+        # by the full residual of each set and not by its slow part alone, in which the sets hardly differ
+        best = min(
+            regressors,
+            key=lambda columns: _residual_squares(np.column_stack([straight[part], columns[part]]), full[part], seen[part]),
+        )
         trends.append((_fitted(np.column_stack([straight, best]), full, seen), best.shape[1]))
     stiffnesses, found = _stiffnesses(step, fastest_s), []
     for trend, spent in trends:
@@ -71,29 +74,31 @@ def gcv_smooth(
 
 
 def _fitted(columns: FloatArray, values: FloatArray, seen: npt.NDArray[np.bool_]) -> FloatArray:
-    """Return the least-squares sum (n,) of columns (n, k) to values (n,) where seen."""
+    """Return the least-squares fit (n,) of columns (n, k) to the values (n,) at samples `seen`."""
     size = np.linalg.norm(columns[seen], axis=0)
     scaled = columns / np.where(size > 0.0, size, 1.0)
     return np.asarray(scaled @ np.linalg.lstsq(scaled[seen], values[seen], rcond=1e-9)[0])
 
 
-def _left(columns: FloatArray, values: FloatArray, seen: npt.NDArray[np.bool_]) -> float:
-    """Return the sum of squares that the least-squares sum of columns (n, k) leaves of values (n,) where seen."""
+def _residual_squares(columns: FloatArray, values: FloatArray, seen: npt.NDArray[np.bool_]) -> float:
+    """Return the residual sum of squares of the least-squares fit of columns (n, k) to the values (n,) at samples `seen`."""
     return float(np.sum((values - _fitted(columns, values, seen))[seen] ** 2))
 
 
 def _is_new_value(values: FloatArray, ok: npt.NDArray[np.bool_], step: float) -> npt.NDArray[np.bool_]:
-    """Return the samples that bring something new: all that were measured, or the first of each where values are held."""
+    """Return the samples with new values: all that were measured, or the first of each where the log repeats values."""
     first = np.concatenate([[True], values[1:] != values[:-1]])
     lengths = np.diff(np.append(np.flatnonzero(first), values.size))
-    held = lengths.size > 1 and float(np.mean(lengths)) > 1.5 and float(np.percentile(lengths, 90)) * step <= LONGEST_HELD_VALUE_S
-    return ok & first if held else ok
+    repeats = (
+        lengths.size > 1 and float(np.mean(lengths)) > 1.5 and float(np.percentile(lengths, 90)) * step <= LONGEST_HELD_VALUE_S
+    )
+    return ok & first if repeats else ok
 
 
 def _is_outlier(values: FloatArray) -> npt.NDArray[np.bool_]:
-    """Return the values far from the running median, for their own noise and for all that the signal does.
+    """Return the values that are far from the running median, relative to the noise and to the range of the signal.
 
-    A step or a slow swing is its own median.
+    The median follows a step or a slow swing.
     """
     around = sliding_window_view(np.pad(values, MEDIAN_WIDTH // 2, mode="edge"), MEDIAN_WIDTH)
     off = np.abs(values - np.median(around, axis=1))
@@ -102,7 +107,7 @@ def _is_outlier(values: FloatArray) -> npt.NDArray[np.bool_]:
 
 
 def _stiffnesses(step: float, fastest_s: float) -> FloatArray:
-    """Return (T/h)^4 for T from next to nothing, or the fastest allowed, to the slowest."""
+    """Return (T/h)^4 for T from 0.3 steps, or the fastest allowed, to the slowest."""
     shortest = max(0.3 * step, fastest_s)
     count = max(1, int(np.ceil(np.log2(LONGEST_TIME_CONSTANT_S / shortest) * 1.5)) + 1)
     return np.asarray((np.geomspace(shortest, max(LONGEST_TIME_CONSTANT_S, shortest), count) / step) ** 4)
@@ -113,7 +118,7 @@ def _best_stiffness(
 ) -> tuple[float, float]:  # fmt: skip
     """Return the stiffness of least generalised cross-validation error, and that error.
 
-    `spent` are the columns that were fitted before, besides the straight line's, which the smoother passes itself.
+    `spent` is the number of columns fitted before, without those of the straight line, which the smoother passes anyway.
     """
     probe = np.random.default_rng(0).choice([-1.0, 1.0], values.size)
     sides = np.column_stack([weight * values, weight * probe])

@@ -1,4 +1,4 @@
-"""Least squares of many rows and few columns, from the columns' products: a hundredth of a decomposition's time."""
+"""Least squares of many rows and few columns from the normal equations, a hundred times faster than by a decomposition."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from scipy.linalg.lapack import dposv
 from fieldsid.numerics.arrays import FloatArray
 
 SINGULAR_EIGENVALUE_SHARE = 1e-12
-"""Share of the largest product's eigenvalue below which a combination of columns counts as zero."""
+"""Eigenvalue of the Gram matrix, relative to the largest, below which a combination of columns counts as zero."""
 INDEPENDENT_PIVOT = SINGULAR_EIGENVALUE_SHARE**0.25
-"""Pivot of a column of length one, its part that is not of those before it, from which on no combination comes near to zero."""
+"""Least Cholesky pivot, with columns of unit length, at which all combinations of columns are certainly far from zero."""
 
 
 def gram_least_squares(columns: FloatArray, target: FloatArray) -> FloatArray:
-    """Return the least-squares coefficients (k,) of rows `columns` (k, m) for a target (m,), the smallest where many do.
+    """Return the least-squares coefficients (k,) of rows `columns` (k, m) for a target (m,), of minimum norm if not unique.
 
-    Half of the digits are lost: enough where the answer is only a step or a score.
+    The normal equations halve the number of significant digits, which is enough for a step or a score.
     """
     return solve_normal_equations(columns @ columns.T, columns @ target)
 
 
 def solve_normal_equations(gram: FloatArray, right: FloatArray) -> FloatArray:
-    """Return the solution (k,) of normal equations, products of the columns (k, k) and of columns and target (k,)."""
+    """Return the solution (k,) of normal equations with the Gram matrix (k, k) and the products of columns and target (k,)."""
     size = np.sqrt(np.maximum(gram.diagonal(), 0.0))
     size[size == 0.0] = 1.0
-    unit, wish = gram / size / size[:, None], right / size
-    factor, solution, failed = dposv(unit, wish)
+    unit, scaled = gram / size / size[:, None], right / size
+    factor, solution, failed = dposv(unit, scaled)
     if failed or not factor.diagonal().min(initial=1.0) > INDEPENDENT_PIVOT:
-        solution = np.linalg.lstsq(unit, wish, rcond=SINGULAR_EIGENVALUE_SHARE)[0]
+        solution = np.linalg.lstsq(unit, scaled, rcond=SINGULAR_EIGENVALUE_SHARE)[0]
     return np.asarray(solution / size)

@@ -1,10 +1,10 @@
 """The typed interface to numba: `@jit` compiles a function once and caches it on disk, `@inner` marks what it calls.
 
-A cache is code that is run. It is the user's own, and no file of the working folder says where it is: by itself numba reads
-`.numba_config.yaml` there, which a folder from somebody else may hold.
+A cache is code that will be executed. It is therefore in a folder of the user, and no file of the working folder may redirect it:
+numba by default reads `.numba_config.yaml` there, which may come from somebody else.
 
-On a vehicle's computer without numba functions stay plain Python: the online estimate needs 31 us a sample then. Fits of whole
-logs would take minutes.
+On a vehicle's computer without numba, functions stay plain Python: the online estimate then needs 31 us for a sample. Fits of
+entire logs would take minutes.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def jit(function: Callable[P, R]) -> Callable[P, R]:
         return function
     numba = _numba()
     given = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = given or cache_folder()  # looked at here alone: what a caller compiles is kept where it was
+    numba.config.CACHE_DIR = given or cache_folder()  # numba reads it here only; the caller's functions keep their cache
     try:
         return cast("Callable[P, R]", numba.njit(cache=True, error_model="numpy", no_cfunc_wrapper=True)(function))
     finally:
@@ -39,12 +39,12 @@ def jit(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def inner(function: Callable[P, R]) -> Callable[P, R]:
-    """Return the function as it is, which functions of `jit` may call, compiled with them; called from Python it is plain."""
+    """Return the function, which functions of `jit` may call and compile in; called from Python it stays plain Python."""
     return _callable_when_compiled(function, forceinline=False)
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
-    """Return the function as `inner` does, put into what calls it: what a caller does not take of its result is not computed."""
+    """Return the function as `inner` does, inlined into its callers: results that a caller ignores are not computed."""
     return _callable_when_compiled(function, forceinline=True)
 
 
@@ -56,9 +56,9 @@ def _callable_when_compiled(function: Callable[P, R], *, forceinline: bool) -> C
 
 
 def cache_folder() -> str:
-    """Return the folder of what is compiled, among what the user's programs keep; empty, which numba takes for its own choice.
+    """Return the folder of compiled code in the user's cache folder; empty, for numba's default, where there is none.
 
-    The variable NUMBA_CACHE_DIR, where it is set, says another one.
+    The variable NUMBA_CACHE_DIR takes precedence where it is set.
     """
     places = (os.environ.get("XDG_CACHE_HOME", ""), os.environ.get("LOCALAPPDATA", ""), os.path.expanduser("~/.cache"))  # noqa: PTH111
     place = next((p for p in places if os.path.isabs(p)), "")  # noqa: PTH117 - a relative one is one of the working folder
@@ -67,17 +67,17 @@ def cache_folder() -> str:
 
 @cache
 def _numba() -> Any:
-    """Return numba, which then takes no settings from the working folder: it reads them with a library that it does not find."""
+    """Return numba, imported while `yaml` is hidden: without that library it cannot read settings from the working folder."""
     modules = cast("dict[str, Any]", sys.modules)
-    held = {"yaml": modules["yaml"]} if "yaml" in modules else {}
+    hidden = {"yaml": modules["yaml"]} if "yaml" in modules else {}
     modules["yaml"] = None
-    warnings.filterwarnings("ignore", "A Numba config file is found")  # said at each function that is compiled
+    warnings.filterwarnings("ignore", "A Numba config file is found")  # it is issued for each function that is compiled
     try:
         numba = import_module("numba")
         import_module("numba.extending")
     finally:
         del modules["yaml"]
-        modules.update(held)
+        modules.update(hidden)
     return numba
 
 
@@ -87,14 +87,14 @@ def plain_of(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def is_loaded(function: Callable[..., object]) -> bool:
-    """Whether a function needs nothing more before it runs: it has run in this process, or is plain Python."""
+    """Whether a function runs without compiling or loading: it has run in this process, or is plain Python."""
     return not hasattr(function, "py_func") or bool(cast("Any", function).signatures)
 
 
 def warmup_marker(functions: Sequence[Callable[..., object]]) -> Path:
     """Return the file, in numba's cache folder, that exists once all of these functions are compiled on this machine.
 
-    Its name changes with what numba compiles anew for: the source files, numba's and Python's version, the processor.
+    Its name depends on all that makes numba compile again: the source files, the versions of numba and Python, the processor.
     """
     parts = [_numba().__version__, sys.version, import_module("llvmlite.binding").get_host_cpu_name()]
     for source in sorted({cast("Any", f).py_func.__code__.co_filename for f in functions}):

@@ -1,4 +1,4 @@
-"""Are series white? The Ljung-Box statistic, pooled over runs, and its chi-square tail; and what those are worth that are not."""
+"""Whiteness of series: the Ljung-Box statistic, pooled over runs, with its p-value; and the samples for each independent one."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from fieldsid.numerics.tail_probabilities import chi_square_tail
 
 LJUNG_BOX_LAGS = 20
 FEWEST_SAMPLES = 4 * LJUNG_BOX_LAGS
-"""Samples below which a series says nothing."""
+"""Samples below which a series is left out of the test."""
 MIN_WHITENESS_P = 0.01
 
 
 def ljung_box(e: FloatArray) -> float:
-    """Return the Ljung-Box statistic of a series over LAGS lags (chi-square with LAGS degrees when white)."""
+    """Return the Ljung-Box statistic over LJUNG_BOX_LAGS lags; chi-square with as many degrees of freedom for a white series."""
     n = e.size
     centred = e - e.mean()
     power = float(centred @ centred)
@@ -27,16 +27,16 @@ def ljung_box(e: FloatArray) -> float:
 
 
 def ljung_box_p(series: Iterable[FloatArray]) -> float:
-    """Return the p-value of several series being white, their statistics summed; one where all are too short to say."""
-    told = [ljung_box(e) for e in series if e.size >= FEWEST_SAMPLES]
-    return chi_square_tail(sum(told), LJUNG_BOX_LAGS * len(told)) if told else 1.0
+    """Return the p-value of several series being white, from the sum of their statistics; one where all are too short."""
+    statistics = [ljung_box(e) for e in series if e.size >= FEWEST_SAMPLES]
+    return chi_square_tail(sum(statistics), LJUNG_BOX_LAGS * len(statistics)) if statistics else 1.0
 
 
 MAX_RHO = 0.98
 
 
 def inflation(parts: Sequence[FloatArray]) -> float:
-    """Return how many residuals, in parts of (n,) each, hold one independent one: (1 + rho) / (1 - rho)."""
+    """Return the number of residuals, in parts of (n,) each, for each independent one: (1 + rho) / (1 - rho)."""
     power = sum(float(p @ p) for p in parts)
     rho = min(max(sum(float(p[1:] @ p[:-1]) for p in parts) / max(power, 1e-30), 0.0), MAX_RHO)
     return (1.0 + rho) / (1.0 - rho)

@@ -1,6 +1,6 @@
-"""The correlation of two signals: their slope, and at many shifts at once.
+"""The correlation of two signals at many shifts at once, and the slope of one on the other.
 
-Block by block through the Fourier transform: n log n operations for all shifts, and memory for one block.
+It is computed block by block by the Fourier transform: n log n operations for all shifts, and memory for one block.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from fieldsid.numerics.arrays import FloatArray
 
 BLOCK_SAMPLES = 1 << 15
 ROUNDING_SHARE = 1e-12
-"""Share of a signal's power below which what is left of it at a shift cannot be distinguished from the rounding of its sums."""
+"""Share of a signal's power below which the variance of its part at a shift is no more than the rounding error of its sums."""
 
 
 def shifted_correlations(a: FloatArray, b: FloatArray, reach: int) -> FloatArray:
-    """Return the correlation (2 reach + 1,) of a[i + k] with b[i] for k = -reach .. reach, of the samples both have.
+    """Return the correlation (2 reach + 1,) of a[i + k] with b[i] for k = -reach .. reach, over the overlapping samples.
 
     a, b: (n,) without gaps, n > reach. 0 where one of them is constant.
     """
@@ -29,14 +29,14 @@ def shifted_correlations(a: FloatArray, b: FloatArray, reach: int) -> FloatArray
     count = a.size - np.abs(shifts)
     sum_a, sum_b = _sums(a, shifts), _sums(b, -shifts)
     power_a, power_b = _sums(a * a, shifts), _sums(b * b, -shifts)
-    left_a, left_b = power_a - sum_a**2 / count, power_b - sum_b**2 / count
-    varies = (left_a > ROUNDING_SHARE * (a @ a)) & (left_b > ROUNDING_SHARE * (b @ b))
+    variance_a, variance_b = power_a - sum_a**2 / count, power_b - sum_b**2 / count
+    varies = (variance_a > ROUNDING_SHARE * (a @ a)) & (variance_b > ROUNDING_SHARE * (b @ b))
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(varies, (_products(a, b, reach) - sum_a * sum_b / count) / np.sqrt(left_a * left_b), 0.0)
+        return np.where(varies, (_products(a, b, reach) - sum_a * sum_b / count) / np.sqrt(variance_a * variance_b), 0.0)
 
 
 def slope_of(a: FloatArray, b: FloatArray) -> tuple[float, float]:
-    """Return the slope of a (n,) on b (n,), and the size of their correlation; zeros when one of them does not move."""
+    """Return the slope of a (n,) on b (n,), and their absolute correlation; zeros where one of them is constant."""
     a, b = _centred(a), _centred(b)
     power = math.sqrt(float(a @ a) * float(b @ b))
     if power == 0.0:
@@ -47,7 +47,7 @@ def slope_of(a: FloatArray, b: FloatArray) -> tuple[float, float]:
 
 
 def lag_of(a: FloatArray, b: FloatArray, reach: int) -> tuple[float, float]:
-    """Return by how many samples a is late against b, up to reach, with the parts of one, and what the correlation gains by it.
+    """Return the delay of a relative to b in (fractional) samples, up to reach, and the gain of correlation at that delay.
 
     a, b: (n,) without gaps, n > reach.
     """
@@ -59,18 +59,18 @@ def lag_of(a: FloatArray, b: FloatArray, reach: int) -> tuple[float, float]:
     shift = 0.0
     if 0 < best < len(size) - 1:
         left, middle, right = size[best - 1 : best + 2]
-        bend = left - 2 * middle + right
-        shift = float(0.5 * (left - right) / bend) if bend != 0.0 else 0.0
+        curvature = left - 2 * middle + right
+        shift = float(0.5 * (left - right) / curvature) if curvature != 0.0 else 0.0
     return best - reach + shift, gain
 
 
 def _centred(values: FloatArray) -> FloatArray:
-    """Return values less their mean, zero where all are alike: what the mean of those is off by is rounding."""
+    """Return values less their mean; zeros where all are equal, where the difference would be a rounding error."""
     return np.zeros_like(values) if float(np.ptp(values)) == 0.0 else values - values.mean()
 
 
 def _sums(values: FloatArray, shifts: npt.NDArray[np.int64]) -> FloatArray:
-    """Return the sum of the samples that are left at each shift: without the first k, or without the last -k."""
+    """Return the sum of the overlapping samples at each shift k: all without the first k, or without the last -k."""
     reach = int(np.abs(shifts).max())
     first = np.concatenate([[0.0], np.cumsum(values[:reach])])
     last = np.concatenate([[0.0], np.cumsum(values[::-1][:reach])])

@@ -25,7 +25,7 @@ def student_tail(statistic: float, freedom: float) -> float:
 
 
 def student_quantile(p: float, freedom: float) -> float:
-    """Return what Student's t stays below with probability p; the normal one where no scatter could be measured."""
+    """Return the p-quantile of Student's t; that of the normal distribution where there are no degrees of freedom."""
     return float(stdtrit(freedom, p)) if freedom > 0 else float(ndtri(p))
 
 

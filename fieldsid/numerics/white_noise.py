@@ -1,6 +1,6 @@
 """The white noise of a smooth signal, from its k-th differences: a polynomial of degree k - 1 vanishes in them.
 
-White noise of variance s^2 leaves them the variance binom(2 k, k) s^2.
+White noise of variance s^2 gives them the variance binom(2 k, k) s^2.
 """
 
 from __future__ import annotations

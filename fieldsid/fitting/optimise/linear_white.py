@@ -1,4 +1,4 @@
-"""The fast path of a fit without effects under white noise: normal equations straight from the linear kernel."""
+"""The fast path of a fit without effects under white noise: normal equations computed in the linear kernel."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class LinearWhite:
 
 
 def linear_white(problem: Problem, noise: Noise, free: Sequence[int]) -> LinearWhite | None:
-    """Return the short way of a problem, None where it has effects or the noise is coloured."""
+    """Return the fast path of a problem, None where it has effects or the noise is coloured."""
     if problem.layout.effects or not is_white(noise):
         return None
     runs = []

@@ -1,4 +1,4 @@
-"""What a free run leaves in each channel: the weights of output error, and the likelihood that two fits compare by."""
+"""Residual squares of a free run: the weights of output error, and the likelihood by which two fits are compared."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def white_weights(problem: Problem, x: FloatArray) -> Noise:
 
 
 def negative_log_likelihood(problem: Problem, x: FloatArray) -> float:
-    """Return minus the log likelihood of white residuals of unknown size, infinite where x cannot be simulated."""
+    """Return minus the log likelihood of white residuals of unknown variance, infinite where x cannot be simulated."""
     try:
         squares, counts = squares_of(problem, x)
     except EffectError:

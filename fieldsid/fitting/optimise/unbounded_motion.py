@@ -1,4 +1,4 @@
-"""A fit whose own motion runs away on a run it was fitted to is refused, and the run is named."""
+"""Refuse a fit whose free run grows without bound on one of the runs fitted, with the name of the run."""
 
 from __future__ import annotations
 

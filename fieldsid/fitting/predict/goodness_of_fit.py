@@ -28,7 +28,7 @@ class GoodnessOfFit:
 
 
 def goodness_of_fit(predictions: Sequence[Prediction]) -> GoodnessOfFit:
-    """Return the merit of one run, or of several from their raw residuals together (each about its own mean)."""
+    """Return the goodness of fit of one run, or of several from their pooled residuals (each run about its mean)."""
     angle = [_sums(p.record.angle, p.angle, p.record.angle_ok) for p in predictions]
     rate = [_sums(p.record.rate, p.rate, p.record.rate_ok) for p in predictions]
     return GoodnessOfFit(_rms(angle), _rms(rate), _fit(angle), _fit(rate))

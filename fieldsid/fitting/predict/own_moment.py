@@ -1,13 +1,13 @@
-"""A run's free run with a constant moment of its own: its trim is not quite that of the runs a model was fitted to.
+"""The free run of a predicted run with a constant moment, as its trim differs a little from that of the runs fitted to.
 
-Half a milliradian per second of turning, which no record shows, is two degrees of heading in a minute. So the moment of a
-predicted run is a nuisance, as its start and its speed are, with prior N(0, s^2), s the model's own (`Noise.own_moment`), zero
-where its runs did not differ. The moment m minimises
+A rate offset of half a milliradian per second, which no record shows, adds up to two degrees of heading in a minute. The moment m
+of a predicted run is therefore a nuisance parameter, as its initial state and its speed are. Its prior is N(0, s^2) with s from
+the model (`Noise.own_moment`), zero where the trims of the fitted runs did not differ. It minimises
 
     sum over channels |e - r m|^2 / (L s_c^2) + m^2 / s^2,
 
-e the residual and r the response to a unit moment, both free of the run's start, s_c the rms of what is left of e at its best m
-and L the correlation length of that, so that the residual of a wrong model has little weight.
+where e is the residual and r the response to a unit moment, both with the initial state projected out, s_c the rms of e - r m at
+the best m and L its correlation length. The residual of a wrong model thus has little weight.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.gram_least_squares import solve_normal_equations
 
 MIN_REPORTED_STD = 1.0
-"""Standard deviations of the prior from which on a moment is told of: a smaller one is what is usual from run to run."""
+"""Standard deviations of the prior from which on a moment is reported: smaller ones are usual from run to run."""
 
 
 @dataclass(frozen=True)
 class FreeRun:
-    """A run's residual (2, n) without a moment of its own, what 1 rad/s^2 of it does (2, n), and the channels' weights (2, 1).
+    """A run's residual (2, n) without a moment, the response to a unit moment (2, n), and the channels' weights (2, 1).
 
-    The response is free of the run's start: with a moment the start moves along.
+    The initial state is projected out of the response, as it is refitted together with the moment.
     """
 
     record: Record
@@ -56,14 +56,14 @@ class FreeRun:
 
     @cached_property
     def _information(self) -> tuple[float, float]:
-        """What the weighted residual says of the moment, and the information on it, without the prior."""
-        shown = self.response * self.weight
-        return float(np.vdot(shown, self.residual * self.weight)), float(np.vdot(shown, shown))
+        """Response times residual, both weighted, and the information about the moment, without the prior."""
+        weighted = self.response * self.weight
+        return float(np.vdot(weighted, self.residual * self.weight)), float(np.vdot(weighted, weighted))
 
     def own_moment(self, std: float) -> float:
         """Return the most probable moment (rad/s^2) under a prior of that standard deviation."""
-        said, information = self._information
-        return std**2 * said / (1.0 + std**2 * information)
+        pull, information = self._information
+        return std**2 * pull / (1.0 + std**2 * information)
 
     def squares(self, std: float) -> FloatArray:
         """Return each channel's sum (2,) of squares of the residual with that moment, over the measured samples."""
@@ -72,7 +72,7 @@ class FreeRun:
 
 
 def free_run(problem: Problem, x: FloatArray, run: int, residual: FloatArray, floor: Noise) -> FreeRun:
-    """Return a run's free run at x with its residual (2, n); one that grows without bound has no moment of its own."""
+    """Return a run's free run at x with its residual (2, n); the response is zero where the motion grows without bound."""
     layout, record = problem.layout, problem.records[run]
     trim = layout.names.index(NAMES[layout.axis].trim)
     starts = [i for i in layout.nuisances_of(run) if layout.parameters[i].name in START_NAMES]
@@ -82,15 +82,15 @@ def free_run(problem: Problem, x: FloatArray, run: int, residual: FloatArray, fl
     sensitivity = dict(zip(result.columns, result.sensitivity * record.ok, strict=True))
     response, columns = sensitivity[trim] / problem.trim_factor(x, run), np.stack([sensitivity[i] for i in starts])
     scale = channel_weights(record, residual, floor)[:, None]
-    flat, shown = (columns * scale).reshape(len(starts), -1), (response * scale).ravel()
-    response = response - np.tensordot(solve_normal_equations(flat @ flat.T, flat @ shown), columns, axes=1)
-    shown = response * scale
-    best = float(np.vdot(shown, residual * scale)) / max(float(np.vdot(shown, shown)), np.finfo(float).tiny)
+    flat, weighted = (columns * scale).reshape(len(starts), -1), (response * scale).ravel()
+    response = response - np.tensordot(solve_normal_equations(flat @ flat.T, flat @ weighted), columns, axes=1)
+    weighted = response * scale
+    best = float(np.vdot(weighted, residual * scale)) / max(float(np.vdot(weighted, weighted)), np.finfo(float).tiny)
     return FreeRun(record, residual, response, channel_weights(record, residual - best * response, floor)[:, None])
 
 
 def with_own_moment(problem: Problem, x: FloatArray, std: float, floor: Noise) -> tuple[FloatArray, float]:
-    """Return x of a one-run problem with the run's most probable own moment in its trim, and that moment (rad/s^2)."""
+    """Return x of a one-run problem with the run's most probable moment added to its trim, and that moment (rad/s^2)."""
     if not std > 0.0:
         return x, 0.0
     moment = free_run(problem, x, 0, problem.residual(x, 0)[0], floor).own_moment(std)
@@ -100,7 +100,7 @@ def with_own_moment(problem: Problem, x: FloatArray, std: float, floor: Noise) -
 
 
 def moment_note(record: Record, moment: float, std: float) -> Note | None:
-    """Return the note on a run that had a moment of its own, None where it is no larger than is usual."""
+    """Return the note on a run whose moment is larger than usual from run to run, else None."""
     if not abs(moment) > MIN_REPORTED_STD * std:
         return None
     return Note(

@@ -1,4 +1,4 @@
-"""A model's free run on a record, its initial state and per-run nuisances refitted, its parameters not."""
+"""A model's free run on a record: the initial state and the nuisance parameters of the run are refitted, nothing else."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 MAX_NUISANCE_ITERATIONS, NUISANCE_COST_TOLERANCE = 15, 1e-6
-"""Iterations for a run's nuisances, and the share of the sum of squares that an iteration must gain."""
+"""Most iterations for the nuisance parameters of a run, and the relative gain of the cost at which they end."""
 MAX_STARTS = 4
-"""Other times of a run's events that are tried beside the present ones."""
+"""Most starts with other event times that are tried in addition to the present times."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Prediction(Brief):
-    """Free run of a model on a record: angle and rate (n,) as measured would be, fin angle (n,), start and nuisances.
+    """Free run of a model on a record: angle and rate (n,) as the sensors show them, fin (n,), initial state and nuisances.
 
-    `faster` is the relative speed correction, see speed_correction.py; `moment` (rad/s^2) the run's own, of standard deviation
-    `moment_std`, see own_moment.py. `as_logged` is the rms residual (rad, rad/s) with the model's trim and the log's speed and
-    command times, None where all are unchanged.
+    `faster` is the relative speed correction, see speed_correction.py. `moment` (rad/s^2) is the moment of the run and
+    `moment_std` its prior standard deviation, see own_moment.py. `as_logged` is the rms residual (rad, rad/s) with the model's
+    trim and the logged speed and command times, None where these are unchanged.
     """
 
     record: Record
@@ -61,7 +61,7 @@ class Prediction(Brief):
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """What the run was taken to have done otherwise than log and model have it: command times, speed, trim."""
+        """The notes on what differs in the run from the log and the model: command times, speed, trim."""
         return tuple(
             n
             for n in (
@@ -77,7 +77,7 @@ def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None 
     """Return a model's free run on a record; raises DivergenceError when it grows without bound."""
     floor = white_noise_floor([record])
     logged, x = frozen_problem(model, record, effects_of(model) if effects is None else effects)
-    if not record.is_whole:  # the differences of samples further apart than those of the clock contain the motion
+    if not record.is_whole:  # where samples are missing, differences of the signals contain the motion
         floor = lowered_noise_floor(floor, [record], [logged.residual(refit_nuisances(logged, x, 0, floor), 0)[0]])
     problem, x = with_command_timing(logged, x, floor)
     as_timed = problem
@@ -104,7 +104,7 @@ def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None 
 
 
 def as_flown(model: Model, records: Sequence[Record]) -> tuple[Note, ...]:
-    """Return what runs were taken to have done otherwise than their logs have it, those a model diverges on left out."""
+    """Return the notes on what differs in the runs from their logs, without runs on which the model diverges."""
     notes: list[Note] = []
     for record in records:
         try:
@@ -117,7 +117,7 @@ def as_flown(model: Model, records: Sequence[Record]) -> tuple[Note, ...]:
 def frozen_problem(
     model: Model, record: Record, effects: Sequence[Effect], evaluations: EvaluationCounter | None = None
 ) -> tuple[Problem, FloatArray]:
-    """Return a problem of one record whose shared parameters have the model's values at the record's speed, and its start."""
+    """Return the problem of one record at its speed, and x with the model's parameters and start values of the nuisances."""
     layout = layout_of([record], model.axis, effects)
     of_fin = model.law.trim_of_fin
     exponent, speed = model.law.damping_exponent, model.law.effective(record.speed)
@@ -131,7 +131,8 @@ def frozen_problem(
 def values_at_speed(law: SpeedLaw, values: Mapping[str, float], axis: Axis, speed: float) -> dict[str, float]:
     """Return a model's values as the one-run problem at a speed takes them.
 
-    Its layout scales the authority by s^2, and a trim of the fin with it; the law's own values are divided by that.
+    The problem scales the authority by s^2, and a trim that scales with the authority too; the values by the law are divided by
+    that.
     """
     names, scale = NAMES[axis], law.scale(speed)
     trim = values[names.trim] * law.trim_factor(speed) / (scale**2 if law.trim_of_fin else 1.0)
@@ -149,7 +150,7 @@ def _rms_as_logged(problem: Problem, x: FloatArray) -> tuple[float, float]:
 def with_command_timing(problem: Problem, x: FloatArray, noise: Noise) -> tuple[Problem, FloatArray]:
     """Return a one-run problem and x with the run's nuisances fitted under a noise.
 
-    The jumps of its command are timed between the samples where that explains the motion better.
+    The times of the command's jumps between samples are estimated where that explains the motion better.
     """
     record = problem.records[0]
     x = refit_nuisances(problem, x, 0, noise)
@@ -163,19 +164,19 @@ def with_command_timing(problem: Problem, x: FloatArray, noise: Noise) -> tuple[
 def refit_nuisances(problem: Problem, x: FloatArray, run: int, noise: Noise, *, rescan: bool = True) -> FloatArray:
     """Return x with a run's nuisances (initial state, phases, event times) refitted, the rest unchanged.
 
-    `rescan`: event times are searched over their grids too, not only from their present values.
+    With `rescan`, event times are searched over their grids and not only from their present values.
 
-    Under white noise a second pass weighs the run by its own residual and applies the prior of the initial state, so that the
+    Under white noise a second pass weights the run by its residual and applies the prior of the initial state, so that the
     initial state cannot hide an error of the model.
     """
     own = problem.layout.nuisances_of(run)
-    alone = replace(problem, records=(problem.records[run],), layout=_layout_of_one(problem.layout, run))
+    single = replace(problem, records=(problem.records[run],), layout=_layout_of_one(problem.layout, run))
     keep = [*range(problem.layout.shared), *own]
     free = range(problem.layout.shared, len(keep))
-    starts = [x[keep], *(starts_at_other_times(alone, x[keep], noise, MAX_STARTS, free) if rescan else [])]
+    starts = [x[keep], *(starts_at_other_times(single, x[keep], noise, MAX_STARTS, free) if rescan else [])]
     found = [
         levenberg_marquardt(
-            alone, start, noise, free=free, max_iterations=MAX_NUISANCE_ITERATIONS, tolerance=NUISANCE_COST_TOLERANCE
+            single, start, noise, free=free, max_iterations=MAX_NUISANCE_ITERATIONS, tolerance=NUISANCE_COST_TOLERANCE
         )
         for start in starts
     ]
@@ -183,12 +184,12 @@ def refit_nuisances(problem: Problem, x: FloatArray, run: int, noise: Noise, *, 
     out = x.copy()
     if not np.isfinite(best.cost):
         return out
-    prior = initial_state_prior(alone, 0, noise) if is_white(noise) else None
+    prior = initial_state_prior(single, 0, noise) if is_white(noise) else None
     if prior is not None:
         best = levenberg_marquardt(
-            alone,
+            single,
             best.x,
-            _left_over(alone, best.x, noise),
+            _residual_noise(single, best.x, noise),
             free=free,
             max_iterations=MAX_NUISANCE_ITERATIONS,
             tolerance=NUISANCE_COST_TOLERANCE,
@@ -198,7 +199,7 @@ def refit_nuisances(problem: Problem, x: FloatArray, run: int, noise: Noise, *, 
     return out
 
 
-def _left_over(problem: Problem, x: FloatArray, noise: Noise) -> Noise:
+def _residual_noise(problem: Problem, x: FloatArray, noise: Noise) -> Noise:
     """Return the residual standard deviations of one run, at least those of its noise."""
     residual, _ = problem.residual(x, 0)
     record = problem.records[0]
@@ -207,11 +208,11 @@ def _left_over(problem: Problem, x: FloatArray, noise: Noise) -> Noise:
 
 
 def _layout_of_one(layout: ParameterLayout, run: int) -> ParameterLayout:
-    slots = [*layout.parameters[: layout.shared], *[_moved(layout.parameters[i]) for i in layout.nuisances_of(run)]]
+    slots = [*layout.parameters[: layout.shared], *[_of_run_zero(layout.parameters[i]) for i in layout.nuisances_of(run)]]
     g = layout.groups
     groups = replace(g, of_run=(g.of_run[run],), run_speeds=(g.run_speeds[run],))
     return replace(layout, groups=groups, parameters=tuple(slots))
 
 
-def _moved(slot: Parameter) -> Parameter:
+def _of_run_zero(slot: Parameter) -> Parameter:
     return Parameter(slot.name, slot.unit, slot.low, slot.high, slot.start, 0)

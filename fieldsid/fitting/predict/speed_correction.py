@@ -1,8 +1,8 @@
-"""The maximum a posteriori correction of a run's speed: measured to a third of a percent, twice which enters the authority.
+"""The maximum a posteriori correction of a run's speed: it is measured to 0.3 %, and the authority changes by twice that.
 
-The heading integrates that: a turn of two radians that is half a percent short is off by five times a compass's noise. So the
-speed of a predicted run is a nuisance, as its initial state is, with the measurement as its prior: the relative correction e
-minimises
+The heading integrates the error: a turn of two radians that is half a percent short is off by five times the noise of a compass.
+The speed of a predicted run is therefore a nuisance parameter, as its initial state is, with the measurement as prior. The
+relative correction e minimises
 
     sum over channels |r - S e|^2 / (L s^2) + (e / MEASURED_SPEED_STD_ERROR)^2,   |e| <= MAX_STD_ERRORS MEASURED_SPEED_STD_ERROR,
 
@@ -26,24 +26,24 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.gram_least_squares import solve_normal_equations
 
 MEASURED_SPEED_STD_ERROR, GUESSED_SPEED_STD_ERROR = 0.003, 0.01
-"""Standard error, as a share, that the speed of a run is taken to have, where it was measured and where it was not."""
+"""Assumed relative standard error of the speed of a run, where it was measured and where it was not."""
 MAX_STD_ERRORS = 3.0
-"""Errors of the measurement that a speed is moved by at most."""
+"""Largest correction of a speed, in standard errors of its measurement."""
 MAX_SPEED_ITERATIONS, CONVERGED_STD_ERRORS = 4, 0.02
-"""Rounds, each with the weights of what the last one has left, and the change in errors of the measurement that ends them."""
+"""Most iterations, each with weights of the previous residuals, and the change in standard errors of the speed that ends them."""
 STEP_PARTS = (1.0, 0.5, 0.25)
-"""Parts of a step that are tried until the cost falls."""
+"""Fractions of a step that are tried in turn until the cost falls."""
 SURPRISING_STD_ERRORS = 2.0
-"""Standard errors from which on a speed that is off is a finding of its own."""
+"""Standard errors from which on the note says that the logged speed or the model's is probably wrong."""
 
 
 def speed_sensitivity(problem: Problem, x: FloatArray, speed: float) -> FloatArray:
-    """Return by how much a one-run problem's shared parameters (F,) change with one standard error of the run's speed."""
-    return (MEASURED_SPEED_STD_ERROR if np.isfinite(speed) else GUESSED_SPEED_STD_ERROR) * _moves(problem, x)
+    """Return the change of a one-run problem's shared parameters (F,) with one standard error of the run's speed."""
+    return (MEASURED_SPEED_STD_ERROR if np.isfinite(speed) else GUESSED_SPEED_STD_ERROR) * _speed_derivatives(problem, x)
 
 
 def correct_speed(problem: Problem, x: FloatArray, floor: Noise) -> tuple[Problem, FloatArray, float]:
-    """Return a one-run problem at the run's own speed, x (N,) with its start moved along, and the share it was faster by."""
+    """Return a one-run problem at the corrected speed, x (N,) with refitted initial state, and the relative correction."""
     groups = problem.layout.groups
     if not (np.isfinite(groups.run_speeds[0]) and np.isfinite(groups.speeds[groups.reference])):
         return problem, x, 0.0
@@ -73,9 +73,9 @@ def speed_note(record: Record, faster: float) -> Note | None:
     """
     if not is_worth_reporting(faster):
         return None
-    way, errors = "faster" if faster > 0.0 else "slower", abs(faster) / MEASURED_SPEED_STD_ERROR
-    said = (
-        f"{record.name}: as the motion says, flown {100 * abs(faster):.2f} % {way} than the {record.speed:.3f} m/s of its log, "
+    sense, errors = "faster" if faster > 0.0 else "slower", abs(faster) / MEASURED_SPEED_STD_ERROR
+    message = (
+        f"{record.name}: as the motion says, flown {100 * abs(faster):.2f} % {sense} than the {record.speed:.3f} m/s of its log, "
         f"{errors:.1f} x the standard error of {100 * MEASURED_SPEED_STD_ERROR:g} % that a measured speed is taken to have"
     )
     if errors >= SURPRISING_STD_ERRORS:
@@ -84,10 +84,10 @@ def speed_note(record: Record, faster: float) -> Note | None:
             if errors > MAX_STD_ERRORS - CONVERGED_STD_ERRORS
             else ""
         )
-        said += f"{most}: the scale of its speed is probably off, or the model is at this speed"
+        message += f"{most}: the scale of its speed is probably off, or the model is at this speed"
     return Note(
         "own_speed",
-        said,
+        message,
         {"run": record.name, "faster": faster, "speed_m_s": record.speed, "std_error": MEASURED_SPEED_STD_ERROR},
     )
 
@@ -98,7 +98,7 @@ def _at_speed_share(problem: Problem, share: float) -> Problem:
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """The change of a run's nuisances and, last, of its speed correction; the channels' weights (2, 1), and the cost before."""
+    """The change of a run's nuisances and, last, of the speed correction; the channels' weights (2, 1), the cost before."""
 
     change: FloatArray
     weight: FloatArray
@@ -106,8 +106,8 @@ class _Step:
 
 
 def _step(problem: Problem, x: FloatArray, faster: float, floor: Noise) -> _Step | None:
-    """Return the step to the best correction to first order; None where the motion diverges."""
-    record, shared, moves = problem.records[0], problem.layout.shared, _moves(problem, x)
+    """Return the Gauss-Newton step of nuisances and speed correction; None where the motion diverges."""
+    record, shared, moves = problem.records[0], problem.layout.shared, _speed_derivatives(problem, x)
     result = problem.linearise(x, 0, [*np.flatnonzero(moves).tolist(), *range(shared, x.size)])
     if not np.isfinite(result.stack).all():
         return None
@@ -115,18 +115,18 @@ def _step(problem: Problem, x: FloatArray, faster: float, floor: Noise) -> _Step
     slopes[list(result.columns)] = result.sensitivity * record.ok
     columns = np.concatenate([slopes[shared:], np.tensordot(moves, slopes[:shared], axes=1)[None]])
     weight = channel_weights(record, result.residual, floor)[:, None]
-    flat, left = (columns * weight).reshape(columns.shape[0], -1), (result.residual * weight).ravel()
-    gram, right = flat @ flat.T, flat @ left
+    flat, weighted = (columns * weight).reshape(columns.shape[0], -1), (result.residual * weight).ravel()
+    gram, right = flat @ flat.T, flat @ weighted
     gram[-1, -1] += MEASURED_SPEED_STD_ERROR**-2
     right[-1] -= faster * MEASURED_SPEED_STD_ERROR**-2
-    cost = float(left @ left) + (faster / MEASURED_SPEED_STD_ERROR) ** 2
+    cost = float(weighted @ weighted) + (faster / MEASURED_SPEED_STD_ERROR) ** 2
     return _Step(solve_normal_equations(gram, right), weight, cost)
 
 
 def _step_that_gains(problem: Problem, x: FloatArray, faster: float, step: _Step) -> tuple[Problem, FloatArray, float] | None:
-    """Return the problem, x and share after the step, or after a part of it, that lowers the cost; None where none does.
+    """Return problem, x and correction after the largest fraction of the step that lowers the cost; None where none does.
 
-    An event of the run moves by no small step: its time goes to where the first order of it leads, which may be another event.
+    The time of an event takes the same fraction of its Gauss-Newton step, which need not be small and may end at another event.
     """
     layout, most = problem.layout, MAX_STD_ERRORS * MEASURED_SPEED_STD_ERROR
     for part in STEP_PARTS:
@@ -136,20 +136,20 @@ def _step_that_gains(problem: Problem, x: FloatArray, faster: float, step: _Step
         own = np.clip(own, layout.low, layout.high)
         own[: layout.shared] = x[: layout.shared]
         moved = _at_speed_share(problem, share)
-        left = moved.residual(own, 0)[0] * step.weight
-        if float(np.vdot(left, left)) + (share / MEASURED_SPEED_STD_ERROR) ** 2 < step.cost:
+        weighted = moved.residual(own, 0)[0] * step.weight
+        if float(np.vdot(weighted, weighted)) + (share / MEASURED_SPEED_STD_ERROR) ** 2 < step.cost:
             return moved, own, share
     return None
 
 
 def channel_weights(record: Record, residual: FloatArray, floor: Noise) -> FloatArray:
-    """Return the weight of each channel (2,): over the rms of what is left of it, correlated samples counted once."""
+    """Return the weight of each channel (2,): one over its rms residual and the root of its correlation length."""
     lags = round(MAX_CORRELATION_LAG_S / float(np.median(record.steps)))
     lengths = [correlation_length(e[ok], lags) if ok.any() else 1.0 for e, ok in zip(residual, record.ok, strict=True)]
     return 1.0 / (residual_rms(record, residual, floor) * np.sqrt(lengths))
 
 
-def _moves(problem: Problem, x: FloatArray) -> FloatArray:
+def _speed_derivatives(problem: Problem, x: FloatArray) -> FloatArray:
     """Return the derivatives (F,) of a one-run problem's shared parameters by the relative speed correction."""
     layout, names = problem.layout, NAMES[problem.layout.axis]
     powers = {names.damping: layout.groups.exponent, names.authority: 2.0, names.trim: 2.0 * layout.groups.trim_of_fin}

@@ -27,11 +27,11 @@ class History(Brief):
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """The result of an estimator: vector (N,) of the layout, covariance (S, S) of its shared parameters, noise, notes.
+    """The result of an estimator: vector (N,) of the layout, covariance (S, S) of the shared parameters, noise, notes.
 
-    A shared parameter that was not estimated has zero variance. `nuisances_fitted` is false where the runs' initial states are
-    still at their start values. `weights` is the noise whose weighted squares x minimises, None where that is the white noise of
-    its own residuals, or where x minimises no such sum.
+    A shared parameter that was not estimated has zero variance. `nuisances_fitted` is false where the initial states of the runs
+    are still at their start values. `weights` is the noise under which x minimises the weighted squares. It is None where that is
+    the white noise of the residuals at x, or where x minimises no such sum.
     """
 
     x: FloatArray
@@ -46,7 +46,7 @@ class Solution:
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What a user may set: filter bandwidth lambda (rad/s), forgetting factor of the recursive method."""
+    """The options of an estimator: filter bandwidth lambda (rad/s), forgetting factor of the recursive method."""
 
     bandwidth: float = 4.0
     forgetting: float = 1.0
@@ -54,9 +54,9 @@ class Options:
 
 @dataclass(frozen=True, slots=True)
 class Estimator:
-    """One method; `takes_effects` tells whether it can estimate effects, `joint` whether several runs at once.
+    """One method; `takes_effects` says whether it can estimate effects, `joint` whether it takes several runs at once.
 
-    `after` is the same as `solve` from an output-error solution, for a method that begins with one.
+    `after` does the same as `solve` but starts from a given output-error solution, for a method that starts from one.
     """
 
     name: str
@@ -68,9 +68,9 @@ class Estimator:
     after: Callable[[Problem, Solution], Solution] | None = None
     info: Mapping[str, str] = field(default_factory=dict)
 
-    def refined(self, problem: Problem, plain: Solution, options: Options) -> Solution:
-        """Return this method's solution, from an output-error solution where it begins with one."""
-        return self.solve(problem, options) if self.after is None else self.after(problem, plain)
+    def refined(self, problem: Problem, output_error: Solution, options: Options) -> Solution:
+        """Return the solution of this method, from the given output-error solution where it starts from one."""
+        return self.solve(problem, options) if self.after is None else self.after(problem, output_error)
 
 
 def shared_covariance(problem: Problem, full: FloatArray, free: tuple[int, ...]) -> FloatArray:

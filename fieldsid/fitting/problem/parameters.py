@@ -16,14 +16,14 @@ from fieldsid.models.speed_law import GROUP_WIDTH, TRIM_OF_FIN, SpeedLaw, with_s
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 START_NAMES = ("angle0", "rate0", "rate_before")
-"""What a run starts from: its angle, its rate, and the steady rate before it that left its cross state where it starts."""
+"""Parameters of a run's initial state: angle, rate, and the steady rate before the run, which determines the cross state."""
 MAX_RATE_BEFORE_RATIO, MAX_RATE_BEFORE_RAD_S = 1.5, 2.0
-"""Largest rate before a run over the largest of the records, and in rad/s where no rate was measured."""
+"""Bound of the rate before a run, relative to the largest rate of the records; and in rad/s where no rate was measured."""
 
 EVENT_UNIT = "run"
 """Unit of the time of an event, a share of its run."""
 GROUP_WIDTH_TRAINED = 0.12
-"""A run this near to a group counts as of it, where the training runs showed that a group shares its parameters."""
+"""Relative distance from a group's speed within which a run counts as flown at that speed, where groups are `snapped`."""
 BASE_BOUNDS = {"damping": (-10.0, 100.0), "stiffness": (-20.0, 100.0), "authority": (-500.0, 500.0), "trim": (-50.0, 50.0)}
 
 
@@ -46,12 +46,12 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class SpeedGroups:
-    """Speed groups: mean speed of each, group and speed of each run; `reference` is the group the law refers to.
+    """Speed groups: mean speed of each, group and speed of each run; `reference` is the group to which the law refers.
 
-    `snapped`: runs count as flown at their group's speed, and what changes within a run is over that. `faster`: share by which
-    the runs were faster than they count as, where their speed is corrected. `trim_of_fin`: the trim moment scales with the
-    authority. `by_law`: all groups share one authority that scales with the square of the speed, else each has its own.
-    `exponent`: the damping's power of the speed where that is not a parameter.
+    `snapped`: runs count as flown at the speed of their group, and changes of the speed within a run are relative to that.
+    `faster`: the relative correction of the runs' speed. `trim_of_fin`: the trim moment scales with the authority. `by_law`: all
+    groups share one authority, which scales with the square of the speed; else each group has a separate one. `exponent`: the
+    exponent of the damping over speed where it is not a parameter.
     """
 
     speeds: tuple[float, ...]
@@ -65,15 +65,15 @@ class SpeedGroups:
     faster: float = 0.0
 
     def flown(self, run: int) -> float:
-        """Return the speed a run was flown at: the one it counts as, corrected."""
+        """Return the corrected speed of a run."""
         return self.run_speeds[run] * (1.0 + self.faster)
 
     def over_group(self, run: int) -> float:
-        """Return a run's speed over the one its authority parameter belongs to."""
+        """Return the speed of a run over the speed to which its authority parameter refers."""
         return self.flown(run) / self.speeds[self.reference if self.by_law else self.of_run[run]]
 
     def over_reference(self, group: int) -> float:
-        """Return a group's speed over the reference's."""
+        """Return the speed of a group over that of the reference group."""
         return self.speeds[group] / self.speeds[self.reference]
 
 
@@ -82,7 +82,7 @@ def speed_groups(
 ) -> SpeedGroups:
     """Return the runs' speed groups by single linkage in log speed; one group when any speed is not known.
 
-    width is the log ratio of neighbouring speeds above which a new group begins; trim_of_fin is by default the axis's own.
+    width is the log ratio of neighbouring speeds above which a new group begins; trim_of_fin is by default that of the axis.
     """
     trim = TRIM_OF_FIN[records[0].axis] if trim_of_fin is None else trim_of_fin
     own = tuple(r.speed for r in records)
@@ -101,7 +101,7 @@ def speed_groups(
 
 
 def _run_speeds(own: Sequence[float], means: Sequence[float], of_run: Sequence[int], *, snapped: bool) -> tuple[float, ...]:
-    """Return the speed each run counts as flown at."""
+    """Return the speed of each run, replaced by that of its group where it is near enough."""
     near = GROUP_WIDTH_TRAINED if snapped else 0.0
     return tuple(means[g] if abs(np.log(u / means[g])) <= near else u for u, g in zip(own, of_run, strict=True))
 
@@ -144,12 +144,12 @@ class ParameterLayout:
         return self.run_nuisances.get(run, ())
 
     def on_bound(self, x: FloatArray) -> list[Parameter]:
-        """Return the shared parameters that a vector has on one of their bounds."""
+        """Return the shared parameters whose value in x is on a bound."""
         shared = zip(self.parameters[: self.shared], x[: self.shared].tolist(), strict=True)
         return [p for p, value in shared if is_on_bound(value, p.low, p.high)]
 
     def shown(self, name: str) -> str:
-        """Return a shared parameter's name as it is printed: that of several runs with the speed it belongs to."""
+        """Return a shared parameter's name as it is printed: with the speed to which it refers where there are several runs."""
         g = self.groups
         return with_speed(name, self.axis, g.speeds[g.reference], trim_of_fin=g.trim_of_fin) if len(g.of_run) > 1 else name
 
@@ -166,14 +166,14 @@ class ParameterLayout:
 
 
 def group_name(authority: str, groups: SpeedGroups, index: int) -> str:
-    """Return the name of a group's authority; the reference group's, or the one all share, is the plain name."""
+    """Return the name of a group's authority, without a speed for the reference group and for an authority shared by all."""
     return authority if groups.by_law or index == groups.reference else f"{authority}@{groups.speeds[index]:.3g}"
 
 
 def layout_of(
     records: Sequence[Record], axis: Axis, effects: Sequence[Effect], groups: SpeedGroups | None = None
 ) -> ParameterLayout:
-    """Return the parameters of a joint fit of records with effects, at most one of them with the cross state."""
+    """Return the parameters of a joint fit of records with effects; only one of the effects keeps the cross state."""
     effects = with_one_cross_state(effects)
     names, groups = NAMES[axis], speed_groups(records) if groups is None else groups
     slots = [Parameter(names.damping, "1/s", *BASE_BOUNDS["damping"], 1.0)]
@@ -202,7 +202,7 @@ def _run_nuisances(run: int, record: Record, effects: Sequence[Effect], before: 
 
 
 def _fastest_before(records: Sequence[Record]) -> float:
-    """Return the largest steady rate that may have gone before a run."""
+    """Return the bound of the steady rate before a run."""
     fastest = max((float(np.max(np.abs(r.rate[r.rate_ok]))) for r in records if r.rate_ok.any()), default=0.0)
     return MAX_RATE_BEFORE_RATIO * fastest if fastest > 0.0 else MAX_RATE_BEFORE_RAD_S
 

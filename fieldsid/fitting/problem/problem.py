@@ -23,14 +23,14 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 MAX_CACHED_SAMPLES = 20_000
-"""Samples of the longest run whose arrays are kept for the next call."""
+"""Samples of the longest run whose kernel inputs are cached."""
 
 
 @dataclass(frozen=True, slots=True)
 class RunResult:
-    """One run's free run: measured-like angle and rate (n,).
+    """One run's free run: angle and rate (n,) as the sensors show them.
 
-    Stack (1 + P, 2, n) of its residual and sensitivities of `columns`.
+    `stack` (1 + P, 2, n) has the residual, then the sensitivities to the parameters at `columns`.
     """
 
     angle: FloatArray
@@ -46,7 +46,7 @@ class RunResult:
 
     @property
     def sensitivity(self) -> FloatArray:
-        """Derivatives of what the sensors show by the parameters, (P, 2, n)."""
+        """Derivatives of the simulated sensor signals by the parameters, (P, 2, n)."""
         return np.asarray(self.stack[1:])
 
 
@@ -54,7 +54,7 @@ class RunResult:
 class Problem:
     """Records and the parameters estimated from them.
 
-    `evaluations` counts what is evaluated of it; `replace` gives a problem that counts on the same counter, with a new cache.
+    `evaluations` counts the simulations; a problem made by `replace` has the same counter and a new cache.
     """
 
     records: tuple[Record, ...]
@@ -62,9 +62,9 @@ class Problem:
     evaluations: EvaluationCounter = field(default_factory=EvaluationCounter, compare=False, repr=False)
     cache: KernelInputCache = field(default_factory=KernelInputCache, init=False, compare=False, repr=False)
     counted: tuple[Record, ...] = field(init=False, compare=False, repr=False)
-    """The records at the speeds that the runs count as, which what changes within them is over."""
+    """The records at the speeds of the groups, to which changes of the speed within a run are relative."""
     scales: tuple[tuple[float, float], ...] = field(init=False, compare=False, repr=False)
-    """Of each run the speed over the reference speed, and over the one that its authority parameter belongs to."""
+    """The speed of each run over the reference speed, and over the speed to which its authority parameter refers."""
 
     def __post_init__(self) -> None:
         g = self.layout.groups
@@ -73,7 +73,7 @@ class Problem:
         object.__setattr__(self, "scales", tuple(_scales(g, run) for run in range(len(self.records))))
 
     def first(self, samples: int) -> Problem:
-        """Return the problem on the first samples of every run; itself where none is longer."""
+        """Return the problem on the first `samples` samples of every run; this problem where no run is longer."""
         if all(len(r) <= samples for r in self.records):
             return self
         return replace(self, records=tuple(first_part(r, samples) for r in self.records))
@@ -107,7 +107,7 @@ class Problem:
         return self._trim_factor(v, v[self.authority_of(run)] * self.scales[run][1] ** 2)
 
     def values_of(self, x: FloatArray, run: int) -> dict[str, float]:
-        """Return the effects' coefficients as a run sees them."""
+        """Return the values of shared parameters and of a run's nuisances by name."""
         layout, numbers = self.layout, x.tolist()
         values = {"damping_exponent": layout.groups.exponent} | dict(zip(layout.names, numbers, strict=False))
         for place in layout.nuisances_of(run):
@@ -115,13 +115,13 @@ class Problem:
         return values
 
     def state_of(self, x: FloatArray, run: int) -> tuple[float, float, float]:
-        """Return a run's initial state: angle, rate, and the cross state that the rate before the run has led to."""
+        """Return a run's initial state: angle, rate, and the steady cross state at the rate before the run."""
         values = self.values_of(x, run)
         angle, rate, cross = _start_of(values, combined_core(self.layout.effects, values, self.scales[run][0]))
         return float(angle), float(rate), float(cross)
 
     def _arrays(self, record: Record, base: Base, values: Values, run: int) -> KernelInputs:
-        """Return the kernel inputs of a run: those of the last call where nothing but the run's initial state has changed."""
+        """Return the kernel inputs of a run, from the cache where only its initial state has changed since the last call."""
         key = (base, *(v for name, v in values.items() if name not in START_NAMES))
         make = partial(assemble, record, self.layout.effects, base, values, self.scales[run][0])
         return self.cache.get(run, key, make) if len(record) <= MAX_CACHED_SAMPLES else make()
@@ -135,7 +135,7 @@ class Problem:
         return measured(Motion(out[:, 0], out[:, 1]), record, self.layout.effects, values), base
 
     def _inputs(self, x: FloatArray, run: int) -> tuple[dict[str, float], Base, FloatArray, KernelInputs]:
-        """Return what a run is simulated with: its coefficients, its base, its initial state (3,) and the kernel's inputs."""
+        """Return the inputs of a run's simulation: coefficients, base parameters, initial state (3,) and kernel inputs."""
         record, values = self.counted[run], self.values_of(x, run)
         base = self._base(values, run)
         arrays = self._arrays(record, base, values, run)
@@ -150,25 +150,25 @@ class Problem:
     def linearise(self, x: FloatArray, run: int, free: Sequence[int] | None = None) -> RunResult:
         """Return one run's free run with its sensitivities to the free parameters that affect it."""
         self.evaluations.add()
-        slots, pushes = self._sensitivities(x, run, free)
-        out, stack = pushes.integrate(slots)
-        shown = pushes.through_sensors(Motion(out[:, 0], out[:, 1]), slots, stack[1:])
-        _difference(self.records[run], shown, stack[0])
-        return RunResult(shown.angle, shown.rate, slots, stack, pushes.base)
+        slots, sensitivities = self._sensitivities(x, run, free)
+        out, stack = sensitivities.integrate(slots)
+        simulated = sensitivities.through_sensors(Motion(out[:, 0], out[:, 1]), slots, stack[1:])
+        _difference(self.records[run], simulated, stack[0])
+        return RunResult(simulated.angle, simulated.rate, slots, stack, sensitivities.base)
 
     def command_sensitivities(self, x: FloatArray, run: int, commanded: Sequence[FinPath]) -> FloatArray:
-        """Return how one run's free run would move with each of K other commands, to first order, (K, 2, n)."""
+        """Return the first-order change (K, 2, n) of one run's free run with each of K other commands."""
         return self._sensitivities(x, run, ())[1].command_sensitivities(commanded)
 
     def linearise_chunked(
         self, x: FloatArray, run: int, free: Sequence[int], length: int
     ) -> tuple[tuple[int, ...], Iterator[tuple[slice, FloatArray, FloatArray]]]:
-        """Return the free parameters that affect a run, and its samples in chunks: which, motion (m, 3), sensitivities (P, 2, m).
+        """Return the free parameters that affect a run, and its samples in chunks: slice, motion (m, 3), sensitivities (P, 2, m).
 
-        For effects without sensor and extra states only: a chunk starts from the angle and rate at which the last one ended.
+        Only for effects without sensor terms and extra states: a chunk starts from the last angle and rate of the previous one.
         """
-        slots, pushes = self._sensitivities(x, run, free)
-        return slots, pushes.integrate_chunked(slots, length)
+        slots, sensitivities = self._sensitivities(x, run, free)
+        return slots, sensitivities.integrate_chunked(slots, length)
 
     def _sensitivities(self, x: FloatArray, run: int, free: Sequence[int] | None) -> tuple[tuple[int, ...], Sensitivities]:
         record, layout = self.counted[run], self.layout
@@ -183,7 +183,7 @@ class Problem:
         return group_name(NAMES[self.layout.axis].authority, g, g.of_run[run])
 
     def _shared_of(self, run: int) -> Sequence[int]:
-        """Return the shared parameters that affect a run: not another speed group's authority, unless the trim refers to it."""
+        """Return the shared parameters that affect a run, less the authorities of groups to which it does not refer."""
         layout, g = self.layout, self.layout.groups
         if g.by_law or len(g.speeds) == 1:
             return range(layout.shared)
@@ -204,12 +204,12 @@ def _scales(groups: SpeedGroups, run: int) -> tuple[float, float]:
 
 
 def _start_of(values: Values, core: Core) -> FloatArray:
-    """Return the initial state (3,): angle, rate, and the cross state that the rate before the run has led to."""
+    """Return the initial state (3,): angle, rate, and the steady cross state at the rate before the run."""
     return np.array([values["angle0"], values["rate0"], core.steady_cross_state(values.get("rate_before", 0.0))])
 
 
 def _difference(record: Record, motion: Motion, out: FloatArray) -> FloatArray:
-    """Fill out (2, n) with measured minus shown, zero where nothing was measured, and return it."""
+    """Fill out (2, n) with measured minus simulated, zero where nothing was measured, and return it."""
     np.subtract(record.angle, motion.angle, out=out[0])
     np.subtract(record.rate, motion.rate, out=out[1])
     if not record.is_whole:

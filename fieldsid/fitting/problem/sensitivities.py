@@ -47,16 +47,16 @@ EXPONENT_STEP = 1e-4
 """Half width of the central difference by the exponent of the speed law."""
 
 DriveDerivatives = Mapping[int, tuple[float, FloatArray | None]]
-"""The derivatives of the drives by one number: a factor, and the (n-1,) that it multiplies, none where that is one."""
+"""The derivatives of the drives by one parameter: a factor, and the array (n-1,) that it multiplies, None for ones."""
 UNIT_DRIVE = (1.0, None)
 
 
 @dataclass(frozen=True, slots=True)
 class Sensitivities:
-    """The derivatives of one record's kernel inputs by each parameter, which the sensitivities are integrated from.
+    """The derivatives of one record's kernel inputs by each parameter, from which the sensitivities are integrated.
 
-    `scales` are the record's speed over the reference speed and over the speed of its own group; `authority` is the name of its
-    authority.
+    `scales` are the speed of the record over the reference speed and over the speed of its group; `authority` is the name of its
+    authority parameter.
     """
 
     record: Record
@@ -68,19 +68,19 @@ class Sensitivities:
     start: FloatArray
     arrays: KernelInputs
     others: dict[str, Terms] = field(default_factory=dict, init=False, repr=False)
-    """The terms of all effects but one, by its name, as far as they were asked for."""
+    """Cache of the terms of all effects but one, by the name of that one."""
     paths: dict[str, FinPath] = field(default_factory=dict, init=False, repr=False)
-    """The fin's path before one of the effects, by its name, as far as it was asked for."""
+    """Cache of the path of the fin at the input of an actuator effect, by its name."""
 
     def integrate(self, slots: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
-        """Return motion (n, 3) before the sensor, and a stack (1 + P, 2, n): room for a residual, and the sensitivities."""
+        """Return the motion (n, 3) before the sensors, and a stack (1 + P, 2, n): an empty residual and the sensitivities."""
         drives, d_c, d_start = self._input_jacobians(slots)
         stack = np.empty((1 + len(slots), 2, len(self.record)))
         out = self._integrate_with_sensitivities(slice(0, len(self.record) - 1), drives, d_c, self.start, d_start, stack[1:])
         return out, stack
 
     def integrate_chunked(self, slots: tuple[int, ...], length: int) -> Iterator[tuple[slice, FloatArray, FloatArray]]:
-        """Yield the same in pieces of `length` intervals, without the cross state's sensitivity from piece to piece."""
+        """Yield slice, motion and sensitivities in chunks of `length` intervals; that of the cross state begins at zero."""
         drives, d_c, d_start = self._input_jacobians(slots)
         start, last = self.start, len(self.record) - 1
         for first in range(0, last, length):
@@ -133,7 +133,7 @@ class Sensitivities:
         return combined_core(self.layout.effects, values, self.scales[0])
 
     def _initial_state_derivatives(self, d_c: FloatArray) -> FloatArray:
-        """Return the derivatives (P,) of the initial cross state by the constants (P, C), the rate before the run fixed."""
+        """Return the derivatives (P,) of the initial cross state by the constants (P, C) at a fixed rate before the run."""
         x, before, c = self.start[CROSS], self.values["rate_before"], self.arrays.constants
         by_flow = 2.0 * c[STRIP_FORCE] * c[STRIP_FLOW] * d_c[:, STRIP_FLOW]
         square = d_c[:, CROSS_QUADRATIC] + d_c[:, STRIP_FORCE] * c[STRIP_FLOW] ** 2 + by_flow
@@ -141,7 +141,7 @@ class Sensitivities:
         return np.asarray(push * self._steady_cross_slope())
 
     def _steady_cross_slope(self) -> float:
-        """Return the derivative of the initial cross state by a small input of its equation."""
+        """Return the derivative of the initial cross state by an input of its equation."""
         c = self.arrays.constants
         damping, square = c[CROSS_DAMPING], c[CROSS_QUADRATIC] + c[STRIP_FORCE] * c[STRIP_FLOW] ** 2
         return -1.0 / float(damping + 2.0 * square * abs(self.start[CROSS])) if damping > 0.0 else 0.0
@@ -208,7 +208,7 @@ class Sensitivities:
         """Return the derivatives of the drives by the trim: a constant moment, or one that scales with the authority."""
         if not self.layout.groups.trim_of_fin:
             return {MOMENT[0]: UNIT_DRIVE, MOMENT[1]: UNIT_DRIVE}
-        over, shape = self._over_reference(), self._authority_shape()
+        over, shape = self._authority_ratio(), self._authority_shape()
         return {MOMENT[0]: (over, shape[0]), MOMENT[1]: (over, shape[1])}
 
     def _authority_shape(self) -> tuple[FloatArray | None, FloatArray | None]:
@@ -216,18 +216,18 @@ class Sensitivities:
         factor = self.arrays.terms.authority_factor
         return (None, None) if factor is None else (factor[:-1], factor[1:])
 
-    def _over_reference(self) -> float:
+    def _authority_ratio(self) -> float:
         return over_reference(self.base.authority, self.values[NAMES[self.layout.axis].authority])
 
     def _authority(self, name: str, factor: float) -> DriveDerivatives:
-        """Return the derivatives of the drives by an authority: the fin's moment in its group's runs, and a trim of the fin."""
-        lifted, shape = scaled_fin(self.arrays.fin, self.arrays.terms), self._authority_shape()
+        """Return the derivatives of the drives by an authority: of the fin's moment, and of a trim that scales with it."""
+        fin_moment, shape = scaled_fin(self.arrays.fin, self.arrays.terms), self._authority_shape()
         own, moved = name == self.authority, self._trim_derivative(name, factor)
         if not own:
             return {place: (moved, trim) for place, trim in zip(MOMENT, shape, strict=True)}
         if moved == 0.0:
-            return {place: (factor, fin) for place, fin in zip(MOMENT, lifted, strict=True)}
-        both = zip(MOMENT, lifted, shape, strict=True)
+            return {place: (factor, fin) for place, fin in zip(MOMENT, fin_moment, strict=True)}
+        both = zip(MOMENT, fin_moment, shape, strict=True)
         return {place: (1.0, factor * fin + (moved if trim is None else moved * trim)) for place, fin, trim in both}
 
     def _trim_derivative(self, name: str, factor: float) -> float:
@@ -237,10 +237,10 @@ class Sensitivities:
         if not self.layout.groups.trim_of_fin or self.authority == names.authority or at_reference == 0.0:
             return 0.0
         by_own = trim / at_reference
-        return by_own * factor if name == self.authority else -by_own * self._over_reference()
+        return by_own * factor if name == self.authority else -by_own * self._authority_ratio()
 
     def _of_effect(self, name: str) -> tuple[DriveDerivatives, FloatArray | None]:
-        """Return an effect's own slope where it has one, else the central difference of the kernel inputs."""
+        """Return the derivatives by a coefficient: analytic where the effect has them, else central differences."""
         owner, coefficient = self.layout.owners[name]
         if owner.measure is not None:
             return {}, None
@@ -256,15 +256,15 @@ class Sensitivities:
         }
         if owner.core is None:
             return drives, None
-        # a core is the sum of the effects' own: what the others add, and the factors that they set, stay
+        # the core is the sum of the cores of all effects, so that those of the others do not change
         up, down = (owner.core(values, self.scales[0]) for values in ends)
         return drives, (np.array(up) - np.array(down)) / width
 
     def _changes(self, owner: Effect, above: Values, below: Values) -> dict[int, FloatArray]:
-        """Return what an effect changes of the drives outside of its core from the one values to the other, (n-1,) by place."""
+        """Return the changes (n-1,) of the drives, apart from the core, between two sets of an effect's values, by drive."""
         record = self.record
         if owner.fin is not None:
-            return self._changes_of_fin(*(self._path_behind(owner, values) for values in (above, below)))
+            return self._changes_of_fin(*(self._path_after(owner, values) for values in (above, below)))
         changes = (
             {} if owner.terms is None else self._changes_of_terms(owner, owner.terms(above, record), owner.terms(below, record))
         )
@@ -275,8 +275,8 @@ class Sensitivities:
             _add_moment(changes, moment)
         return changes
 
-    def _path_behind(self, owner: Effect, values: Values) -> FinPath:
-        """Return the fin's path with an actuator effect's numbers at other values; what comes before it is computed once."""
+    def _path_after(self, owner: Effect, values: Values) -> FinPath:
+        """Return the path of the fin with other values of an actuator effect; the path at its input is computed once."""
         chain = in_order(self.layout.effects)
         place = chain.index(owner)
         if owner.name not in self.paths:
@@ -291,11 +291,11 @@ class Sensitivities:
 
     def _changes_of_terms(self, owner: Effect, above: Terms, below: Terms) -> dict[int, FloatArray]:
         changes, base, fin = dict[int, FloatArray](), self.base, self.arrays.fin
-        change = _change_beside(above, below, self._terms_beside(owner))
+        change = _difference_of_terms(above, below, self._terms_of_others(owner))
         if (factor := change.authority_factor) is not None:
-            held = base.trim if base.trim_of_fin else 0.0
-            changes[MOMENT[0]] = (base.authority * fin.start + held) * factor[:-1]
-            changes[MOMENT[1]] = (base.authority * fin.end + held) * factor[1:]
+            trim = base.trim if base.trim_of_fin else 0.0
+            changes[MOMENT[0]] = (base.authority * fin.start + trim) * factor[:-1]
+            changes[MOMENT[1]] = (base.authority * fin.end + trim) * factor[1:]
         if change.moment is not None:
             _add_moment(changes, change.moment)
         if change.damping_factor is not None:
@@ -306,14 +306,14 @@ class Sensitivities:
             changes[CROSS_FACTOR] = over_intervals(change.cross_factor)
         return changes
 
-    def _terms_beside(self, owner: Effect) -> Terms:
+    def _terms_of_others(self, owner: Effect) -> Terms:
         """Return the terms of all effects but one, computed once."""
         if owner.name not in self.others:
             self.others[owner.name] = combined_terms(self.record, [e for e in self.layout.effects if e is not owner], self.values)
         return self.others[owner.name]
 
     def through_sensors(self, motion: Motion, slots: tuple[int, ...], sens: FloatArray) -> Motion:
-        """Return what the sensors show, and carry the sensitivities (P, 2, n) through one after another of them in place."""
+        """Return the motion as the sensors show it, and transform the sensitivities (P, 2, n) in place by each sensor effect."""
         for effect in self.layout.effects:
             if effect.measure is None:
                 continue
@@ -329,7 +329,7 @@ class Sensitivities:
     def _sensor_jvp(self, effect: Effect, motion: Motion, shown: Motion, sens: FloatArray) -> FloatArray:
         """Return the product of a sensor's Jacobian with sensitivities, by differences where the effect has no derivative.
 
-        A step of 1e-6 rad is so small against the scale of any sensor's law that a one-sided difference is exact to 1e-6.
+        A step of 1e-6 rad is so small relative to the scale of any sensor law that a one-sided difference is exact to 1e-6.
         """
         if effect.sensor_jvp is not None:
             return effect.sensor_jvp(sens, motion, self.values, self.record)
@@ -343,7 +343,7 @@ class Sensitivities:
         return out
 
     def _sensor_slope(self, effect: Effect, motion: Motion, name: str, step: float) -> FloatArray:
-        """Return the derivative (2, n) of what a sensor shows by one of its coefficients, by differences where it has none."""
+        """Return the derivative (2, n) of a sensor's output by a coefficient, by differences where it has no analytic one."""
         if effect.sensor_slope is not None:
             return effect.sensor_slope(name, motion, self.values, self.record)
         ends = (self.values | {name: self.values[name] + s} for s in (step, -step))
@@ -361,11 +361,11 @@ def _add(changes: dict[int, FloatArray], place: int, change: FloatArray) -> None
     changes[place] = changes[place] + change if place in changes else change
 
 
-def _change_beside(above: Terms, below: Terms, beside: Terms) -> Terms:
-    """Return the change of each part from one effect's terms to others of it, the factors times those of the effects beside."""
+def _difference_of_terms(above: Terms, below: Terms, of_others: Terms) -> Terms:
+    """Return the change of each term of one effect between two sets of values; factors are times those of the other effects."""
     changes: dict[str, FloatArray] = {}
     for part, how in TERM_PARTS.items():
-        up, down, other = (getattr(terms, part) for terms in (above, below, beside))
+        up, down, other = (getattr(terms, part) for terms in (above, below, of_others))
         if up is not None or down is not None:
             is_factor = how is np.multiply
             change = (float(is_factor) if up is None else up) - (float(is_factor) if down is None else down)

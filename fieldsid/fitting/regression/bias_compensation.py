@@ -1,10 +1,10 @@
-"""What white noise of the samples does in the filtered equation of motion: its transfer, and the bias it leaves.
+"""The effect of white sample noise on the filtered equation of motion: its transfer to the residual, and the bias it causes.
 
-Noise n of the samples passes the filter as straight lines between samples do, so on even steps it enters the
-equation's residual as lambda (s + a)/(s + lambda) n, or lambda^2 (s^2 + a s + k)/(s + lambda)^2 n for the angle
-alone, here as rational functions of the shift q. The same noise is in the regressors: with known variance its
-share of the normal equations can be taken out. Source: Soderstrom 2018, Errors-in-Variables Methods in System
-Identification, chapter 6 (bias-compensated least squares).
+The noise n of the samples is interpolated linearly and filtered like the signal. At equal steps it enters the residual of the
+equation as lambda (s + a)/(s + lambda) n, or lambda^2 (s^2 + a s + k)/(s + lambda)^2 n for the angle alone; here these are
+rational functions of the shift q. The same noise is in the regressors: where its variance is known, its contribution to the
+normal equations can be subtracted. Source: Soderstrom 2018, Errors-in-Variables Methods in System Identification, chapter 6
+(bias-compensated least squares).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fieldsid.fitting.regression.svf_equation import RegressionParameters
 from fieldsid.numerics.arrays import FloatArray
 
 MIN_INVERSE_CORNER_RAD_S = 0.1
-"""Corner (rad/s) below which the inverse transfer is not followed: there noise and start terms cannot be separated."""
+"""Corner (rad/s) below which the inverse transfer is cut off: there noise and start terms cannot be separated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class Transfer:
 
 @dataclass(frozen=True, slots=True)
 class NoiseShare:
-    """Share of white noise in a row's products: gram (4, 4) of the columns and cross (4,) of columns and target."""
+    """Contribution of white noise to a row's products: gram (4, 4) of the columns, cross (4,) of columns and target."""
 
     gram: FloatArray
     cross: FloatArray
@@ -67,7 +67,7 @@ def inverse_of(transfer: Transfer, h: float) -> Transfer:
 
 
 def noise_share(order: int, bandwidth: float, h: float, angle: float, rate: float) -> NoiseShare:
-    """Return the share of white noise of standard deviation angle (rad) and rate (rad/s) in a row's products."""
+    """Return the contribution of white noise of standard deviation angle (rad) and rate (rad/s) to a row's products."""
     impulse = np.zeros(max(64, int(12.0 / (bandwidth * h))))
     impulse[0] = 1.0
     g1, g2 = filtered(np.full(impulse.size, h), np.append(0.0, impulse[:-1]), impulse, bandwidth)[1:].T
@@ -85,14 +85,14 @@ def noise_share(order: int, bandwidth: float, h: float, angle: float, rate: floa
 
 
 def noise_can_go(normal: FloatArray, gram: FloatArray) -> bool:
-    """Whether noise, with its share gram (P, P) of a normal matrix (P, P), makes up less than half of every direction."""
+    """Whether noise, whose contribution is gram (P, P), makes up less than half of a normal matrix (P, P) in every direction."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
     least = [float(np.linalg.eigvalsh(m * np.outer(scale, scale))[0]) for m in (normal - gram, normal)]
     return least[0] > 0.5 * least[1]
 
 
 def inverse_of_normal(normal: FloatArray, gram: FloatArray) -> FloatArray:
-    """Return the inverse of a normal matrix (P, P) with the share of noise taken out of it, where that can be done."""
+    """Return the inverse of a normal matrix (P, P) less the contribution of noise, where that is small enough to subtract."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
     clean = normal - gram if noise_can_go(normal, gram) else normal
     inverse = np.linalg.pinv(clean * np.outer(scale, scale), rcond=1e-13, hermitian=True)

@@ -1,9 +1,9 @@
 """Recursive least squares on the filtered equation of motion, with forgetting: one sample in, the estimate out.
 
     g = P phi,  d = beta + phi' g,  e = q - phi' Theta,  Theta += g e / d,  P <- (P - g g' / d) / beta
-with phi = [-p_f, -y_f, delta_f, 1_f] and q of the filtered equation. Rows count once the filter has forgotten its start.
-Where nothing excites a direction P would grow as beta^-n: forgetting rests while P is at its start value.
-Source: the paper, estimator 2 (recursive); Ljung 1999, section 11.2.
+with phi = [-p_f, -y_f, delta_f, 1_f] and q of the filtered equation. Rows are used once the filter has forgotten its initial
+state. Without excitation P would grow as beta^-n in some direction: there is no forgetting while P is at its start value. Source:
+the paper, estimator 2 (recursive); Ljung 1999, section 11.2.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 
 INITIAL_VARIANCE = 1e6
-"""Start of P (the paper: 100): with filtered rates near 0.1 rad/s a start of 100 pulls the estimate by up to 2 %."""
+"""Start value of P (the paper: 100): with filtered rates near 0.1 rad/s a start of 100 biases the estimate by up to 2 %."""
 CURVATURE_REFRESH_SAMPLES = 16
-"""Samples between two looks at the estimate for the curvature between samples."""
+"""Samples after which the curvature between samples is computed from the new estimate."""
 MAX_NOISE_SHARE = 0.3
 """Share of noise in the normal equations above which their bias is not compensated: noise and signal cannot be separated."""
 MAX_VARIANCE_SHARE = 1e-2
-"""Share of INITIAL below which all of P must be before the estimate is used for the curvature between samples."""
+"""Share of INITIAL_VARIANCE below which all variances in P must be before the estimate is used for the curvature."""
 EQUAL_STEP_SHARE = 1e-9
-"""Share by which two sampling intervals may differ and still use the same filter weights."""
+"""Relative difference of two sampling intervals up to which the same filter weights are used."""
 MEMORY = 27
 (
     SAMPLES, TIME, FIRST_TIME, ANGLE, RATE, P1, P2, Y1, Y2, D1, D2, DECAY, START, SQUARES, WEIGHT, WEIGHT2,
@@ -47,7 +47,7 @@ def row_of(m: FloatArray, order: int, lam: float, angle: float, rate: float) -> 
 
 @jit
 def update(s: FloatArray, row: tuple[float, float, float, float, float], beta: float) -> tuple[float, float]:
-    """Update Theta and P, packed in s (14,), by one row; return the error before it and the share left after.
+    """Update Theta and P, packed in s (14,), by one row; return the error before the update, and the share of it left after.
 
     Written out for four parameters: a loop over matrices takes four times as long. A parameter whose row of P is
     zero stays at zero.
@@ -75,7 +75,7 @@ def update(s: FloatArray, row: tuple[float, float, float, float, float], beta: f
 
 @jit
 def corrected(m: FloatArray, s: FloatArray, noise: FloatArray) -> tuple[float, float, float, float]:
-    """Return Theta with the bias of white sensor noise taken out, as it is where there is too little signal for that.
+    """Return Theta corrected for the bias of white sensor noise; uncorrected where the share of noise is too large.
 
     noise (5,) is its share of one row's products: gram of damping and stiffness (3), cross with the target (2).
     """
@@ -92,7 +92,7 @@ def corrected(m: FloatArray, s: FloatArray, noise: FloatArray) -> tuple[float, f
 
 @jit
 def refresh_curvature(m: FloatArray, s: FloatArray) -> None:
-    """Take the estimate over for the curvature, once every direction has been excited enough to know it."""
+    """Use the present estimate for the curvature between samples, where all variances in P are small enough."""
     m[NEXT_REFRESH] = m[SAMPLES] + CURVATURE_REFRESH_SAMPLES
     if max(s[4], s[8], s[11], s[13]) <= MAX_VARIANCE_SHARE * INITIAL_VARIANCE:
         m[A], m[K], m[B], m[C] = s[0], s[1], s[2], s[3]
@@ -100,7 +100,7 @@ def refresh_curvature(m: FloatArray, s: FloatArray) -> None:
 
 @jit
 def curvatures(m: FloatArray, order: int, h: float, angle: float, rate: float, start: float, end: float) -> tuple[float, float]:
-    """Return the curvature of angle and rate over an interval by the estimate of the last look, zero before it."""
+    """Return the curvature of angle and rate over an interval by the last estimate taken over, zero before there is one."""
     per = 1.0 / h
     slope = (angle - m[ANGLE]) * per
     if order == 1:
@@ -113,7 +113,7 @@ def curvatures(m: FloatArray, order: int, h: float, angle: float, rate: float, s
 def step(
     m: FloatArray, s: FloatArray, lam: float, beta: float, order: int, samples: FloatArray, rows: FloatArray, i: int
 ) -> bool:
-    """Take sample i of [time, fin at the interval's start, at its end, angle, rate, counts]; return whether it counted.
+    """Take sample i of [time, fin at the interval's start, at its end, angle, rate, is used]; return whether a row was used.
 
     m is the filter's memory, s Theta and packed P; row i of rows (n, 5) receives phi and target.
     """
@@ -133,7 +133,7 @@ def step(
     m[P1], m[P2] = advance(m[P1], m[P2], m[RATE], rate, bow_p, h, weights)
     m[Y1], m[Y2] = advance(m[Y1], m[Y2], m[ANGLE], angle, bow_y, h, weights)
     m[D1], m[D2] = advance(m[D1], m[D2], start, end, 0.0, h, weights)
-    # a product left to run below the normal numbers would make every later one several times slower
+    # set to zero before it becomes a denormal number, which would make every later product several times slower
     m[DECAY] = m[DECAY] * m[W0] if m[DECAY] > 1e-30 else 0.0
     m[SAMPLES] += 1.0
     m[TIME], m[ANGLE], m[RATE] = time, angle, rate
@@ -151,7 +151,7 @@ def step(
 
 @jit
 def variance_scale(m: FloatArray, size: int) -> float:
-    """Return what P is to be multiplied with for the variance of a white residual, NaN before there is any."""
+    """Return the factor from P to the covariance under a white residual, NaN before there are enough rows."""
     free = m[WEIGHT] - size
     return float(m[SQUARES] / free * m[WEIGHT2] / m[WEIGHT]) if free > 0.0 else np.nan
 
@@ -161,9 +161,9 @@ def sweep(
     m: FloatArray, s: FloatArray, lam: float, beta: float, order: int, size: int, noise: FloatArray, samples: FloatArray,
     values: FloatArray, spread: FloatArray, rows: FloatArray,
 ) -> None:  # fmt: skip
-    """Run `step` over samples (n, 6) and keep what it found.
+    """Run `step` over samples (n, 6) and store the results.
 
-    Fills values and plain standard deviations (n, 4), and rows (n, 5) of phi and target, NaN where unused.
+    Fills values and uncorrected standard errors (n, 4), and rows (n, 5) of phi and target, NaN where unused.
     """
     for i in range(samples.shape[0]):
         if not step(m, s, lam, beta, order, samples, rows, i):
@@ -175,7 +175,7 @@ def sweep(
 
 
 def initial_memory(*, stiff: bool) -> FloatArray:
-    """Return Theta = 0 and P = INITIAL I, packed (14,); without stiffness its row of P is zero and it stays zero."""
+    """Return Theta = 0 and P = INITIAL_VARIANCE I, packed (14,); without a stiffness its row of P and its value stay zero."""
     s = np.zeros(14)
     s[[4, 8, 11, 13]] = INITIAL_VARIANCE
     s[8] *= stiff
@@ -183,11 +183,11 @@ def initial_memory(*, stiff: bool) -> FloatArray:
 
 
 def forget_filter(m: FloatArray) -> None:
-    """Let the filter begin anew at the next sample, as after a gap: what was estimated, its weight and its errors stay."""
+    """Restart the filter at the next sample, as after a gap; the estimate, its weight and its errors are kept."""
     m[:SQUARES] = 0.0
     m[[H, NEXT_REFRESH]] = 0.0
 
 
 def noise_of(share: NoiseShare) -> FloatArray:
-    """Return the share of white noise in one row's products as the recursion takes it, (5,)."""
+    """Return the contribution of white noise to the products of one row as the vector (5,) that `corrected` takes."""
     return np.array([share.gram[0, 0], share.gram[0, 1], share.gram[1, 1], share.cross[0], share.cross[1]])

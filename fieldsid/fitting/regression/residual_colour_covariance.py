@@ -29,7 +29,7 @@ class ResidualColour:
 
     @property
     def long_run(self) -> float:
-        """Spectrum at zero frequency over the variance: 1 when white, the loss of independent samples otherwise."""
+        """Spectrum at zero frequency over the variance: samples for each independent one; 1 where white."""
         if self.variance == 0.0:
             return 1.0
         return float(self.input_variance / self.denominator.sum() ** 2 / self.variance)
@@ -46,7 +46,7 @@ def colour_of(parts: Sequence[FloatArray]) -> ResidualColour:
 def autoregression(power: FloatArray, count: float, price: float | None = None) -> ResidualColour:
     """Return the autoregression of a series of `count` samples with autocovariances (order + 1,), by Levinson's recursion.
 
-    Its order is chosen by the fit and a price per coefficient: Schwarz's log(count) without one, 2 is Akaike's.
+    Its order is chosen by the fit and a penalty per coefficient: by default Schwarz's log(count); 2 is Akaike's.
     """
     price = float(np.log(count)) if price is None else price
     if power[0] <= 0.0:

@@ -1,4 +1,4 @@
-"""State variable filter: signals through 1/(s + lambda) and 1/(s + lambda)^2, exact for what they are between samples.
+"""State variable filter: signals filtered by 1/(s + lambda) and 1/(s + lambda)^2, exact for their shape between samples.
 
 Over an interval of length h, seen back from its end (tau = h - s), a signal is u(tau) = u_e - (u_e - u_s) tau / h
 - c tau (h - tau) / 2: straight from u_s to u_e with curvature c. A held command has u_s = u_e and c = 0; a

@@ -19,9 +19,9 @@ from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
 MAX_BRIDGED_GAP_S = 0.3
-"""A gap in the measurement up to this is bridged; after a longer one the filter is given time to forget it."""
+"""Longest gap in the measurement that is bridged; after a longer one, rows are left out until the filter has forgotten it."""
 FORGET_TIME_CONSTANTS = 3.0
-"""Filter time constants after which what came before a gap no longer matters."""
+"""Filter time constants after which the samples before a gap no longer matter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ def _bridged(time: FloatArray, values: FloatArray, ok: npt.NDArray[np.bool_]) ->
 
 
 def _usable(time: FloatArray, ok: npt.NDArray[np.bool_], forget_s: float) -> npt.NDArray[np.bool_]:
-    """Return the rows that were measured and are not in the wake of a long gap."""
+    """Return the rows that were measured and do not follow closely on a long gap."""
     use = ok.copy()
     after = time[ok][1:][np.diff(time[ok]) > MAX_BRIDGED_GAP_S]
     for end in after:

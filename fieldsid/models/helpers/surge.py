@@ -31,7 +31,7 @@ def smoothed_surge(time: FloatArray, surge: FloatArray, causes: Sequence[FloatAr
         np.column_stack([*(first_order_lag(steps, cause, lag) for cause in causes), np.exp(-since / lag)])
         for lag in TIME_CONSTANTS_S.tolist()
     )
-    return gcv_smooth(time, surge, fastest_s=fastest_s, beside=columns)
+    return gcv_smooth(time, surge, fastest_s=fastest_s, regressors=columns)
 
 
 def causes_of(thrust: FloatArray | None, fin: FloatArray) -> list[FloatArray]:
