@@ -86,12 +86,12 @@ def html_of(page: Page) -> str:
     """Return a page as a fragment of HTML that is well-formed XML too; every word of the record is escaped."""
     warnings = "".join(f"<li>{escape(w)}</li>" for w in page.warnings)
     parts = [f"<p><b>{escape(page.title)}</b></p>", f"<ul>{warnings}</ul>" if warnings else ""]
-    parts += [_block_html(b) if isinstance(b, Block) else f"<p>{escape(b.strip())}</p>" for b in page.blocks if told(b)]
+    parts += [_block_html(b) if isinstance(b, Block) else f"<p>{escape(b.strip())}</p>" for b in page.blocks if has_content(b)]
     parts += [f"<p>{escape(line)}</p>" for line in page.closing]
     return f'<div class="fieldsid">{"".join(parts)}</div>'
 
 
-def told(block: Block | str) -> bool:
+def has_content(block: Block | str) -> bool:
     """Whether a block says anything."""
     return bool(block.rows if isinstance(block, Block) else block)
 

@@ -84,7 +84,7 @@ def number(value: float | None, digits: int = 4) -> str:
     return f"{value:.{digits - 1}e}"
 
 
-def beside(value: float, limit: float, digits: int = 3) -> str:
+def number_against(value: float, limit: float, digits: int = 3) -> str:
     """Return a number to so many significant digits, or as many more as show on which side of a limit it is."""
     for more in range(digits, MOST_DIGITS):
         shown = number(value, more)

@@ -1,4 +1,4 @@
-"""Two states of a vehicle compared, from models to the one line: `sysid compare OLD NEW`."""
+"""Comparison of two states of a vehicle by their models: `sysid compare OLD NEW`."""
 
 from __future__ import annotations
 
@@ -39,9 +39,10 @@ def compare_models(
 ) -> Change:
     """Return what has changed between the models of one axis before and after.
 
-    Tested are the parameters at the speeds that both sides were flown at, and the effects' coefficients that both have. fin_limit
-    (rad): of the turn and the gains, the largest in the old models' runs if not given. stated: the fin's lag, delay and rate.
-    The gains are P gains. Raises UsageError for models of two axes, without a speed in common, or without runs at a known speed.
+    Tested are the parameters at the speeds at which both sides were flown, and the coefficients of effects that both have.
+    `fin_limit` (rad) is the fin of the turn and the limit of the gains, by default the largest fin in the runs of the old models.
+    `stated` are the lag, delay and rate of the fin. The gains are P gains. Raises UsageError for models of two axes, without a
+    common speed, or without runs at a known speed.
     """
     _refuse(old, new)
     speeds = common_speeds(old, new)
@@ -81,7 +82,7 @@ def _refuse(old: ParameterSource, new: ParameterSource) -> None:
 
 
 def _effects(here: ParameterSource, there: ParameterSource) -> tuple[str, ...]:
-    """Return the effects that models of one side have and none of the other."""
+    """Return the effects that models of one side have and no model of the other."""
     other = {e for m in there.models for e in m.effects}
     return tuple(dict.fromkeys(e for m in here.models for e in m.effects if e not in other))
 
@@ -93,16 +94,18 @@ def _list(source: ParameterSource) -> str:
 def _tried(make: Callable[[], tuple[T, ...]], what: str, notes: list[Note]) -> tuple[T, ...]:
     try:
         return make()
-    except FieldsidError as error:  # one side may have no turn or no gain: the parameters stand without it
+    except FieldsidError as error:  # where one side has no turn or no gain, the parameters are compared without it
         notes.append(Note(f"no_{what}", f"{what} not compared: {error.what}", {}))
         return ()
 
 
-def _remarks(parameters: tuple[ParameterChange, ...], apart: tuple[str, ...]) -> list[Note]:
+def _remarks(parameters: tuple[ParameterChange, ...], one_sided: tuple[str, ...]) -> list[Note]:
     notes: list[Note] = []
-    if apart:
-        said = f"{', '.join(apart)} is in the models of one side only: what it takes up there the other's parameters take up"
-        notes.append(Note("other_form", f"{said}; identify both with the same effects", {"effects": list(apart)}))
+    if one_sided:
+        message = (
+            f"{', '.join(one_sided)} is in the models of one side only: what it takes up there the other's parameters take up"
+        )
+        notes.append(Note("other_form", f"{message}; identify both with the same effects", {"effects": list(one_sided)}))
     for p in parameters:
         changes = [a.change for a in p.speeds if a.is_beyond_errors]
         both_ways = bool(changes) and min(changes) < 0 < max(changes)
@@ -113,7 +116,7 @@ def _remarks(parameters: tuple[ParameterChange, ...], apart: tuple[str, ...]) ->
 
 
 def _verdict(parameters: tuple[ParameterChange, ...], gains: tuple[GainChange, ...]) -> str:
-    """Return what follows for the gains: needed where one must change by more than matters, beyond its errors."""
+    """Return the verdict on the gains: `needed` where one must change significantly and by more than MATTERS."""
     if not gains:
         return "none"
     if any(abs(g.change) > MATTERS and (g.interval95[0] > 0 or g.interval95[1] < 0) for g in gains):

@@ -29,12 +29,12 @@ PULSES = "square_pulses"
 def gain_changes(
     old: ParameterSource, new: ParameterSource, speeds: Sequence[float], fin_limit: float, stated: FinLimits
 ) -> tuple[GainChange, ...]:
-    """Return the P gains at each speed, of a fin with a largest angle (rad), and with lag, delay and rate where they are stated.
+    """Return the P gains at each speed for a fin with a largest angle (rad), and with lag, delay and rate where stated.
 
-    Raises ModelError where no gain holds one of the two loops.
+    Raises ModelError where no gain stabilises one of the two loops.
     """
     was, now = (design_schedule(s, fin_limit, speeds=speeds, wish=Wish(), limits=stated) for s in (old, new))
-    level = LEVEL / len(speeds)  # the speeds are asked together
+    level = LEVEL / len(speeds)  # Bonferroni: one family of intervals over the speeds
     return tuple(_gain(old, new, was.at(s), now.at(s), stated, level) for s in speeds)
 
 
@@ -43,7 +43,7 @@ def _gain(old: ParameterSource, new: ParameterSource, was: Row, now: Row, stated
     families = [family_at(source, speed, stated, DRAWS, SEED + 1000 * i) for i, source in enumerate((old, new))]
     ratio = _formula(families[1]) / _formula(families[0])
     change = now.gains.kp / was.gains.kp - 1.0
-    # the draws say how far the ratio may be off; what lag and delay take of the gain is in its middle
+    # the draws give the relative width of the interval; its centre is the designed gain, which allows for lag and delay
     low, high = (float(np.quantile(ratio, q) / np.median(ratio)) for q in (0.5 * level, 1 - 0.5 * level))
     plant = families[1].one()
     return GainChange(
@@ -53,7 +53,7 @@ def _gain(old: ParameterSource, new: ParameterSource, was: Row, now: Row, stated
 
 
 def _formula(plant: LinearPlant) -> FloatArray:
-    """Return the gain that the formula gives at damping 0.7071, for each draw, (d,)."""
+    """Return the gain for a damping ratio of 0.7071 by the formula, for each draw, (d,)."""
     authority = plant.slow_authority
     size = np.broadcast_to(np.abs(0.5 * plant.slow_damping**2 - plant.stiffness), authority.shape)
     count = min(DRAWS, authority.size)
@@ -71,7 +71,7 @@ def radius_changes(
 
 
 def answers(old: ParameterSource, new: ParameterSource, speed: float, fin_max: float) -> Answers | None:
-    """Return what both vehicles do at the same pulses of the fin, at one speed in m/s; None where a model cannot be flown so."""
+    """Return the responses of both vehicles to the same fin pulses at one speed in m/s; None where one cannot be simulated."""
     models = [s.models[s.near(speed)[0][0]] for s in (old, new)]
     if any(e.needs for m in models for e in effects_of(m)):
         return None
@@ -87,6 +87,6 @@ def answers(old: ParameterSource, new: ParameterSource, speed: float, fin_max: f
 
 
 def fin_of(models: Sequence[Model]) -> float | None:
-    """Return the largest fin angle in the models' runs, rad; None where no model knows it."""
+    """Return the largest fin angle in the models' runs in rad; None where no model has it."""
     known = [m.trained.get("fin_max", 0.0) for m in models]
     return max(known) if known and max(known) > 0 else None

@@ -1,7 +1,7 @@
-"""What one side knows of a parameter at one speed: its models' values there, pooled, with a standard error.
+"""The pooled estimate of a parameter at one speed from all models of one side, with a standard error.
 
-Values of one model at several speeds share what they were fitted to: their errors are taken as fully correlated, those of two
-models as independent. Where models of one side disagree at a speed by more than their errors, the error of their mean is widened
+Values of one model at several speeds come from one fit: their errors are taken as fully correlated, those of two models as
+independent. Where models of one side disagree at a speed by more than their errors, the error of their mean is widened
 by the Birge ratio (Birge 1932, Physical Review 40, 207).
 """
 
@@ -25,7 +25,7 @@ from fieldsid.plant.points import points_of
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Known(Brief):
-    """Values and standard errors by name at one speed, and the share that each model has in them, by its place."""
+    """Values and standard errors by name at one speed, and the weight of each model in them, by its index."""
 
     values: Mapping[str, float]
     std_errors: Mapping[str, float]
@@ -33,7 +33,7 @@ class Known(Brief):
 
 
 def common_speeds(old: ParameterSource, new: ParameterSource) -> list[float]:
-    """Return the speeds in m/s, rising, at which both sides have a model: those of their points, none within 8 % of another."""
+    """Return the speeds in m/s, ascending, at which both sides have a model; points within 8 % of each other count once."""
     found: list[float] = []
     for speed in sorted(float(s) for s in {*old.speeds, *new.speeds}):
         if not (_members(old, speed) and _members(new, speed)):
@@ -45,7 +45,7 @@ def common_speeds(old: ParameterSource, new: ParameterSource) -> list[float]:
 
 
 def known_at(source: ParameterSource, speed: float) -> Known:
-    """Return what a side knows at a speed in m/s."""
+    """Return the pooled estimates of a side at a speed in m/s."""
     names = (*NAMES[source.axis].base, TRIM_ANGLE)
     each = {place: _of_model(source.models[place], speed) for place in _members(source, speed)}
     values, errors, shares = {}, {}, {}
@@ -57,7 +57,7 @@ def known_at(source: ParameterSource, speed: float) -> Known:
 
 
 def _members(source: ParameterSource, speed: float) -> list[int]:
-    """Return the places of the models that were flown at a speed, or between speeds they were flown at."""
+    """Return the indices of the models whose range of flown speeds includes a speed."""
     return [i for i, model in enumerate(source.models) if _covers(model, speed)]
 
 
@@ -68,7 +68,7 @@ def _covers(model: Model, speed: float) -> bool:
 
 
 def _of_model(model: Model, speed: float) -> tuple[dict[str, float], dict[str, float]]:
-    """Return a model's base parameters and trim angle at a speed, and their standard errors: those of its nearest point."""
+    """Return a model's base parameters and trim angle at a speed, with the relative standard errors of its nearest point."""
     names = NAMES[model.axis]
     _, (points,) = points_of([model], ["model"])
     near = min(points, key=lambda p: abs(p.speed - speed))
@@ -95,7 +95,7 @@ def _pooled(each: Mapping[int, tuple[float, float]]) -> tuple[float, float, dict
 
 
 def weights_of(errors: FloatArray) -> FloatArray:
-    """Return the weights (n,) of values with some standard errors (n,), equal where one of them has none."""
+    """Return the inverse-variance weights (n,) for standard errors (n,); equal weights where one is not positive."""
     weights = 1.0 / errors**2 if np.all(errors > 0) else np.ones(errors.size)
     return np.asarray(weights / weights.sum())
 

@@ -1,4 +1,4 @@
-"""Which parameters changed beyond their errors: at each speed in common, and over all of them, several tests at once."""
+"""Tests of which parameters changed significantly, at each common speed and over all speeds, as one family of tests."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ WORDS = {"b2": "authority", "d2": "authority", "a22": "damping", "c22": "damping
 
 @dataclass(frozen=True, slots=True)
 class _Quantity:
-    """One quantity before tests: name, unit, relative or not, and its rows over the speeds, their errors' correlation (n, n)."""
+    """One quantity before the tests: name, unit, relative or not, a row for each speed, correlation of their errors (n, n)."""
 
     name: str
     unit: str
@@ -47,25 +47,29 @@ def parameter_changes(old: ParameterSource, new: ParameterSource, speeds: Sequen
     afters = [known_at(new, s) for s in speeds]
     units = {names.authority: "1/s^2", names.damping: "1/s", names.stiffness: "1/s^2", TRIM_ANGLE: "rad"}
     order = (names.authority, names.damping, *((names.stiffness,) if names.stiffness else ()), TRIM_ANGLE)
-    found = [_over_speeds(n, units[n], speeds, befores, afters) for n in order]
+    found = [_quantity_over_speeds(n, units[n], speeds, befores, afters) for n in order]
     after = {n: (v, e) for n, v, e in shared_values(new)}
     found += [_coefficient(n, v, e, *after[n], old) for n, v, e in shared_values(old) if n in after]
     return _tested(found)
 
 
-def _over_speeds(name: str, unit: str, speeds: Sequence[float], befores: Sequence[Known], afters: Sequence[Known]) -> _Quantity:
+def _quantity_over_speeds(
+    name: str, unit: str, speeds: Sequence[float], befores: Sequence[Known], afters: Sequence[Known]
+) -> _Quantity:
     is_relative = name != TRIM_ANGLE and all(abs(b.values[name]) > 3.0 * b.std_errors[name] for b in befores)
     rows = tuple(
         _row(s, b.values[name], b.std_errors[name], a.values[name], a.std_errors[name], is_relative=is_relative)
         for s, b, a in zip(speeds, befores, afters, strict=True)
     )
     places = range(len(speeds))
-    correlation = np.array([[0.5 * (_alike(befores, i, j) + _alike(afters, i, j)) for j in places] for i in places])
+    correlation = np.array(
+        [[0.5 * (_error_correlation(befores, i, j) + _error_correlation(afters, i, j)) for j in places] for i in places]
+    )
     return _Quantity(name, unit, is_relative, rows, correlation)
 
 
-def _alike(side: Sequence[Known], i: int, j: int) -> float:
-    """Return the correlation of a side's errors at two speeds: that of the models the two have in common."""
+def _error_correlation(side: Sequence[Known], i: int, j: int) -> float:
+    """Return the correlation of a side's errors at two speeds, which comes from the models used at both."""
     a, b = side[i].shares, side[j].shares
     size = float(np.sqrt(sum(w * w for w in a.values()) * sum(w * w for w in b.values())))
     return sum(w * b.get(p, 0.0) for p, w in a.items()) / size
@@ -98,7 +102,7 @@ def _tested(found: Sequence[_Quantity]) -> tuple[ParameterChange, ...]:
 
 
 def _mean(quantity: _Quantity) -> tuple[float, float]:
-    """Return the change over the speeds, weighted by its errors, and its standard error with what the speeds share."""
+    """Return the weighted mean change over the speeds, and its standard error with the correlation of the speeds."""
     changes, errors = (np.array([getattr(r, n) for r in quantity.rows]) for n in ("change", "std_error"))
     weights = weights_of(errors)
     spread = weights * errors
@@ -113,14 +117,14 @@ def _judged(quantity: _Quantity, rows: tuple[AtSpeed, ...], change: float, error
     reach = -float(ndtri(0.5 * LEVEL)) * error
     low, high = change - reach, change + reach
     least = min([v for v in (p, *(r.p_adjusted for r in rows)) if np.isfinite(v)], default=float("nan"))
-    state = CHANGED if least < LEVEL else UNCHANGED if max(abs(low), abs(high)) <= _matters(quantity) else UNCLEAR
+    state = CHANGED if least < LEVEL else UNCHANGED if max(abs(low), abs(high)) <= _least_relevant_change(quantity) else UNCLEAR
     return ParameterChange(
         quantity.name, WORDS.get(quantity.name, quantity.name), quantity.unit, quantity.is_relative, change, error, (low, high),
         least, state, rows,
     )  # fmt: skip
 
 
-def _matters(quantity: _Quantity) -> float:
+def _least_relevant_change(quantity: _Quantity) -> float:
     if quantity.is_relative:
         return MATTERS
     return TRIM_MATTERS_RAD if quantity.unit == "rad" else MATTERS * max(abs(r.old) for r in quantity.rows)

@@ -1,4 +1,4 @@
-"""As promised? Steps of the goal that an autopilot flew, each against what a verification says of the same step at its speed."""
+"""Goal steps that an autopilot flew, each compared with the prediction of a verification for the same step and speed."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from fieldsid.schedule.record import Schedule
 from fieldsid.schedule.verify import STEPS_RAD, promised_step
 
 SMOOTH_S = 0.5
-"""A heading is averaged over so long before its overshoot is read off: a peak of the sensor's noise is none of the hull's."""
-SURE = 3.0
-"""Standard errors of the sensor's noise by which a number must be beyond what was promised."""
+"""Time over which the angle is averaged before its overshoot is measured, so that peaks of the sensor noise do not count."""
+MIN_STD_ERRORS = 3.0
+"""Standard errors of the sensor noise by which a number must exceed the prediction to count as worse."""
 
 
 @dataclass(frozen=True, slots=True)
 class FlownStep:
-    """What a step that was flown came to: overshoot as a share of it, settling (s, infinite if never), steady error (rad)."""
+    """The result of a step that was flown: overshoot as a share of the step, settling (s, inf if never), steady error (rad)."""
 
     overshoot: Annotated[Number, Key("Overshoot of the angle averaged over half a second.", "overshoot_percent", times=100.0)]
     settling: Annotated[Number, Key("Time to stay within 5 %; null if it was not there at the end of the step.", "settling_s")]
@@ -38,7 +38,7 @@ class FlownStep:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class KeptStep(Brief):
-    """One step of the goal, flown and promised; `noise` (rad) is that of the averaged angle."""
+    """One goal step as flown and as predicted; `noise` (rad) is that of the averaged angle."""
 
     run: Annotated[str, Key("Name of the run.")]
     start: Annotated[float, Key("When the goal changed.", "t_start_s")]
@@ -52,7 +52,7 @@ class KeptStep(Brief):
     @property
     def broken(self) -> Annotated[tuple[str, ...], Key()]:
         """The numbers that are worse than 95 % of the draws said: of a step that was not held so long settling is none."""
-        f, p, slack = self.flown, self.promised, SURE * self.noise
+        f, p, slack = self.flown, self.promised, MIN_STD_ERRORS * self.noise
         worse = {
             "overshoot": f.overshoot > p.overshoot_most + slack / abs(self.size),
             "settling": f.settling > p.settling_most and self.seconds > p.settling_most,
@@ -67,7 +67,7 @@ class KeptStep(Brief):
 
 
 def kept_steps(schedule: Schedule, of: Plants, run: Run) -> list[KeptStep]:
-    """Return the steps of the goal in a run, flown and promised; raises DataError where there is none."""
+    """Return the goal steps in a run as flown and as predicted; raises DataError where there is none."""
     names = NAMES[schedule.axis]
     if not (run.has(names.goal) and run.has(names.angle)):
         raise DataError(
@@ -75,7 +75,10 @@ def kept_steps(schedule: Schedule, of: Plants, run: Run) -> list[KeptStep]:
             found=f"signals {', '.join(n for n in run.signals if run.has(n))}",
             hint=f"map `{names.goal}` and `{names.angle}` on import",
         )
-    found = [_kept(schedule, of, run, *part) for part in _held(run.time, run[names.goal], STEPS_RAD[schedule.axis][0] / 2)]
+    found = [
+        _compared_step(schedule, of, run, *part)
+        for part in _goal_intervals(run.time, run[names.goal], STEPS_RAD[schedule.axis][0] / 2)
+    ]
     if not found:
         least = np.degrees(STEPS_RAD[schedule.axis][0] / 2)
         raise DataError(
@@ -86,8 +89,8 @@ def kept_steps(schedule: Schedule, of: Plants, run: Run) -> list[KeptStep]:
     return found
 
 
-def _held(time: FloatArray, goal: FloatArray, least: float) -> Iterator[tuple[int, int]]:
-    """Yield first and last sample of each stretch of a goal that is held after a change of at least so much (rad)."""
+def _goal_intervals(time: FloatArray, goal: FloatArray, least: float) -> Iterator[tuple[int, int]]:
+    """Yield the first and last sample of each interval of constant goal after a change of at least `least` rad."""
     known = np.flatnonzero(np.isfinite(goal))
     changed = [int(known[0]), *(int(known[i + 1]) for i in np.flatnonzero(np.abs(np.diff(goal[known])) > 1e-9)), time.size]
     for before, start, end in zip(changed, changed[1:], changed[2:], strict=False):
@@ -95,7 +98,7 @@ def _held(time: FloatArray, goal: FloatArray, least: float) -> Iterator[tuple[in
             yield start, end
 
 
-def _kept(schedule: Schedule, of: Plants, run: Run, start: int, end: int) -> KeptStep:
+def _compared_step(schedule: Schedule, of: Plants, run: Run, start: int, end: int) -> KeptStep:
     names = NAMES[schedule.axis]
     time, angle = run.time[start:end] - run.time[start], run[names.angle][start:end]
     goal = float(run[names.goal][start])
@@ -108,7 +111,7 @@ def _kept(schedule: Schedule, of: Plants, run: Run, start: int, end: int) -> Kep
     moved = np.sign(size) * (smooth - smooth[0])[:, None]
     surge = run["surge_m_s"][start:end] if knows_speed(run) else np.full(2, schedule.speeds[0])
     speed = float(np.nanmedian(surge))
-    band = SETTLING_BAND + SURE * noise / abs(size)
+    band = SETTLING_BAND + MIN_STD_ERRORS * noise / abs(size)
     flown = FlownStep(
         overshoot=float(overshoot(moved, abs(size))[0]),
         settling=float(settling(time, moved, abs(size), band)[0]),
@@ -119,5 +122,5 @@ def _kept(schedule: Schedule, of: Plants, run: Run, start: int, end: int) -> Kep
 
 
 def worst_of(steps: Sequence[KeptStep]) -> KeptStep:
-    """Return the step that breaks most of what was promised, of those that break none the one that overshoots most."""
+    """Return the step with the most numbers worse than predicted, among equals the one with the largest overshoot."""
     return max(steps, key=lambda s: (len(s.broken), s.flown.overshoot))

@@ -26,7 +26,7 @@ from fieldsid.artifacts import plain
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.voice import voice
 from fieldsid.logs.run import Note
-from fieldsid.page import Block, Page, Whole, dense, folded, told
+from fieldsid.page import Block, Page, Whole, dense, folded, has_content
 from fieldsid.records.keys import Result, body_of
 from fieldsid.text.one_line import one_line
 
@@ -132,7 +132,7 @@ def print_file(to: Console, text: str) -> None:
 
 def print_page(to: Console, page: Page) -> None:
     """Print the blocks and sentences of a page: the first lines of the result stand for its title and warnings."""
-    for i, block in enumerate(filter(told, page.blocks)):
+    for i, block in enumerate(filter(has_content, page.blocks)):
         if i and (isinstance(block, Block) or block.startswith("\n")):
             to.print()
         if isinstance(block, Block):

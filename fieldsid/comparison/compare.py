@@ -1,4 +1,4 @@
-"""A model against runs it may not have seen: how well its free run follows, and where it fails."""
+"""Comparison of a model with runs, also with runs it was not fitted to: how well its free run follows, and where it fails."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from fieldsid.rounding import MANY, Angles, number
 
 
 def left_in_words(over_floor: float, fit: float, digits: int = 1) -> str:
-    """Return what a model leaves of a channel: the error over its noise; of a log without noise the fit in percent."""
+    """Return a model's error in a channel in words: over its noise, or the fit in percent for a log without noise."""
     return f"{over_floor:.{digits}f} x its noise" if over_floor < MANY else f"fit {fit:.1f} %"
 
 
 def errors_in_words(merit: GoodnessOfFit, floor: Noise, angles: Angles, digits: int) -> list[tuple[str, str]]:
-    """Return each measured channel and, to some digits in a unit of angle, its free-run error beside its noise, and the fit."""
+    """Return the name of each measured channel, and its free-run error, noise and fit in words, in a unit of angle."""
 
-    def said(unit: str, rms: float, noise: float, fit: float) -> str:
+    def in_words(unit: str, rms: float, noise: float, fit: float) -> str:
         error, of = (number(angles.factor * v, digits) for v in (rms, noise))
         return f"rms {error} {unit} (noise {of}), fit {number(fit, 3)} %"
 
@@ -41,13 +41,13 @@ def errors_in_words(merit: GoodnessOfFit, floor: Noise, angles: Angles, digits: 
         ("angle", angles.unit, merit.angle_rms, floor.angle, merit.angle_fit),
         ("rate", f"{angles.unit}/s", merit.rate_rms, floor.rate, merit.rate_fit),
     )
-    return [(name, said(unit, rms, *more)) for name, unit, rms, *more in channels if isfinite(rms)]
+    return [(name, in_words(unit, rms, *more)) for name, unit, rms, *more in channels if isfinite(rms)]
 
 
 def badness(over_floor: float, fit: float) -> tuple[float, float]:
-    """Return what channels and runs are ordered by: the error over the noise, and of logs without noise what the fit leaves.
+    """Return the sorting key of channels and runs: the error over the noise, then 100 less the fit in percent.
 
-    The floor of a log without noise is that of its digits, which says nothing of one channel against the other.
+    The fit decides for logs without noise, whose floor is that of their digits and cannot be compared between channels.
     """
     return min(over_floor, MANY), 100.0 - fit
 
@@ -65,7 +65,7 @@ class Channel(Brief):
 
     @property
     def badness(self) -> tuple[float, float]:
-        """What it is ordered by among channels."""
+        """The sorting key among channels, see `badness`."""
         return badness(self.over_floor, self.fit)
 
 
@@ -86,39 +86,38 @@ class Comparison(Plotted):
         return self.shown.record.name
 
     @property
-    def leading(self) -> Channel:
+    def worst_channel(self) -> Channel:
         """The worst channel: the one furthest above its noise floor, or of less fit in a log without noise."""
         return self.channels[0]
 
     @property
     def over_noise(self) -> float:
-        """The error over the noise floor, the measured channels pooled: what a diagnosis and an extension judge by."""
+        """The error over the noise floor, pooled over the measured channels: the measure of a diagnosis and an extension."""
         return pooled(c.over_floor for c in self.channels)
 
     @property
     def badness(self) -> tuple[float, float]:
-        """What it is ordered by among runs."""
-        return badness(self.over_noise, self.leading.fit)
+        """The sorting key among runs, see `badness`."""
+        return badness(self.over_noise, self.worst_channel.fit)
 
     @property
     def failing(self) -> tuple[Channel, ...]:
-        """The channels that have more left than their noise, the worst first; none where the run as a whole has not."""
+        """The channels whose error exceeds their noise, the worst first; empty where the pooled error does not."""
         return () if is_noise(self.over_noise) else tuple(c for c in self.channels if not is_noise(c.over_floor))
 
     @property
     def where(self) -> tuple[Place, ...]:
-        """Where the error of the leading channel falls."""
-        return self.leading.where
+        """The places of the worst channel's error."""
+        return self.worst_channel.where
 
 
 def compare(model: Model, runs: Sequence[Run], *, unfit: Refused[Run] | None = None) -> tuple[Comparison, ...]:
     """Return the comparison of a model with each run.
 
-    Its initial state, per-run nuisances, the command's times between samples and, within its measurement's error, the run's
-    speed are refitted, nothing else. unfit is told of each of several runs that cannot be compared with; without it, for a
-    single run, and where none is left, its error is raised.
-    Raises DataError for a run without the signals, EffectError for one without a signal that an effect needs,
-    ModelError when the model grows without bound.
+    Only the initial state, the nuisance parameters of the run, the times of the command between samples and, within its
+    measurement error, the speed are refitted. `unfit` is called with each of several runs that cannot be compared; without
+    `unfit`, for a single run, and where no run can be compared, the error of the run is raised. Raises DataError for a run
+    without the signals, EffectError for one without a signal that an effect needs, ModelError when the model grows without bound.
     """
     made = (attempt(lambda one: compare_one(model, one), run) for run in runs)
     return tuple(found for _, found in sifted(runs, made, unfit))

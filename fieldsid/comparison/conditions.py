@@ -1,6 +1,6 @@
 """The conditions of a run: phase of the maneuver, fin angle, rate, speed, heading, side, depth, time; each a set of samples.
 
-Words are those of a person at the log: `phase: onset`, `side: port`. A signal that hardly moves makes no conditions.
+They are named in plain words: `phase: onset`, `side: port`. There are no conditions of a signal that hardly changes.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from fieldsid.numerics.arrays import FloatArray
 Mask = npt.NDArray[np.bool_]
 
 ONSET_S = 1.0
-"""Time after a fin movement that counts as onset."""
+"""Time after a fin movement that counts as the onset phase."""
 MIN_MOVE_RANGE_SHARE = 0.1
-"""Share of the fin's range that is a movement, or an angle off trim."""
+"""Least change of the fin that is a movement, and least angle off trim, as shares of the fin's range."""
 MIN_TURNING_RATE_SHARE = 0.1
-"""Share of the largest rate below which the vehicle goes straight."""
+"""Rate below which the vehicle goes straight, as a share of the largest rate."""
 LEAST_SPREAD = {"surge": 0.05, "depth": 0.5}
-"""Spread (m/s as a share of the median; m) below which a signal makes no conditions."""
+"""Least spread of a signal (surge: as a share of its median; depth: in m) for which there are conditions."""
 QUARTERS = 4
 WIDEST_HEADING = np.pi / 2
 

@@ -13,7 +13,7 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.records.keys import Key
 
 SMALLEST_SHARE = 0.02
-"""Share of the samples below which a condition says nothing."""
+"""Share of the samples below which a condition is left out."""
 STRETCH_WINDOW_S = 2.0
 JOIN_S = 0.5
 MOST_STRETCHES = 3
@@ -32,7 +32,7 @@ class Place:
 
     @property
     def beyond(self) -> float:
-        """The share of the squared error beyond that of the samples: by this it is told where a model fails most."""
+        """The share of the squared error less that of the samples: it ranks the conditions by how much the model fails."""
         return self.share_of_error - self.share_of_samples
 
 
@@ -46,7 +46,7 @@ class Stretch:
 
 
 def places(time: FloatArray, square: FloatArray, ok: Mask, conditions: Sequence[Condition]) -> tuple[Place, ...]:
-    """Return where squared residuals (n,) fall, most above its share of the samples first; ok (n,) marks measured ones."""
+    """Return the places of squared residuals (n,), ordered by `Place.beyond`; ok (n,) marks the measured samples."""
     total, count = float(square[ok].sum()), int(ok.sum())
     found = []
     for condition in conditions:
@@ -71,11 +71,11 @@ def worst_run(time: FloatArray, square: FloatArray, here: Mask) -> tuple[float, 
 
 def stretches(time: FloatArray, square: FloatArray, ok: Mask) -> tuple[Stretch, ...]:
     """Return the worst stretches of two seconds that do not overlap, the worst first."""
-    left = np.where(ok, square, 0.0)
-    total = float(left.sum())
+    remaining = np.where(ok, square, 0.0)
+    total = float(remaining.sum())
     found: list[Stretch] = []
     while total > 0.0 and len(found) < MOST_STRETCHES:
-        sums = np.concatenate([[0.0], np.cumsum(left)])
+        sums = np.concatenate([[0.0], np.cumsum(remaining)])
         ends = np.searchsorted(time, time + STRETCH_WINDOW_S, side="right")
         inside = sums[ends] - sums[:-1]
         first = int(np.argmax(inside))
@@ -83,5 +83,5 @@ def stretches(time: FloatArray, square: FloatArray, ok: Mask) -> tuple[Stretch, 
         if inside[first] <= 0.0:
             break
         found.append(Stretch(float(time[first]), float(time[last]), float(inside[first]) / total))
-        left[first : last + 1] = 0.0
+        remaining[first : last + 1] = 0.0
     return tuple(found)

@@ -1,6 +1,6 @@
-"""What the residual moves with: the moment a model misses, against every signal of the run.
+"""Signals that the residual follows: a regression of the moment that the model lacks on every signal of the run.
 
-The residual of the rate obeys e' + a e = missing moment to first order; quarter-second means keep the sensor's noise out.
+The residual of the rate obeys e' + a e = missing moment to first order; means over a quarter of a second reduce the sensor noise.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def missing_moment(shown: Prediction, damping: float) -> tuple[FloatArray, Float
 
 
 def companions(shown: Prediction, damping: float) -> tuple[Companion, ...]:
-    """Return the signals the missing moment moves with, the closest first."""
+    """Return the signals by the share of the missing moment that they explain, the largest first."""
     _, moment = missing_moment(shown, damping)
     if moment.size == 0 or float(np.var(moment)) == 0.0:
         return ()
@@ -62,5 +62,5 @@ def _explained(moment: FloatArray, signal: FloatArray) -> float:
         return 0.0
     columns = np.stack([np.ones(centred.size), centred, centred * np.abs(centred)], axis=1)
     columns /= np.maximum(np.abs(columns).max(axis=0), 1e-300)
-    left = moment - columns @ np.linalg.lstsq(columns, moment, rcond=None)[0]
-    return max(0.0, 1.0 - float(np.var(left)) / float(np.var(moment)))
+    unexplained = moment - columns @ np.linalg.lstsq(columns, moment, rcond=None)[0]
+    return max(0.0, 1.0 - float(np.var(unexplained)) / float(np.var(moment)))

@@ -1,4 +1,4 @@
-"""When an error over the noise is the noise alone: the one limit that verdicts, tables, headlines and next steps share."""
+"""The limit up to which an error over the noise floor counts as noise alone, shared by verdicts, tables and next steps."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ SUFFICIENT_ERROR_RATIO = 1.15
 
 
 def pooled_over_noise(*channels: tuple[float | None, float | None]) -> float:
-    """Return free-run errors over their noises, (error, noise) of each channel, pooled over what was measured; else NaN."""
+    """Return the pooled ratio of free-run errors to noise, from (error, noise) of each measured channel; NaN without any."""
     return pooled(error / noise for error, noise in channels if error is not None and noise)
 
 
 def over_noise(errors: Mapping[str, Any], floor: Mapping[str, Any]) -> float:
-    """Return the same of errors and a noise floor as records and JSON name them."""
+    """Return the pooled ratio of errors to a noise floor, both with the keys of records and JSON."""
     names = (("angle_rms_rad", "angle_rad"), ("rate_rms_rad_s", "rate_rad_s"))
     return pooled_over_noise(*((errors.get(name), floor.get(of)) for name, of in names))
 
 
 def pooled(ratios: Iterable[float]) -> float:
-    """Return errors over the noise, of channels or of runs, as one: the root of their mean square; NaN without any."""
+    """Return the root mean square of errors over the noise, of channels or of runs; NaN without any finite one."""
     squares = [ratio**2 for ratio in ratios if isfinite(ratio)]
     return float((sum(squares) / len(squares)) ** 0.5) if squares else float("nan")
 

@@ -1,1 +1,1 @@
-"""A model with one physical effect more, kept only where that pays, and the line of models it comes from."""
+"""Extension of a model by a physical effect, kept only where it improves the prediction, and the ancestry of a model."""

@@ -1,7 +1,7 @@
-"""A model with some effects more: everything refitted together, and judged on runs that were not fitted.
+"""Extension of a model by effects: all parameters are refitted, and the result is judged on runs that were not fitted.
 
-Before and after are found by the one search that `diagnose` uses, with the same start values, noise models and runs,
-so that the difference between them is the addition and nothing else.
+The models before and after come from the same search as in `diagnose`, with the same start values, noise models and runs, so that
+they differ in the addition only.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ FITTED_TO_ALL = Note(
     "the runs to fit leave the addition's size open, and the unseen ones settle it: all were fitted, none is left to judge by",
 )
 FORM_TAKEN = "form_taken"
-"""Code of the note that an effect was added in a form that is not the textbook's."""
+"""Code of the note that an effect was added in a variant other than the textbook form."""
 BEAM_WIDTH = 2
-"""Orders in which several effects are added that are followed from one addition to the next."""
+"""Number of partial sets of the effects that the search continues from after each addition."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,14 +78,14 @@ class Gain(Brief):
 
     @property
     def over_floor(self) -> tuple[float, float]:
-        """The same over the noise floor."""
+        """The error before and after over the noise floor, on unseen data where there are any."""
         before, after = self.judged
         return before.over(self.noise_floor), after.over(self.noise_floor)
 
     def left(self, *, kept: bool) -> tuple[float, float]:
-        """Return the error over the noise floor that the addition leaves, or its lack where not kept: fitted, validation runs.
+        """Return the error over the noise floor on fitted and on validation runs, with the addition if `kept`, else without.
 
-        NaN for the unseen where there are none.
+        It is NaN where there are no validation runs.
         """
         pair = self.after if kept else self.before
         return pair.train.over(self.noise_floor), pair.validation.over(self.noise_floor)
@@ -102,7 +102,7 @@ class Extension(Plotted):
 
     @property
     def pays(self) -> bool:
-        """Whether the error falls by more than a trifle; where all data were fitted the evidence must pay as well."""
+        """Whether the error falls by more than a negligible factor; where all data were fitted, the evidence must rise too."""
         before, after = self.gain.over_floor
         return after < MAX_ERROR_RATIO * before and (self.gain.unseen or self.evidence > 0.0)
 
@@ -116,16 +116,16 @@ def extend_in_steps(
     report: Callable[[str], None] = lambda _text: None,
     unfit: Refused[Run] | None = None,
 ) -> tuple[Extension, ...]:
-    """Return an extension for each of some effects, each of the model before it, so that a person watches the error fall.
+    """Return one extension for each effect added, each of the model of the step before.
 
-    All come from one search, base and all effects refitted to the training runs together: the whole is reached in the best of
-    several orders, of which that of the steps is one. Without validation runs a part of the training runs is held back to judge
-    by. Where an addition is accepted though its error on the validation runs does not fall, since the training runs leave its
-    size open, all runs are fitted together. report is told what is being tried. unfit is told of each of several runs that cannot
-    be fitted; without it, and where none of a group is left, its error is raised.
-    Raises UsageError for an effect that is unknown, of the other axis or in the model already, DataError for runs that
-    cannot be used or lack a signal the effects need, EffectError for a user's effect that fails, or has a coefficient of a name
-    that another effect of the model has.
+    All steps come from one search, in which the base parameters and all effects are refitted to the training runs together. The
+    full set of effects is reached in the best of several orders; the order of the steps is one of them. Without validation runs,
+    a part of the training runs is held out for validation. Where the training runs do not determine the size of an addition, it
+    may be accepted though the error on the validation runs does not fall; then all runs are fitted together. `report` is called
+    with the name of each trial. `unfit` is called with each of several runs that cannot be fitted; without `unfit`, and where no
+    run of a group can be fitted, the error of the run is raised. Raises UsageError for an effect that is unknown, of the other
+    axis or in the model already, DataError for runs that cannot be used or lack a signal the effects need, EffectError for a
+    user's effect that fails, or has a coefficient of a name that another effect of the model has.
     """
     new = new_effects(parent, add)
     fitted, checked = records_of([training, validation], parent.axis, unfit)
@@ -143,7 +143,7 @@ def extend_in_steps(
 
 
 def whole_of(steps: Sequence[Extension]) -> Extension:
-    """Return steps as one extension, from before the first to after the last: how the runs were flown the last model says."""
+    """Return steps as one extension, from before the first to after the last, with the notes on the runs of the last one."""
     first, last = steps[0].gain, steps[-1].gain
     gain = replace(last, added=tuple(name for s in steps for name in s.gain.added), before=first.before)
     notes = (*(n for s in steps[:-1] for n in s.notes if n.code == FORM_TAKEN), *steps[-1].notes)
@@ -151,10 +151,10 @@ def whole_of(steps: Sequence[Extension]) -> Extension:
 
 
 def _grown(work: Search, new: Sequence[Effect]) -> list[ScoredModel]:
-    """Return the parent and what it becomes with each of the new effects after the other, refitted.
+    """Return the refitted parent and the refitted models after each addition of the new effects in their order.
 
-    The whole is grown from the best few sets of each size and from the first effects in their order; then the search goes on as
-    that of `diagnose` does, with these effects alone, and keeps of each set the better optimum.
+    The full set is built up from the best few sets of each size and from the first effects in their order. Then the search of
+    `diagnose` runs with these effects alone, and the better optimum of each set is kept.
     """
     work.base()
     line = [work.root | {e.name for e in new[:size]} for size in range(len(new) + 1)]
@@ -169,7 +169,7 @@ def _grown(work: Search, new: Sequence[Effect]) -> list[ScoredModel]:
 def _steps(
     work: Search, line: Sequence[ScoredModel], new: Sequence[Effect], notes: tuple[Note, ...]
 ) -> tuple[Extension, ...]:  # fmt: skip
-    """Return the extensions from each model of a line to the next; what the last leaves over is noise in all of them."""
+    """Return the extensions from each model of a line to the next; the residual of the last defines the noise of all."""
     work.lower_floor(line[-1])
     steps = zip(line[:-1], line[1:], new, strict=True)
     return tuple(_extension(work, before, after, [effect], notes) for before, after, effect in steps)
@@ -180,9 +180,9 @@ def _extension(
 ) -> Extension:  # fmt: skip
     """Return the extension from a model without the new effects to one with them, both fitted by one search."""
     learned, judged = work.records, work.validation
-    told = common_own_moment(before, after)
-    before, after = before.with_own_moment(told), after.with_own_moment(told)
-    # as `diagnose` has it: what runs without noise leave over is no colour of a sensor's
+    moment_std = common_own_moment(before, after)
+    before, after = before.with_own_moment(moment_std), after.with_own_moment(moment_std)
+    # as in `diagnose`: the residual of runs without noise is not coloured sensor noise
     ended_with = after.likelihood_fit if work.is_noiseless else joint_noise_fit(after.likelihood_fit, work.parallel)
     noise = ended_with.noise
     gain = Gain(
@@ -200,7 +200,7 @@ def _extension(
 
 
 def forms_taken(model: Model, new: Sequence[Effect]) -> tuple[Note, ...]:
-    """Return a note for each effect that a model holds in a form which is not the textbook's, with the form in words."""
+    """Return a note for each effect that a model has in a variant other than the textbook form, with the variant in words."""
     notes = []
     for effect in new:
         own, textbook = effect.names & set(model.values), {c.name for c in effect.coefficients}
@@ -238,7 +238,7 @@ def new_effects(parent: Model, add: Sequence[str]) -> tuple[Effect, ...]:
 
 
 def _with_signals(parts: Sequence[Effect], records: Sequence[Record]) -> tuple[Effect, ...]:
-    """Return the effects with the forms that can be tried; raises DataError for one whose signals the records lack."""
+    """Return the effects with the variants that can be tried; raises DataError for one whose signals the records lack."""
     kept, skipped = applicable_effects(parts, records)
     for name, why in skipped.items():
         raise DataError(

@@ -1,6 +1,6 @@
-"""Where an extended model comes from: its parents with the error before and after each addition, their hashes checked.
+"""The ancestry of an extended model: its parents with the errors before and after each addition, and a check of their hashes.
 
-And the loop in one record: where the first model of a line fails, what was added, and how the error fell, an effect a step.
+And the modelling loop in one record: where the first model fails, which effects were added, and how the error fell with each.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from fieldsid.numerics.arrays import known
 from fieldsid.records.check import ShapeError, check
 from fieldsid.records.keys import INLINE, Key, Number, body_of
 from fieldsid.records.model import EXTENSION
-from fieldsid.records.named_inputs import beside, sha256_of, sha256_of_named
+from fieldsid.records.named_inputs import first_allowed, sha256_of, sha256_of_named
 from fieldsid.records.reading import load_record
 from fieldsid.rounding import MANY
 
@@ -66,7 +66,7 @@ class Generation(Brief):
 
 
 def kept_by(extension: Extension) -> str:
-    """Return why an extension is kept: `unseen` data are predicted better, the `evidence` pays, or the user said `--keep`."""
+    """Return why an extension is kept: `unseen` data are predicted better, the `evidence` rises, or the user gave `--keep`."""
     if not extension.pays:
         return "--keep"
     return "unseen" if extension.gain.unseen else "evidence"
@@ -99,7 +99,7 @@ def save_steps(
     steps: Sequence[Extension], files: Sequence[Path], parent: Path, data: tuple[Sequence[Run], Sequence[Run]], *,
     mapping: Path | None = None, force: bool,
 ) -> None:  # fmt: skip
-    """Write each step's model with the one before it as its parent; data: training and unseen runs, by a mapping if any.
+    """Write the model of each step with that of the previous step as its parent; `data` are the training and unseen runs.
 
     Raises ArtifactError.
     """
@@ -109,27 +109,27 @@ def save_steps(
 
 
 def parent_of(path: Path) -> Parent | None:
-    """Return the parent a model file names, None where it names none; raises ArtifactError.
+    """Return the parent that a model file names, None where it names none; raises ArtifactError.
 
-    The parent is looked for where the file says, and beside the file itself: a folder may have been moved.
+    The parent is looked for at the path in the file, and in the folder of the file, which may have been moved.
     """
     named = load_record(path, KIND).get("parent")
     if named is None:
         return None
-    said, digest = Path(named["path"]), named["sha256"]
+    named_path, digest = Path(named["path"]), named["sha256"]
     trial = path.resolve().parent.parent
-    places = [p for p in (said, path.parent / said.name) if beside([p], trial) is not None and not p.is_dir()]
+    places = [p for p in (named_path, path.parent / named_path.name) if first_allowed([p], trial) is not None and not p.is_dir()]
     for place in places:
         if sha256_of_named(place) == digest:
             return Parent(place, digest, INTACT)
-    return Parent(places[0], digest, CHANGED) if places else Parent(said, digest, MISSING)
+    return Parent(places[0], digest, CHANGED) if places else Parent(named_path, digest, MISSING)
 
 
 def history_of(path: Path) -> tuple[Generation, ...]:
-    """Return the line of a model from its oldest known ancestor on; raises ArtifactError where a file cannot be read.
+    """Return the ancestors of a model, the oldest first, and the model itself; raises ArtifactError where one cannot be read.
 
-    A parent that is missing ends the line: what its child knows of it is all that is said. No log is looked at before every
-    model of the line has been read.
+    Where a parent is missing the line ends with an entry made of what its child records. The logs are hashed only after all
+    models have been read.
     """
     line: list[Generation] = []
     logs: dict[Path, list[tuple[Path, str]]] = {}
@@ -152,15 +152,15 @@ def history_of(path: Path) -> tuple[Generation, ...]:
 
 
 def _with_logs(generation: Generation, logs: Sequence[tuple[Path, str]]) -> Generation:
-    """Return a generation that knows which of its logs are no longer what they were."""
+    """Return a generation with the names of those of its logs that have changed."""
     trial = generation.path.resolve().parent.parent
-    there = [(path, digest) for path, digest in logs if beside([path], trial) is not None]
+    there = [(path, digest) for path, digest in logs if first_allowed([path], trial) is not None]
     changed = tuple(str(path) for path, digest in there if sha256_of_named(path) not in (None, digest))
     return generation if generation.step is None else replace(generation, step=replace(generation.step, changed_data=changed))
 
 
 def _step(path: Path, body: Any) -> tuple[Step | None, list[tuple[Path, str]]]:
-    """Return how a model was extended, and the logs it was made from with their hashes."""
+    """Return the step by which a model was extended, and the logs it was made from with their hashes."""
     if body is None:
         return None, []
     try:
@@ -231,12 +231,12 @@ class Loop(Brief):
 
     @property
     def where(self) -> Annotated[tuple[Place, ...], Key()]:
-        """Where the first model's leading channel fails, the most first."""
+        """Where the worst channel of the first model fails, the most first."""
         return tuple(p for p in self.before.where if p.beyond > 0.0)
 
     @property
     def is_noiseless(self) -> bool:
-        """Whether there is no noise floor that errors could be told over."""
+        """Whether the log has no noise to which errors could be compared."""
         return self.before.over_noise >= MANY
 
     @property
@@ -248,11 +248,11 @@ class Loop(Brief):
         return tuple(_loop_step(name, pair, floor, gains[0].before if self.is_noiseless else None) for name, pair, floor in pairs)
 
     def left_by(self, found: Comparison) -> str:
-        """Return in words what one of the two models leaves of the run."""
+        """Return in words the error of one of the two models on the run."""
         if not self.is_noiseless:
             return f"error {found.over_noise:.2f} x the noise"
-        leading = next(c for c in found.channels if c.name == self.before.leading.name)
-        return f"{leading.name} fit {leading.fit:.1f} %"
+        worst_channel = next(c for c in found.channels if c.name == self.before.worst_channel.name)
+        return f"{worst_channel.name} fit {worst_channel.fit:.1f} %"
 
 
 def _loop_step(name: str, pair: Pair, floor: Noise, first: Pair | None) -> LoopStep:
@@ -266,9 +266,9 @@ def _loop_step(name: str, pair: Pair, floor: Noise, first: Pair | None) -> LoopS
 
 
 def loop_of(line: Sequence[Generation], first: Sequence[Comparison], last: Sequence[Comparison]) -> Loop | None:
-    """Return the loop of a line by the comparisons of its first and of its last model with the same runs; None where it has none.
+    """Return the loop of a line from comparisons of its first and last model with the same runs; None without an extension.
 
-    It is shown on the run that the first model fails most on, of those that the last was not fitted to where there are any.
+    It is shown on the run with the largest error of the first model, if possible one to which the last was not fitted.
     """
     pairs = [(b, a) for b in first for a in last if a.run == b.run]
     unseen = [(b, a) for b, a in pairs if b.run not in a.model.runs]

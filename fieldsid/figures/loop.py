@@ -46,13 +46,13 @@ def headline(found: Loop) -> str:
 
 def draw_motion(found: Loop, ax: Axes, models: list[tuple[str, Comparison, str]]) -> None:
     """Draw the channel that the first model fails most in, measured and by each model, its worst stretches shaded."""
-    record, is_rate = found.before.shown.record, found.before.leading.name == "rate"
+    record, is_rate = found.before.shown.record, found.before.worst_channel.name == "rate"
     values, ok = (record.rate, record.rate_ok) if is_rate else (record.angle, record.angle_ok)
     canvas.dress(ax, y=f"{record.axis.value} rate, deg/s" if is_rate else f"{record.axis.value}, deg")
     canvas.dots(ax, record.time[ok], np.degrees(values[ok]))
     for name, one, colour in models:
         ax.plot(record.time, np.degrees(one.shown.rate if is_rate else one.shown.angle), color=colour, linewidth=1.3, label=name)
-    for stretch in found.before.leading.worst:
+    for stretch in found.before.worst_channel.worst:
         ax.axvspan(stretch.start_s, stretch.end_s, color=canvas.WARM, alpha=0.18, linewidth=0)
     ax.set_xlim(record.time[0], record.time[-1])
 

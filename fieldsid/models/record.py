@@ -22,7 +22,7 @@ from fieldsid.models.fin_path import FinPath
 from fieldsid.models.helpers.surge import causes_of, smoothed_surge
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.gcv_smoother import gcv_smooth
-from fieldsid.rounding import beside
+from fieldsid.rounding import number_against
 
 SPEED_LIMITS_M_S = (0.05, 50.0)
 """Plausible median surge speeds: below the first no fin steers, above the second the log has another unit."""
@@ -290,7 +290,7 @@ def speed_refused(run: Run) -> str:
         return ""
     middle, limit = beyond
     side = "above the {:g} m/s of any vehicle in water" if middle >= limit else "below the {:g} m/s of one under way"
-    return f"surge_m_s is {beside(middle, limit)} m/s in the middle, {side.format(limit)}"
+    return f"surge_m_s is {number_against(middle, limit)} m/s in the middle, {side.format(limit)}"
 
 
 def _measured(run: Run, name: str) -> tuple[FloatArray, npt.NDArray[np.bool_]]:

@@ -1,7 +1,7 @@
-"""What a record must hold, said as data: a value of another type, sign, range or word is refused with the way to it.
+"""Check a record against a shape: a value of another type, sign, range or word is refused, with the path of its keys.
 
-A shape is a mapping of keys to shapes (one that ends in `?` may be left out), a list of one shape for each item, a tuple of
-shapes for a list of just so many, or a function that looks at one value. Keys that a shape does not name are left alone.
+A shape is a mapping of keys to shapes (a key that ends in `?` may be missing), a list with one shape for all items, a tuple of
+shapes for a list of that length, or a function that checks one value. Keys that a shape does not name are ignored.
 """
 
 from __future__ import annotations
@@ -13,25 +13,25 @@ from typing import Any
 from fieldsid.errors import shortened
 
 LARGEST = 1e9
-"""No number of a vehicle in SI is larger: what is beyond is damage, and its powers would overflow."""
+"""Largest number accepted: none of a vehicle in SI is larger, and powers of larger ones would overflow."""
 LARGEST_SPEED_M_S = 50.0
-"""Nothing goes faster through water: what is above is another unit."""
+"""Largest speed accepted: a larger number is in another unit."""
 LARGEST_FIN_RAD = 1.5708
-"""A fin across the flow: no limit of one is larger."""
+"""Largest fin limit accepted: a fin across the flow."""
 
 AXES = ("yaw", "pitch")
 SIDES = ("port", "starboard")
 
 Shape = Any
-"""A mapping, list or tuple of shapes, or what looks at a value and a place and raises ShapeError."""
+"""A mapping, list or tuple of shapes, or a function of a value and its place that raises ShapeError."""
 
 
 class ShapeError(ValueError):
-    """A value that is not what its place in a record needs, with both in words."""
+    """A value that does not have the shape required at its place in a record; the message has both."""
 
 
 def check(value: object, shape: Shape, place: str = "") -> None:
-    """Raise ShapeError where a value, at a place of a record, has not some shape."""
+    """Raise ShapeError where a value at a place of a record does not have the shape."""
     if isinstance(shape, Mapping):
         _refuse(not isinstance(value, Mapping), value, place, "keys with values")
         for name, inner in shape.items():
@@ -51,12 +51,12 @@ def check(value: object, shape: Shape, place: str = "") -> None:
 def _check_key(value: Any, name: str, inner: Shape, place: str) -> None:
     key, is_optional = name.removesuffix("?"), name.endswith("?")
     if key in value:
-        check(value[key], inner, _way(place, key))
+        check(value[key], inner, _path(place, key))
     elif not is_optional:
-        raise ShapeError(f"`{_way(place, key)}` is missing")
+        raise ShapeError(f"`{_path(place, key)}` is missing")
 
 
-def _way(place: str, key: str) -> str:
+def _path(place: str, key: str) -> str:
     return f"{place}.{key}" if place else key
 
 
@@ -67,7 +67,7 @@ def _items(value: object, place: str) -> list[Any]:
 
 
 def finite_number(value: object, name: str, low: float = -LARGEST, high: float = LARGEST) -> float:
-    """Return a value of a record as the number it must be, within bounds; raises ShapeError for what is none of a vehicle."""
+    """Return a value of a record as a number; raises ShapeError where it is not a finite number within the bounds."""
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         raise _wrong(value, name, "a finite number")
     if not low <= value <= high:
@@ -92,7 +92,7 @@ def above_zero(high: float = LARGEST) -> Shape:
 
 
 def maybe(shape: Shape) -> Shape:
-    """Return the shape of what may be nothing too: a number that could not be found is written so."""
+    """Return the shape of a value that may also be null, as which a number that could not be computed is written."""
     return lambda value, place: None if value is None else check(value, shape, place)
 
 
@@ -102,7 +102,7 @@ def each(shape: Shape) -> Shape:
     def look(value: object, place: str) -> None:
         _refuse(not isinstance(value, Mapping), value, place, "keys with values")
         for key, item in value.items():  # type: ignore[attr-defined]
-            check(item, shape, _way(place, str(key)))
+            check(item, shape, _path(place, str(key)))
 
     return look
 
@@ -118,18 +118,18 @@ def at_least_one(shape: Shape) -> Shape:
 
 
 def times(count: int, shape: Shape) -> Shape:
-    """Return the shape of a list of so many of one shape."""
+    """Return the shape of a list of `count` items of one shape."""
     return lambda value, place: check(value, (shape,) * count, place)
 
 
 def one_of(words: Collection[str]) -> Shape:
-    """Return the shape of one of some words."""
+    """Return the shape of a text that is one of the words."""
     wanted = f"one of {', '.join(words)}"
     return lambda value, place: _refuse(not isinstance(value, str) or value not in words, value, place, wanted)
 
 
 def anything(_value: object, _place: str) -> None:
-    """Take any value: what reads it further on has a shape of its own."""
+    """Accept any value, which is checked where it is read."""
 
 
 def text(value: object, place: str) -> None:
@@ -159,9 +159,9 @@ def _wrong(value: object, place: str, wanted: str) -> ShapeError:
 SOURCE: Shape = {"path": text, "sha256": text}
 """A file that a record was made from."""
 HEAD: Shape = {"inputs?": maybe([SOURCE]), "mapping?": maybe(SOURCE), "parent?": maybe(SOURCE)}
-"""What the head of every record holds beside its schema."""
+"""The head of every record, in addition to its schema."""
 ERRORS: Shape = {"angle_rms_rad": maybe(number(0.0)), "rate_rms_rad_s": maybe(number(0.0))}
-"""The error of a free run; nothing where a channel was not measured."""
+"""The error of a free run; null where a channel was not measured."""
 BOTH_SIDES: Shape = {"train": ERRORS, "validation": ERRORS}
 FLOOR: Shape = {"angle_rad": maybe(number(0.0)), "rate_rad_s": maybe(number(0.0))}
-"""The noise floor that errors are told over."""
+"""The noise floor to which errors are compared."""

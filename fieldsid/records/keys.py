@@ -1,7 +1,7 @@
 """The keys of a record: a field or property with a `Key` in its annotation is a key of the record's JSON.
 
-The one place where a record's keys are said. Its JSON object, the rows of its tables and the JSON Schema of
-the guide are read off them.
+It is the only definition of a record's keys: its JSON object, the rows of its tables and the JSON Schema of the guide are derived
+from it.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ Side = Literal["port", "starboard"]
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """What a key means, in a sentence (of a property its docstring), and its name in JSON where that is not the field's.
+    """The meaning of a key in a sentence (for a property its docstring), and its name in JSON where that is not the field's.
 
-    `of` is the type that JSON has of it where that is not the field's, `times` what a number is multiplied by, as a share that
-    is told in per cent. `is_inline`: the keys of the record it holds stand in its place. `is_optional`: left out where None.
+    `of` is its type in JSON where that is not the field's. `times` is a factor for JSON, as for a share that is given in per
+    cent. `is_inline`: the keys of the record in this field are written in place of this key. `is_optional`: left out where None.
     """
 
     says: str = ""
@@ -41,7 +41,7 @@ INLINE = Key(is_inline=True)
 
 
 class Result:
-    """What a command comes to: its JSON begins with the name and version of the object, and ends with its first lines."""
+    """The result of a command: its JSON begins with the name and version of the object, and ends with its first lines."""
 
     __slots__ = ()
     SCHEMA: ClassVar[str]
@@ -49,7 +49,7 @@ class Result:
 
 @cache
 def keys_of(kind: type) -> tuple[tuple[str, str, Any, Key], ...]:
-    """Return attribute, name in JSON, type and key of all that a class of records has in its JSON, properties last."""
+    """Return attribute, name in JSON, type and key of each entry in the JSON of a class of records, properties last."""
     found = [pair for base in reversed(kind.__mro__) for pair in _fields(base)]
     for name in dict.fromkeys(n for base in reversed(kind.__mro__) for n in vars(base)):
         member = getattr(kind, name)
@@ -59,7 +59,7 @@ def keys_of(kind: type) -> tuple[tuple[str, str, Any, Key], ...]:
 
 
 def _fields(kind: type) -> Iterator[tuple[str, Any]]:
-    """Yield the fields of a class that have a key, with their types: those of others may not be there when the program runs."""
+    """Yield the fields of a class that have a key, with their types; the types of other fields may not exist at run time."""
     own = {n: h for n, h in vars(kind).get("__annotations__", {}).items() if "Key(" in str(h) or "INLINE" in str(h)}
     alone = type(kind.__name__, (), {"__annotations__": own, "__module__": kind.__module__})
     yield from get_type_hints(alone, include_extras=True).items()
@@ -73,7 +73,7 @@ def _keys(found: list[tuple[str, Any]]) -> Iterator[tuple[str, str, Any, Key]]:
 
 
 def body_of(record: Any) -> dict[str, Any]:
-    """Return a record as the mapping that its JSON is, the records in it too."""
+    """Return the mapping that is a record's JSON, with all records in it as mappings too."""
     body: dict[str, Any] = {"schema": record.SCHEMA} if isinstance(record, Result) else {}
     for attribute, name, hint, key in keys_of(record.__class__):
         value = getattr(record, attribute)
@@ -89,7 +89,7 @@ def body_of(record: Any) -> dict[str, Any]:
 
 
 def opened(value: Any) -> Any:
-    """Return a value with every record in it as a mapping; what is no record stays as it is."""
+    """Return a value with every record in it as a mapping; other values are returned unchanged."""
     if isinstance(value, Mapping):
         return {k: opened(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
@@ -98,5 +98,5 @@ def opened(value: Any) -> Any:
 
 
 def has_keys(value: Any) -> bool:
-    """Whether a value is a record that says its keys."""
+    """Whether a value is a record with keys."""
     return is_dataclass(value) and not isinstance(value, type) and bool(keys_of(value.__class__))

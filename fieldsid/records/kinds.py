@@ -1,7 +1,7 @@
-"""The kinds of records by their schema: the shape of each, what it is called, and how it is made again.
+"""The kinds of records by their schema: the shape of each, its name, and how it is made again.
 
-A plan and a prior are looked through number by number where they are read, for there the bounds are those of their maneuvers and
-effects; here they have what a folder's overview needs of them.
+The numbers of a plan and of a prior are checked where they are read, as their bounds are those of their maneuvers and effects;
+the shapes here have only what the overview of a folder needs.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from fieldsid.records.schedule import SCHEDULE
 
 
 class Kind(NamedTuple):
-    """What a record of one kind holds, is called in an error, and how it is made again."""
+    """The shape of one kind of record, its name in an error, and how it is made again."""
 
     shape: Shape
     name: str
@@ -66,7 +66,7 @@ DRAWN_DIAGNOSIS: Shape = {
     **dict.fromkeys(("verdict", "base", "noise_floor"), anything),
     "candidates": [{"train": anything, "validation": anything}],
 }
-"""What a report needs of a diagnosis beside that."""
+"""What a report needs of a diagnosis in addition."""
 TURN_RADIUS: Shape = {
     **HEAD,
     "rudder_max_rad?": above_zero(LARGEST_FIN_RAD),
@@ -90,10 +90,10 @@ RUN_HEAD: Shape = {
     "schema": text,
     "notes": [{"code": text, "message": text, "data": {"signal?": anything, "reach_rad?": number(0.0)}}],
 }
-"""What a run keeps beside its columns."""
+"""The metadata of a run file, next to its columns."""
 
 ANY = Kind(HEAD, "record", "make it again")
-"""A record of a kind that nothing is read back from but its head."""
+"""A record of a kind of which only the head is read back."""
 KINDS = {
     "fieldsid/model": Kind(MODEL, "model file", "identify again, with `--force`"),
     "fieldsid/fit": Kind(FIT, "fit file", "make it again: `sysid fit MODEL...`"),

@@ -1,4 +1,4 @@
-"""What a fit file holds: laws over speed, the points they were drawn through, and the models these came from."""
+"""The shape of a fit file: laws over speed, the points they were fitted to, and the models of these points."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from fieldsid.records.check import AXES, HEAD, Shape, at_least_one, each, maybe,
 from fieldsid.records.model import EXPONENT, MODEL, SPEED
 
 LARGEST_COEFFICIENT = 1e6
-"""Of a law of powers of the speed, SI: no vehicle damps or turns so fast."""
+"""Largest coefficient of a law of powers of the speed in SI."""
 LARGEST_LOGARITHM = 50.0
-"""Of the two numbers of a law k u^e, which are ln k and e."""
+"""Largest of the two coefficients ln k and e of a law k u^e."""
 REGRESSION: Shape = {
     "kind": text,
     "powers": [EXPONENT],

@@ -1,4 +1,4 @@
-"""What a file of a model holds; under `info`, where estimators leave remarks, there may be more."""
+"""The shape of a model file; `info`, where estimators store remarks, may have further keys."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from fieldsid.records.check import (
 
 SPEED = above_zero(LARGEST_SPEED_M_S)
 EXPONENT = number(-20.0, 20.0)
-"""A power of the speed: those of a fit are between 0 and 3, and those of all speeds there are stay numbers with it."""
+"""An exponent of the speed: those of a fit are between 0 and 3; within these bounds no power of a speed overflows."""
 EXTENSION = {
     "added": [text],
     "before": BOTH_SIDES,

@@ -1,7 +1,7 @@
-"""Files that a record names as what it was made from: looked for inside or beside its trial, known by their SHA-256.
+"""The input files that a record names: they are looked for in its trial or next to it, and identified by their SHA-256.
 
-A record may come from anybody and name anything. What is no plain file, lies elsewhere or is larger than is stated here is as
-if it were not there: a device has no end, and the files of a whole system take hours.
+A record may come from anybody and name any path. A path that is not a plain file or folder, lies elsewhere, or is larger than the
+limits here is treated as missing: a device has no end, and hashing a file system takes hours.
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ from fieldsid.errors import ArtifactError
 from fieldsid.records.reading import read_yaml
 
 LARGEST_HASHED = 1 << 28
-"""Bytes of a file that a record names, or of all files of a folder, up to which they are hashed: a second at the most."""
+"""Most bytes of a named file, or of all files of a named folder, that are hashed: this takes at most a second."""
 MOST_HASHED = 1000
-"""Files and folders in a folder that a record names, as a bag is one, up to which it is hashed."""
+"""Most files and folders in a named folder, such as a bag, for which it is hashed."""
 ABOVE = 3
-"""Folders above a record that its trial, and what lies beside that, can be: `models` of it, the trial, and the one it lies in."""
+"""Number of folders above a record that are searched: its folder (`models`), the trial, and the folder that contains the
+trial."""
 
 
 def sha256_of(path: Path) -> str:
@@ -37,35 +38,38 @@ def sha256_of(path: Path) -> str:
 
 
 def sha256_of_named(path: Path) -> str | None:
-    """Return the SHA-256 of a file or folder that a record or a trial's folder names; None for what is not hashed here."""
+    """Return the SHA-256 of a file or folder that a record or a trial names; None where it is missing or beyond the limits."""
     if os.path.isdir(path):  # noqa: PTH112 - says no of what cannot be a path, and does not raise
-        held = list(islice(path.rglob("*"), MOST_HASHED + 1))
-        files = [p for p in held if p.is_file()] if len(held) <= MOST_HASHED else []
+        entries = list(islice(path.rglob("*"), MOST_HASHED + 1))
+        files = [p for p in entries if p.is_file()] if len(entries) <= MOST_HASHED else []
     else:
         files = [path] if is_there(path) else []
     try:
         return sha256_of(path) if files and sum(p.stat().st_size for p in files) <= LARGEST_HASHED else None
-    except OSError:  # closed to this user: as if it were not there
+    except OSError:  # not readable by this user: treated as missing
         return None
 
 
 def is_there(path: Path) -> bool:
-    """Whether a path is that of a plain file or of a folder; false of any text that can be none."""
+    """Whether a path is that of a plain file or of a folder; false for any text that cannot be a path."""
     return os.path.isfile(path) or os.path.isdir(path)  # noqa: PTH112, PTH113 - say no where a path cannot be one
 
 
-def beside(places: Iterable[Path], trial: Path) -> Path | None:
-    """Return the first of some places that is a plain file or a folder, inside a trial, beside it or where the program runs."""
+def first_allowed(places: Iterable[Path], trial: Path) -> Path | None:
+    """Return the first of the paths that exists in the folder that contains the trial, or in that of the working folder.
+
+    None where there is none. These folders include the trial and the working folder.
+    """
     allowed = [Path(os.path.abspath(p)).parent for p in (trial, Path())]  # noqa: PTH100 - a link counts where it lies
     for place in places:
-        whole = Path(os.path.abspath(place))  # noqa: PTH100
-        if is_there(place) and any(whole.is_relative_to(a) for a in allowed):
+        absolute = Path(os.path.abspath(place))  # noqa: PTH100
+        if is_there(place) and any(absolute.is_relative_to(a) for a in allowed):
             return place
     return None
 
 
 def inputs_of(path: Path) -> tuple[Path, ...]:
-    """Return the files that a record says it was made from, those that are still there; none where it cannot be read."""
+    """Return the existing input files that a record names; empty where the record cannot be read."""
     try:
         return inputs_in(read_yaml(path), path)
     except ArtifactError:
@@ -73,7 +77,7 @@ def inputs_of(path: Path) -> tuple[Path, ...]:
 
 
 def inputs_in(body: Mapping[str, Any], record: Path) -> tuple[Path, ...]:
-    """Return the files that a record's body says it was made from, those that are still there."""
+    """Return the existing input files that the body of a record names."""
     named = body.get("inputs")
     entries = [e for e in named if isinstance(e, Mapping)] if isinstance(named, list) else []
     found = (where_now(e, record) for e in entries)
@@ -81,7 +85,7 @@ def inputs_in(body: Mapping[str, Any], record: Path) -> tuple[Path, ...]:
 
 
 def mapping_of(records: Iterable[Path]) -> Path | None:
-    """Return the first mapping that the logs of some records were read with, as `mapping_in` does; None where none names one."""
+    """Return the first mapping that one of the records names, as `mapping_in` does; None where none names one."""
     for path in records:
         with suppress(ArtifactError):
             if (mapping := mapping_in(read_yaml(path), path)) is not None:
@@ -90,16 +94,16 @@ def mapping_of(records: Iterable[Path]) -> Path | None:
 
 
 def mapping_in(body: Mapping[str, Any], record: Path) -> Path | None:
-    """Return the mapping that a record's body says its logs were read with, where it still is; None where none was named."""
+    """Return the mapping with which a record's logs were read; None where the body names none or it is missing."""
     entry = body.get("mapping")
     return where_now(entry, record) if isinstance(entry, Mapping) else None
 
 
 def where_now(entry: Mapping[str, Any], record: Path) -> Path | None:
-    """Return the path of a file that a record names with its SHA-256, as seen from the working folder; None where it is nowhere.
+    """Return the path, from the working folder, of a file that a record names with its SHA-256; None where it is missing.
 
-    What is not there is looked for from the folders above the record, and known by its hash: a record tells its files from the
-    folder where it was made.
+    A record names its files from the folder in which it was made. Where the path does not exist, it is therefore looked for from
+    the folders above the record, and accepted where its hash is right.
     """
     named = entry.get("path")
     if not isinstance(named, str) or not named:
@@ -107,7 +111,7 @@ def where_now(entry: Mapping[str, Any], record: Path) -> Path | None:
     path = Path(named)
     folders = list(islice(record.resolve().parents, ABOVE))
     trial = folders[min(1, len(folders) - 1)]
-    if (there := beside([path], trial)) is not None or path.is_absolute():
+    if (there := first_allowed([path], trial)) is not None or path.is_absolute():
         return there
     above = (p for p in _places(path, folders, trial) if sha256_of_named(p) == entry.get("sha256"))
     found = next(above, None)
@@ -115,4 +119,4 @@ def where_now(entry: Mapping[str, Any], record: Path) -> Path | None:
 
 
 def _places(path: Path, folders: Iterable[Path], trial: Path) -> Iterator[Path]:
-    return (p for folder in folders if (p := beside([folder / path], trial)) is not None)
+    return (p for folder in folders if (p := first_allowed([folder / path], trial)) is not None)

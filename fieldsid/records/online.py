@@ -1,11 +1,11 @@
-"""What a saved state of a live estimate holds, array by array."""
+"""The shape of the saved state of a live estimate."""
 
 from __future__ import annotations
 
 from fieldsid.records.check import AXES, Shape, above_zero, each, flag, maybe, number, one_of, text, times, whole
 
 ANY = number(-1e60, 1e60)
-"""A number whose squares are numbers still."""
+"""A number whose square does not overflow."""
 NOT_MEASURED = maybe(ANY)
 LINE = maybe((ANY, ANY))
 COUNT = number(0.0, 1e15)

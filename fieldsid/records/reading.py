@@ -1,7 +1,7 @@
-"""Text, YAML and JSON from files that anybody may have written: read up to stated limits, each with an error of its own.
+"""Read text, YAML and JSON from untrusted files: up to stated limits, each with a separate error.
 
-This is the one way in for every such file. What comes out is nested mappings with text as keys, lists, text, numbers of 64 bits,
-yes and no, and nothing: whatever else YAML can say (tags, dates, files that hold themselves) is refused or stays text.
+All such files are read here. The result has nested mappings with text keys, lists, text, numbers of 64 bits, booleans and null;
+everything else that YAML allows (tags, dates, files that contain themselves) is refused or stays text.
 """
 
 from __future__ import annotations
@@ -28,26 +28,26 @@ from fieldsid.records.check import ShapeError, check
 from fieldsid.records.kinds import ANY, KINDS
 
 LARGEST_TEXT = 4 << 20
-"""Bytes of a file of text: a hundred times the largest that this program writes, the state of a live estimate."""
+"""Most bytes of a text file: a hundred times the largest that this program writes, the state of a live estimate."""
 MOST_VALUES = 30_000
-"""Keys and values of a YAML file, those behind an alias as often as it is used: ten times those of a law of many speeds."""
+"""Most keys and values of a YAML file, where those of an alias count at each use: ten times those of a law of many speeds."""
 DEEPEST = 60
-"""Mappings and lists inside one another."""
+"""Most levels of nested mappings and lists."""
 LARGEST_INTEGER = 2**64
-"""No count, identity or number of a file is as large: none of the arrays that they go into would hold it."""
+"""Integers must be smaller, so that they fit into arrays."""
 _TAG = "tag:yaml.org,2002:"
 _KNOWN = frozenset(_TAG + t for t in ("map", "seq", "str", "int", "float", "bool", "null", "merge"))
 _AS_TEXT = frozenset(_TAG + t for t in ("timestamp", "value"))
-"""What YAML may take a plain word for that is meant as it stands: days, and an equals sign."""
+"""YAML types that are read as text: dates, and the equals sign."""
 _SURROGATES = range(0xD800, 0xE000)
 
 
 class LimitError(ValueError):
-    """A limit that a text passes: which, in words."""
+    """A limit that a text exceeds; the message says which."""
 
 
 def read_text(path: Path) -> str:
-    """Read a text file; raises ArtifactError when it cannot be read, is no plain file, is too large or is no text."""
+    """Read a text file; raises ArtifactError where it cannot be read, is not a plain file, is too large or is not text."""
     try:
         return read_bytes(path).decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
@@ -57,7 +57,7 @@ def read_text(path: Path) -> str:
 
 
 def read_bytes(path: Path) -> bytes:
-    """Read the bytes of a file of text as they are; raises ArtifactError as `read_text` does."""
+    """Read the bytes of a text file without decoding; raises ArtifactError as `read_text` does."""
     try:
         with open(path, "rb", opener=_without_waiting) as stream:
             if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
@@ -66,8 +66,8 @@ def read_bytes(path: Path) -> bytes:
                 )
             raw = stream.read(LARGEST_TEXT + 1)
     except IsADirectoryError as error:
-        held = sorted(p.name for p in path.iterdir())
-        found = f"it holds {', '.join(held[:3])}{' ...' if len(held) > 3 else ''}" if held else "it is empty"
+        names = sorted(p.name for p in path.iterdir())
+        found = f"it holds {', '.join(names[:3])}{' ...' if len(names) > 3 else ''}" if names else "it is empty"
         raise ArtifactError(f"`{path}` is a folder, where a file is needed", found=found, hint="name a file in it") from error
     except OSError as error:
         raise ArtifactError(
@@ -82,18 +82,18 @@ def read_bytes(path: Path) -> bytes:
 
 
 def _without_waiting(path: str, flags: int) -> int:
-    """Open a file so that a pipe into which nobody writes is no wait."""
+    """Open a file without waiting, even if it is a pipe without a writer."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
-    """Read a YAML mapping; raises ArtifactError when it cannot be read, passes a limit or is not a mapping."""
+    """Read a YAML mapping; raises ArtifactError where it cannot be read, exceeds a limit or is not a mapping."""
     return yaml_mapping(read_text(path), path)
 
 
 def yaml_mapping(text: str, path: Path) -> dict[str, Any]:
-    """Return the mapping that a YAML text holds; raises ArtifactError naming the file it came from."""
-    body = _told_of(path, lambda: deepcopy(_parsed(text)))
+    """Return the mapping of a YAML text; raises ArtifactError naming the file it came from."""
+    body = _with_file_in_error(path, lambda: deepcopy(_parsed(text)))
     if not isinstance(body, dict):
         raise ArtifactError(f"`{path}` holds no keys with values", found=_shape_of(body), hint="write `key: value` lines")
     return body
@@ -102,7 +102,7 @@ def yaml_mapping(text: str, path: Path) -> dict[str, Any]:
 def load_record(path: Path, kind: str) -> dict[str, Any]:
     """Read a record back and check that it is one of `kind` (`fieldsid/model` for `fieldsid/model/1`).
 
-    Raises ArtifactError when the file cannot be read, is not YAML, is another kind of record, or has not the shape of its kind.
+    Raises ArtifactError where the file cannot be read, is not YAML, is another kind of record, or lacks the shape of its kind.
     """
     body = read_yaml(path)
     schema = body.get("schema")
@@ -122,7 +122,7 @@ def load_record(path: Path, kind: str) -> dict[str, Any]:
 
 
 def check_kind(body: Mapping[str, Any], kind: str, path: Path) -> None:
-    """Raise ArtifactError where a record has not the shape of its kind: what is wrong, and where."""
+    """Raise ArtifactError where a record does not have the shape of its kind, with the key and what is wrong."""
     shape, name, again = KINDS.get(kind, ANY)
     try:
         check(body, shape)
@@ -131,7 +131,7 @@ def check_kind(body: Mapping[str, Any], kind: str, path: Path) -> None:
 
 
 def read_json(text: str | bytes) -> Any:
-    """Return what a JSON text says; raises ValueError where it is none, or passes a limit."""
+    """Return the value of a JSON text; raises ValueError where it is not JSON or exceeds a limit."""
     if len(text) > LARGEST_TEXT:
         raise LimitError(f"{len(text)} bytes, more than {LARGEST_TEXT}")
     try:
@@ -139,7 +139,7 @@ def read_json(text: str | bytes) -> Any:
     except RecursionError as error:
         raise LimitError("brackets without end") from error
     if (b"\\u" if isinstance(text, bytes) else "\\u") in text:  # type: ignore[operator]
-        json.dumps(body, ensure_ascii=False).encode()  # of a letter that no text has UnicodeEncodeError, which is a ValueError
+        json.dumps(body, ensure_ascii=False).encode()  # raises UnicodeEncodeError, a ValueError, for a lone surrogate
     return body
 
 
@@ -150,13 +150,13 @@ def _integer(digits: str) -> int:
 
 
 def near_files(path: Path) -> str:
-    """Return what a file that is not there may have meant."""
+    """Return a hint with a file of a similar name in the same folder."""
     names = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() and os.access(path.parent, os.R_OK) else []
     close = difflib.get_close_matches(path.name, names, n=1)
     return f"did you mean `{quote(str(path.parent / close[0]))}`?" if close else "check the path"
 
 
-def _told_of(path: Path, parse: Callable[[], object]) -> object:
+def _with_file_in_error(path: Path, parse: Callable[[], object]) -> object:
     try:
         return parse()
     except YAMLError as error:
@@ -166,15 +166,15 @@ def _told_of(path: Path, parse: Callable[[], object]) -> object:
     except LimitError as error:
         hint = "take out what the line above tells of: no file of this program needs it"
         raise ArtifactError(f"`{path}` passes a limit of the YAML that is read", found=str(error), hint=hint) from error
-    except (ValueError, OverflowError, RecursionError) as error:  # a letter that there is not, brackets without end
+    except (ValueError, OverflowError, RecursionError) as error:  # an impossible character, endless brackets
         found = f"{type(error).__name__}: {error}"
         raise ArtifactError(f"`{path}` holds a value that YAML cannot read", found=found, hint="put text in quotes") from error
 
 
 @lru_cache(maxsize=32)
 def _parsed(text: str) -> object:
-    """Return what a YAML text says: a command asks a model's file again and again, and parsing it takes 25 ms."""
-    yaml = YAML(typ="safe", pure=True)  # the compiled parser has no limit of its own for brackets in brackets
+    """Return the value of a YAML text, cached: a command reads the file of a model repeatedly, and parsing takes 25 ms."""
+    yaml = YAML(typ="safe", pure=True)  # the compiled parser has no limit on nested brackets
     yaml.Composer, yaml.Constructor = _Composer, _Constructor
     return yaml.load(text)
 
@@ -196,7 +196,7 @@ class _Composer(Composer):
 
 
 class _Constructor(SafeConstructor):
-    """Makes plain values of nodes that have been checked as a whole."""
+    """Constructs plain values after all nodes have been checked."""
 
     def construct_document(self, node: Any) -> Any:
         """Return the value of a whole file; raises LimitError."""
@@ -215,10 +215,10 @@ _Constructor.add_constructor(f"{_TAG}int", _Constructor.construct_yaml_int)
 
 
 def _values_of(node: Node, known: dict[int, int]) -> int:
-    """Return how many values a node stands for, and see to it that each is one of those known; raises LimitError.
+    """Return the number of values in a node, and check that each has an allowed type; raises LimitError.
 
-    What stands behind an alias is one node, looked through once and counted at each place. A node that is being counted holds
-    itself.
+    The target of an alias is one node, which is checked once and counted at each use. A node met again while it is being counted
+    contains itself.
     """
     if id(node) in known:
         if not known[id(node)]:
@@ -240,7 +240,7 @@ def _values_of(node: Node, known: dict[int, int]) -> int:
 
 
 def _make_text(key: Node) -> None:
-    """Let a key be the text that stands there, a number or a day too; raises LimitError for one that is no word."""
+    """Turn a key into text, also where it is a number or a date; raises LimitError for a key that is not a scalar."""
     if not isinstance(key, ScalarNode):
         raise LimitError(f"line {key.start_mark.line + 1}: a key that is no word")
     if key.tag != f"{_TAG}merge":

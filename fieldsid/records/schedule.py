@@ -1,4 +1,4 @@
-"""What a file of a gain schedule holds."""
+"""The shape of a gain schedule file."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from fieldsid.records.check import (
 
 CONTROLLERS = ("p", "pd", "pi", "pid", "lqr")
 LARGEST_GAIN = 1000.0
-"""Of kp (rad/rad), ki (1/s), kd (s) and the gain of a reference: a thousandth of a rad off would take the whole fin."""
+"""Largest kp (rad/rad), ki (1/s), kd (s) and reference gain: with it, an error of 1 mrad would need the full fin."""
 _GAIN = number(-LARGEST_GAIN, LARGEST_GAIN)
 _SECONDS = maybe(number(0.0))
 _FIN = {"lag_s?": _SECONDS, "delay_s?": _SECONDS, "fin_rate_rad_s?": maybe(above_zero()), "latency_s?": _SECONDS}
@@ -44,9 +44,9 @@ ANSWER: Shape = {
     "asked_settling_s?": maybe(above_zero()),
     **dict.fromkeys(("asked_bandwidth_rad_s?", "asked_overshoot?", "asked_fin_use?"), maybe(number(0.0))),
 }
-"""What the loop was asked for."""
+"""The requirements that the loop was designed for."""
 FINS: Shape = {"names": [text], "shares": [number()], "limits": [above_zero()], "unit": text}
-"""The fins of the plane that its gains steer."""
+"""The fins that the gains of the plane move."""
 PROVENANCE: Shape = {
     "fins?": FINS,
     "models?": [SOURCE],

@@ -53,14 +53,14 @@ def loop_motion(loop: Loop, *, has_last: bool) -> tuple[str, str]:
     if has_last:
         models.append((f"with {', '.join(loop.added)}", loop.after, "simulated"))
         title = "the model with what was added, and the measurement"
-    record, is_rate = loop.before.shown.record, loop.before.leading.name == "rate"
+    record, is_rate = loop.before.shown.record, loop.before.worst_channel.name == "rate"
     values, ok = (record.rate, record.rate_ok) if is_rate else (record.angle, record.angle_ok)
     seen, there = thinned(record.time, np.where(ok, DEG * values, np.nan))
     series = [Series(seen, there, "measured", "measured", "dots")]
     for name, found, kind in models:
         time, motion = thinned(record.time, DEG * (found.shown.rate if is_rate else found.shown.angle))
         series.append(Series(time, motion, kind, name))
-    spans = [(s.start_s, s.end_s) for s in loop.before.leading.worst]
+    spans = [(s.start_s, s.end_s) for s in loop.before.worst_channel.worst]
     label = f"{record.axis.value} rate, deg/s" if is_rate else f"{record.axis.value}, deg"
     return chart([Panel(label, series, height=140, spans=spans)], "time, s", title), legend(series)
 

@@ -154,7 +154,7 @@ def _followed(channel: Channel) -> str:
 
 def _without_noise(judged: Sequence[Comparison], on: str) -> str:
     worst = max(judged, key=lambda c: c.badness)
-    return f"{_followed(worst.leading)} on {on}{', the worst' * (len(judged) > 1)}; the log has next to no noise"
+    return f"{_followed(worst.worst_channel)} on {on}{', the worst' * (len(judged) > 1)}; the log has next to no noise"
 
 
 def _pair(shown: Shown, found: Any, axis: AxisMaterial) -> dict[str, Any]:

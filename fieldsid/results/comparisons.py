@@ -168,9 +168,9 @@ class AsPromised(OfLogs):
 
 
 def compared_run(c: Comparison, figure: str | None, fitted: Collection[str]) -> ComparedRun:
-    """Return a comparison as the command tells it; one whose leading channel is down to its noise fails nowhere."""
-    leading = c.leading
-    fails = leading in c.failing
+    """Return the result of a comparison; one whose worst channel is down to its noise has no places of failure."""
+    worst_channel = c.worst_channel
+    fails = worst_channel in c.failing
     return ComparedRun(
         run=c.run,
         fitted_to=c.run in fitted,
@@ -181,10 +181,10 @@ def compared_run(c: Comparison, figure: str | None, fitted: Collection[str]) -> 
         own_speed=_as_flown(OwnSpeed, c, "own_speed"),
         over_noise=c.over_noise,
         over_floor={channel.name: channel.over_floor for channel in c.channels},
-        judged_by=leading.name,
-        metrics=leading.metrics,
-        where=leading.where if fails else (),
-        worst=leading.worst if fails else (),
+        judged_by=worst_channel.name,
+        metrics=worst_channel.metrics,
+        where=worst_channel.where if fails else (),
+        worst=worst_channel.worst if fails else (),
         failing=c.failing,
         moves_with=c.moves_with if c.failing else (),
         figure=figure,

@@ -9,7 +9,7 @@ from typing import Annotated
 
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.records.keys import Key, Number
-from fieldsid.rounding import beside, number
+from fieldsid.rounding import number, number_against
 from fieldsid.schedule.check import READ_OFF, Check, StepCheck
 from fieldsid.schedule.controller import HELD_SHARE
 from fieldsid.schedule.flown.response import steady_error, swing
@@ -43,7 +43,8 @@ class Gate:
     def says(self) -> str:
         """The gate in words."""
         side = "least" if self.at_least else "most"
-        return f"{self.name} {beside(self.found, self.wanted)} at {number(self.speed, 3)} m/s, wanted at {side} {self.wanted:.3g}"
+        found = number_against(self.found, self.wanted)
+        return f"{self.name} {found} at {number(self.speed, 3)} m/s, wanted at {side} {self.wanted:.3g}"
 
 
 def gates_of(checked: Verification, wanted: Mapping[str, float | None]) -> tuple[Gate, ...]:

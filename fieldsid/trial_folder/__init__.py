@@ -1,1 +1,1 @@
-"""The folder of one trial: what it holds, what was made from what, what is stale, and the journal of the commands run in it."""
+"""The folder of one trial: its files, their inputs, which of them are stale, and the journal of the commands run in it."""

@@ -1,4 +1,4 @@
-"""Fin limits of vehicle.yaml that the runs of a trial contradict: a fin that went further."""
+"""Fin limits of vehicle.yaml that the runs of a trial contradict, as a fin went further."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from fieldsid.vehicle import find_vehicle
 
 
 def contradicted_limits(state: FolderState) -> list[Note]:
-    """Return a note for each fin whose limit (rad) is less than it moved in runs that were imported, or why there is no limit."""
+    """Return a note for each fin that went beyond its limit (rad) in an imported run, or why vehicle.yaml cannot be read."""
     try:
         vehicle = find_vehicle(state.folder)
-    except FieldsidError as error:  # the folder is told all the same
+    except FieldsidError as error:  # the overview of the folder is shown nevertheless
         return [Note("vehicle", "; ".join(p for p in (error.what, error.found, error.hint) if p), {})]
     if vehicle is None:
         return []

@@ -1,6 +1,6 @@
-"""journal.jsonl: one line of JSON for each command that was run in a trial folder, with the hashes of what went in and came out.
+"""journal.jsonl: one line of JSON for each command that was run in a trial folder, with the hashes of its inputs and outputs.
 
-The file marks a folder as a trial. A line is added whole; of a line that a power cut left unfinished nothing is believed.
+The file marks a folder as a trial. Lines are appended in one write; a line that a power cut left incomplete is ignored.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from fieldsid.records.reading import read_json
 JOURNAL = "journal.jsonl"
 SCHEMA = "fieldsid/journal/1"
 GROUPS = (("schedule",), ("effects",))
-"""First words of commands whose second word says which of several they are."""
+"""First words of commands with subcommands."""
 LARGEST = 32 << 20
-"""Bytes of a journal that are read: those of some 30,000 commands."""
+"""Most bytes of a journal that are read, enough for 30,000 commands."""
 STAMP = {"path": text, "sha256": text, "size": whole, "modified_ns": whole}
 SHAPE: Shape = {
     "schema": text,
@@ -40,11 +40,12 @@ SHAPE: Shape = {
     "outputs": [STAMP],
     "named": [text],
 }
-"""What a line of the journal holds."""
+"""The shape of a line of the journal."""
 _OF_FOLDER = -1
-"""Stands for the bytes of a folder: the hash that the journal has of one is not believed, for its files may be others by now."""
+"""Size of a folder in the journal, which never matches: the hash of a folder is always computed again, as its files may
+change."""
 _ODD = re.compile("[\ud800-\udfff]")
-"""What Python makes of the bytes of a name that is no UTF-8: written by its number, for a line has to be text."""
+"""The surrogates that Python uses for bytes of a name that are not UTF-8; they are written as escapes."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -85,7 +86,7 @@ class Entry(Brief):
 
 
 def is_trial(folder: Path) -> bool:
-    """Whether a folder is that of a trial: it holds a journal, which is a file of its own and no link to another."""
+    """Whether a folder is that of a trial: it has a journal, which is a file and not a symbolic link."""
     return (folder / JOURNAL).is_file() and not (folder / JOURNAL).is_symlink()
 
 
@@ -101,9 +102,9 @@ def append(folder: Path, entry: Entry) -> None:
 
 
 def read(folder: Path) -> tuple[tuple[Entry, ...], int]:
-    """Return the entries of a folder's journal, the oldest first, and how many of its lines are none.
+    """Return the entries of a folder's journal, the oldest first, and the number of invalid lines.
 
-    Of a journal beyond LARGEST bytes the newest are read.
+    Of a journal larger than LARGEST bytes the newest entries are read.
     """
     if not is_trial(folder):
         return (), 0
@@ -124,7 +125,7 @@ def _no_link(path: str, flags: int) -> int:
 
 
 class Hashes:
-    """SHA-256 of files, those known to a journal by path, size and time of writing not computed again."""
+    """SHA-256 of files; taken from the journal where path, size and modification time are the same."""
 
     def __init__(self, folder: Path, entries: Iterable[Entry]) -> None:
         self._folder = folder.resolve()
@@ -132,14 +133,14 @@ class Hashes:
         self._known: dict[tuple[str, int, int], str | None] = {(s.path, s.size, s.modified_ns): s.sha256 for s in stamps}
 
     def stamp(self, path: Path) -> Stamp:
-        """Return a file or folder as it is now, however large it is."""
+        """Return the stamp of a file or folder as it is now, whatever its size."""
         name, is_folder, state = relative_to(path, self._folder), path.is_dir(), path.stat()
         size = 0 if is_folder else state.st_size
         known = None if is_folder else self._known.get((name, size, state.st_mtime_ns))
         return Stamp(name, known or sha256_of(path), size, state.st_mtime_ns)
 
     def of_named(self, path: Path) -> str | None:
-        """Return the SHA-256 of what a record or the folder names, from the journal or as far as it is hashed; else None."""
+        """Return the SHA-256 of a named file, from the journal or within the limits of `sha256_of_named`; else None."""
         state = path.stat()
         size = _OF_FOLDER if path.is_dir() else state.st_size
         key = (relative_to(path, self._folder), size, state.st_mtime_ns)
@@ -149,19 +150,19 @@ class Hashes:
 
 
 def relative_to(path: Path, folder: Path) -> str:
-    """Return a path from a folder where it lies inside, else in full, with forward slashes."""
+    """Return a path relative to a folder where it lies inside, else in full, with forward slashes."""
     whole = path.resolve()
     inside = whole.is_relative_to(folder.resolve())
     return (whole.relative_to(folder.resolve()) if inside else whole).as_posix()
 
 
 def made_by(entries: Sequence[Entry], path: str) -> Entry | None:
-    """Return the last command that wrote a file, None where the journal knows none."""
+    """Return the last command that wrote a file, None where the journal has none."""
     return next((e for e in reversed(entries) if any(s.path == path for s in e.outputs)), None)
 
 
 def _entry(body: Any) -> Entry:
-    """Return the entry of a line; raises ValueError where it is none, OverflowError for a time that cannot be."""
+    """Return the entry of a line; raises ValueError where it is invalid, OverflowError for an impossible time."""
     check(body, SHAPE)
     datetime.fromisoformat(body["time"]).astimezone()
     if not body["schema"].startswith("fieldsid/journal/") or len(body["command"]) < 2:

@@ -1,4 +1,4 @@
-"""What to do next in a trial: the first command of the day that has not been done, or must be done again."""
+"""The next step in a trial: the first command of the usual sequence that has not been run, or must be run again."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ REPORT = "sysid report"
 PORT = 14550
 """The UDP port that a ground station usually listens on."""
 TAKES_ALL_RUNS = ("identify", "diagnose")
-"""Commands that take every run of their trial folder where none is typed."""
+"""Commands that use all runs of their trial folder where none is given."""
 
 
 def next_step(state: FolderState) -> tuple[str, str]:
-    """Return why, and the command to run next, ready to paste in the folder; without one where nothing is left to do."""
+    """Return the reason and the command to run next, ready to paste; the command is empty where nothing remains to be done."""
     return (_again(state) or _sides(state) or _data(state) or _model(state) or _use(state)) or DONE_ALL
 
 
 def step_before(command: str, state: FolderState) -> tuple[str, str]:
-    """Return why a command finds nothing to work on here, and what to run first; empty where nothing would help."""
+    """Return why a command has no input in this folder, and what to run first; empty where nothing would help."""
     if command in ("schedule verify", "schedule export") and not state.of_kind("schedule") and (step := _use(state)) is not None:
         return step
     if command == "turn-radius" and state.models and not chosen_models(state, Axis.YAW.value):
@@ -51,11 +51,11 @@ def step_before(command: str, state: FolderState) -> tuple[str, str]:
 
 
 def _again(state: FolderState) -> tuple[str, str] | None:
-    """Return how to make the first stale file again; what only rests on a stale one comes after it."""
+    """Return how to make the first stale file again; files that depend on a stale one come after it."""
     stale = [i for i in state.items if i.stale]
     if not stale:
         return None
-    order = (RUN, MODEL)  # what the rest is made from
+    order = (RUN, MODEL)  # all others are made from these
     first = min(stale, key=lambda i: (i.stale.endswith(" is stale"), order.index(i.kind) if i.kind in order else len(order)))
     maker = made_by(state.entries, first.path)
     return f"{first.path}: {first.stale}", _remake(state, first) if maker is None else _forced(_words(state, maker))
@@ -67,12 +67,12 @@ def _line(*words: str) -> str:
 
 
 def _forced(words: Sequence[str]) -> str:
-    """Return the line of a command that was run before, which replaces what it wrote then."""
+    """Return the line of an earlier command with `--force`, so that it replaces its outputs."""
     return shlex.join([*words, *([] if "--force" in words else ["--force"])])
 
 
 def _words(state: FolderState, entry: Entry) -> list[str]:
-    """Return the words of a command, to be run again; without its runs where it takes just these from its trial folder."""
+    """Return the words of a command to be repeated, without its runs where these are the default in its trial folder."""
     words = [w for w in entry.command if w != "--json"]
     runs = [w for w in words if w in run_words(state)]
     takes_all = words[1] in TAKES_ALL_RUNS and "--validate" not in words and is_trial(state.folder)
@@ -80,12 +80,12 @@ def _words(state: FolderState, entry: Entry) -> list[str]:
 
 
 def _remake(state: FolderState, item: Item) -> str:
-    """Return how to make a file again that the journal does not know, as far as the file says how."""
+    """Return how to make a file again that is not in the journal, from what the file records."""
     axis, folder = item.axis or "yaw", str(Path(item.path).parent)
     named = [s.named for s in item.sources]
     mappings = [name for name in named if name.endswith((".yaml", ".yml"))]
     logs = [name for name in named if name not in mappings]
-    if item.kind == RUN and logs:  # of one that was piped in nothing says where it came from
+    if item.kind == RUN and logs:  # a run that was piped in does not name its log
         return _line("import", *logs, *_repeated("--mapping", mappings), "-o", folder, "--force")
     if item.kind == MODEL:
         mapping = item.body.get("mapping")
@@ -97,12 +97,12 @@ def _remake(state: FolderState, item: Item) -> str:
 
 
 def _repeated(option: str, values: Iterable[str]) -> list[str]:
-    """Return an option that takes one value, once for each of them."""
+    """Return an option of one value, repeated for each value."""
     return [word for value in values for word in (option, value)]
 
 
 def _sides(state: FolderState) -> tuple[str, str] | None:
-    """Return what comes next in the trials that a folder without data of its own holds: a model in each, then what differs."""
+    """Return the next step in a folder that contains trials but no data: a model in each trial, then their comparison."""
     if not state.sides or any(i.kind in (LOG, RUN, MODEL) for i in state.items):
         return None
     for side in state.sides:
@@ -169,25 +169,25 @@ def _model(state: FolderState) -> tuple[str, str] | None:
 
 
 def _searched_on(state: FolderState, best: Item) -> tuple[str, str] | None:
-    """Return how to ask what an extended model still lacks, by its own record, where no diagnosis asked since it was made."""
-    left = left_by_addition(best.body.get("info") or {})
-    if is_noise(left):
+    """Return the diagnosis of an extended model with a remaining error, where none has been run since it was made."""
+    error = left_by_addition(best.body.get("info") or {})
+    if is_noise(error):
         return None
     place = state.place(best)
     now = sha256_of(place)
-    asked = (s.sha256 == now for e in state.done("diagnose") for s in e.inputs)
+    was_diagnosed = (s.sha256 == now for e in state.done("diagnose") for s in e.inputs)
     asking = (s.path == place.resolve() for i in state.of_kind("diagnosis") for s in i.sources)
-    if any(asked) or any(asking):
+    if any(was_diagnosed) or any(asking):
         return None
-    says = f"{left:.2f} x the noise" if left < MANY else "more than the noise"
+    says = f"{error:.2f} x the noise" if error < MANY else "more than the noise"
     line = _line("diagnose", *_left_out(state, *run_words(state)), "--axis", _axis(state), "--model", best.path)
     return f"{best.path} leaves {says}", line
 
 
 def _unsettled(state: FolderState, diagnosis: Entry | None) -> tuple[str, str] | None:
-    """Return how to go on after a diagnosis that named nothing for sure; None where it did, or that has been done.
+    """Return the next step after a diagnosis without a certain result; None where it was certain or the step has been done.
 
-    Gains on a model known to be wrong come after what a longer search finds, and after the flight that tells rivals apart.
+    A longer search, or the flight that distinguishes between the candidates, comes before gains for a model known to be wrong.
     """
     if diagnosis is None:
         return None
@@ -220,21 +220,21 @@ def _use(state: FolderState) -> tuple[str, str] | None:
 
 
 def _extended_since(state: FolderState, gains: Item) -> str:
-    """Return the first model that gains rest on and another one here was extended from; empty without one."""
+    """Return the first model behind a schedule that has been extended since; empty without one."""
     used = {s.path for s in gains.sources}
     last = {i.path for i in state.models}
     return next((i.path for i in state.of_kind(MODEL) if state.place(i).resolve() in used and i.path not in last), "")
 
 
 def verification_of(state: FolderState, gains: Item) -> Entry | None:
-    """Return the journal's last entry of a command that verified gains as they are now."""
+    """Return the last journal entry of a verification of this version of a schedule."""
     done = state.done("schedule verify")
     now = sha256_of(state.place(gains)) if done else ""
     return next((e for e in reversed(done) if not e.inputs or now in {s.sha256 for s in e.inputs}), None)
 
 
 def _reported(state: FolderState) -> tuple[str, str] | None:
-    """Return how the report is written, or written again where a command made something after it."""
+    """Return the command for the report, where there is none or a later command has made something."""
     reports = state.done("report")
     if not reports:
         return "there is no report yet", REPORT
@@ -246,9 +246,9 @@ def _reported(state: FolderState) -> tuple[str, str] | None:
 
 
 def chosen_models(state: FolderState, axis: str = "") -> list[str]:
-    """Return the files that say most of one axis: the joint model that nothing was extended from, else those of single runs.
+    """Return the best models of one axis: the joint model that has not been extended, else those of single runs.
 
-    Nothing where both planes have models and none is asked for.
+    Empty where both planes have models and no axis is given.
     """
     models = [i for i in state.models if not axis or i.axis == axis]
     if len({i.axis for i in models}) > 1:
@@ -260,14 +260,14 @@ def chosen_models(state: FolderState, axis: str = "") -> list[str]:
 
 
 def single_models(state: FolderState, axis: str) -> list[str]:
-    """Return the models of one run each, with the most effects of any of them: points of the laws over speed."""
+    """Return the single-run models with the largest number of effects: the points of the laws over speed."""
     models = [i for i in state.models if i.axis == axis and len(i.runs) == 1]
     most = max((len(i.effects) for i in models), default=0)
     return [i.path for i in models if len(i.effects) == most]
 
 
 def root_of(state: FolderState, model: str) -> str:
-    """Return the file that the line of a model begins with, as far as the folder has it."""
+    """Return the oldest ancestor of a model in the folder."""
     models = {state.place(i).resolve(): i for i in state.of_kind(MODEL)}
     item, seen = next(i for i in models.values() if i.path == model), set[str]()
     while item.path not in seen:
@@ -277,23 +277,23 @@ def root_of(state: FolderState, model: str) -> str:
 
 
 def unseen_runs(state: FolderState, model: Item) -> list[str]:
-    """Return the runs of a folder that a model was not fitted to, all where it was fitted to every one."""
+    """Return the runs of a folder to which a model was not fitted; all runs where it was fitted to every one."""
     fitted = set(trained_runs(state, model))
     runs = run_words(state)
     return [r for r in runs if r not in fitted] or runs
 
 
 def trained_runs(state: FolderState, model: Item) -> list[str]:
-    """Return the runs of a folder that a model was fitted to."""
+    """Return the runs of a folder to which a model was fitted."""
     named = {s.path for s in model.sources if s.path is not None}
     return [i.path for i in state.of_kind(RUN) if state.place(i).resolve() in named and Path(i.path).stem in model.runs]
 
 
 def diagnosed_runs(state: FolderState, model: Item) -> tuple[list[str], list[str]]:
-    """Return the runs that an addition to a model is fitted to, and those that judge it, as in the diagnosis that named it.
+    """Return the training and the validation runs for an addition to a model, as in the diagnosis that named it.
 
-    Without a diagnosis of the model's plane, or where a run of it is no longer there, the runs that the model was fitted to: a
-    run that an earlier addition held back would be lost to the next one otherwise.
+    Without a diagnosis of the model's plane, or where one of its runs is missing, they are the runs to which the model was
+    fitted, so that runs an earlier addition used for validation stay in use.
     """
     made = state.newest(i for i in state.of_kind("diagnosis") if i.axis == model.axis)
     if made is not None:
@@ -305,9 +305,9 @@ def diagnosed_runs(state: FolderState, model: Item) -> tuple[list[str], list[str
 
 
 def logs_to_import(state: FolderState, *, again: bool = False) -> list[str]:
-    """Return the logs of a folder that no run was made of; all of them with `again`, and where there are no others.
+    """Return the logs of a folder from which no run was made; all logs with `again`, or where all have a run.
 
-    Where the folder of logs holds any, a table that lies elsewhere is none of them.
+    Where the folder `logs` has any, tables elsewhere do not count as logs.
     """
     logs = [i for i in state.of_kind(LOG) if i.path.startswith(f"{LOGS}/")] or list(state.of_kind(LOG))
     used = set() if again else {s.path for i in state.of_kind(RUN) for s in i.sources}
@@ -316,12 +316,12 @@ def logs_to_import(state: FolderState, *, again: bool = False) -> list[str]:
 
 
 def _left_out(state: FolderState, *words: str) -> tuple[str, ...]:
-    """Return words that need not be typed in a trial folder: a command takes them from there."""
+    """Return no words in a trial folder, where a command finds these files itself, else the words."""
     return () if is_trial(state.folder) else words
 
 
 def run_words(state: FolderState) -> list[str]:
-    """Return the runs of a folder, as a command line names them there."""
+    """Return the runs of a folder as words of a command line."""
     return [i.path for i in state.of_kind(RUN)]
 
 
@@ -330,14 +330,14 @@ def _joint(runs: Sequence[Item]) -> list[str]:
 
 
 def _axis(state: FolderState) -> str:
-    """Return the plane of the models, else the one that most runs excite."""
+    """Return the plane of the models, else the plane that most runs excite."""
     if state.models:
         return state.models[0].axis or "yaw"
     return plane_of([run for i in state.of_kind(RUN) for run in _loaded(state, i)])
 
 
 def _loaded(state: FolderState, item: Item) -> list[Run]:
-    """Return a run; none where it cannot be read: who works with it says so."""
+    """Return a list with the run; empty where it cannot be read, which the command that uses it will report."""
     try:
         return [load_run(state.place(item), state.mapping_of(state.place(item)), recognise=True)]
     except FieldsidError:

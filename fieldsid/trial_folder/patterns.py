@@ -1,4 +1,4 @@
-"""Files of a command line in few words: a pattern that stands for just them, where there is one."""
+"""Short command lines: many files are replaced by a pattern that matches exactly them, where there is one."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from os.path import commonprefix
 from pathlib import Path
 
 FEW = 3
-"""Files up to which each is named; more are given by a pattern that matches just them, where there is one."""
+"""Number of files up to which each is named; more are replaced by a pattern that matches exactly them, where there is one."""
 
 
 def pattern_of(files: Sequence[Path], folder: Path = Path()) -> list[str]:
-    """Return the words for files named from a folder, quoted for a shell: a pattern where it matches just them, else each."""
+    """Return the words for files relative to a folder, quoted for a shell: a pattern that matches exactly them, else each."""
     parents, suffixes = {p.parent for p in files}, {p.suffix for p in files}
     if len(files) > FEW and len(parents) == len(suffixes) == 1:
         parent, suffix = parents.pop(), suffixes.pop()

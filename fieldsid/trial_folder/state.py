@@ -1,4 +1,4 @@
-"""What a folder holds: runs, models and what was made of them, and which of them rest on something that has changed since."""
+"""The state of a trial folder: runs, models and the files made from them, and which of them have inputs that changed since."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fieldsid.logs.reader import reader_of
 from fieldsid.logs.run import OF_LIMITS, SIMULATED
 from fieldsid.logs.unknown_file import own_kind
 from fieldsid.records.keys import Key, Words
-from fieldsid.records.named_inputs import beside
+from fieldsid.records.named_inputs import first_allowed
 from fieldsid.records.reading import check_kind, read_json, read_yaml
 from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, made_by, read, relative_to
 from fieldsid.trial_folder.make import LOGS, MODELS, RUNS
@@ -26,12 +26,12 @@ LOG, RUN, MODEL, PLANNED = "log", "run", "model", "planned"
 DONE = (0, 1)
 """Exit codes of a command that gave a result."""
 SETTINGS = ("vehicle", "mapping", "user-effect", "effect")
-"""Kinds of files that a user writes: they are read, and made of nothing."""
+"""Kinds of files that a user writes; they have no inputs."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Source(Brief):
-    """What a file was made from: its path as named then, where it is now (None: nowhere), and its SHA-256 then."""
+    """An input of a file: its path as named then, its path now (None where it is missing), and its SHA-256 then."""
 
     named: Annotated[str, Key("The file as it was named then.", "path")]
     path: Path | None
@@ -40,10 +40,10 @@ class Source(Brief):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Item(Brief):
-    """One file: its path from the folder, kind, what it was made from, and why it is stale, empty where it is not.
+    """One file: its path from the folder, kind, inputs, and why it is stale (empty where it is not).
 
-    `body` is the record of a YAML file of this program, empty for all others. `missing` are the inputs that are nowhere.
-    `fins` is how far (rad) a run's fins went where its import found them beyond the vehicle's limits, by signal.
+    `body` is the record of a YAML file of this program, empty for all others. `missing` are the inputs that were not found.
+    `fins` are the largest fin angles (rad) by signal, for fins that went beyond the vehicle's limits when the run was imported.
     """
 
     path: Annotated[str, Key("Its path from the folder.")]
@@ -56,22 +56,22 @@ class Item(Brief):
 
     @property
     def axis(self) -> str | None:
-        """The plane that a record says it is of."""
+        """The plane of a record; None where it has none."""
         return self.body.get("axis")
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """The effects that a record names."""
+        """The effects of a record."""
         return tuple(map(str, self.body.get("effects", ())))
 
     @property
     def runs(self) -> tuple[str, ...]:
-        """The names of the runs that a record says it was fitted to."""
+        """The names of the runs to which a model was fitted."""
         return tuple(map(str, self.body.get("runs", ())))
 
     @property
     def standing(self) -> str:
-        """Why it does not hold any more, or what it was made from and is not there; empty where all is as it was."""
+        """Why the file is stale, or which inputs are missing; empty where neither."""
         return f"stale: {self.stale}" if self.stale else f"not there: {', '.join(self.missing)}" if self.missing else ""
 
 
@@ -79,8 +79,8 @@ class Item(Brief):
 class FolderState(Brief):
     """A folder with its files in order, the journal's entries, and how many of its lines could not be read.
 
-    `unreadable` says of each file of this program that is not among the items why it cannot be read. `sides` are the folders in
-    it that are trials themselves, as before and after a swap: their files are none of this one's.
+    `unreadable` says why a file of this program cannot be read, for each that is not among the items. `sides` are subfolders that
+    are trials themselves, as before and after a swap; their files do not belong to this folder.
     """
 
     folder: Path
@@ -95,23 +95,23 @@ class FolderState(Brief):
         return tuple(i for i in self.items if i.kind == kind)
 
     def newest(self, items: Iterable[Item]) -> Item | None:
-        """Return the file of some that was written last, None where there are none."""
+        """Return the item that was written last, None where there are none."""
         return max(items, key=lambda i: (self.place(i).stat().st_mtime_ns, i.path), default=None)
 
     def done(self, name: str) -> tuple[Entry, ...]:
-        """Return the journal's entries of a command that gave a result, the oldest first."""
+        """Return the journal entries of a command that gave a result, the oldest first."""
         return tuple(e for e in self.entries if e.name == name and e.exit in DONE)
 
     def place(self, item: Item) -> Path:
-        """Return where a file is."""
+        """Return the path of a file."""
         return self.folder / item.path
 
     def parents(self, item: Item) -> tuple[Source, ...]:
-        """Return the file that a model was extended from, none for others."""
+        """Return the parent of an extended model; empty for other files."""
         return _sources(_named(item.body, "parent"), self.folder)
 
     def mapping_of(self, log: Path) -> Path | None:
-        """Return the mapping that a model of a log was made with, None where none was named: the log is read without one."""
+        """Return the mapping with which a model of a log was made; None where it names none."""
         for item in self.of_kind(MODEL):
             sources = _sources(_named(item.body, "mapping"), self.folder)
             if sources and any(s.path == log.resolve() for s in item.sources):
@@ -120,14 +120,14 @@ class FolderState(Brief):
 
     @property
     def models(self) -> tuple[Item, ...]:
-        """The models that nothing was extended from, joint ones before those of one run."""
+        """The models that have not been extended, joint ones before those of one run."""
         parents = {str(s.path) for i in self.of_kind(MODEL) for s in self.parents(i)}
         leaves = [i for i in self.of_kind(MODEL) if str(self.place(i).resolve()) not in parents]
         return tuple(sorted(leaves, key=lambda i: (len(i.runs) < 2, i.path)))
 
 
 def state_of(folder: Path, files: Sequence[Path] | None = None) -> FolderState:
-    """Return what a folder holds, or those of its files that are given; what is neither a log nor this program's is left out."""
+    """Return the state of a folder, or of the given files in it; only logs and files of this program are included."""
     entries, broken = read(folder)
     hashes = Hashes(folder, entries)
     wanted = None if files is None else {p.resolve() for p in files}
@@ -142,15 +142,15 @@ def state_of(folder: Path, files: Sequence[Path] | None = None) -> FolderState:
 
 
 def _sides(folder: Path) -> tuple[str, ...]:
-    """Return the folders in a folder that are trials themselves, the one with the oldest files first."""
+    """Return the subfolders that are trials themselves, the one with the oldest files first."""
     names = (JOURNAL, LOGS, RUNS, MODELS)
-    # os.path says no where a folder is closed, and does not raise
+    # os.path returns False for a folder that may not be read, and does not raise
     found = [p for p in folder.iterdir() if not p.is_symlink() and any(os.path.exists(p / n) for n in names)]  # noqa: PTH110
     return tuple(p.name for p in sorted(found, key=lambda p: (min(f.lstat().st_mtime_ns for f in p.iterdir()), p.name)))
 
 
 def _is_simulated(item: Item, entries: Sequence[Entry]) -> bool:
-    """Whether `sysid simulate` wrote a table: one of text does not say so itself, but the journal does."""
+    """Whether `sysid simulate` wrote a table: a text file does not record it, but the journal does."""
     maker = made_by(entries, item.path) if item.kind in (LOG, RUN) else None
     return maker is not None and maker.command[1:2] == ("simulate",)
 
@@ -172,8 +172,8 @@ def _items(folder: Path, sides: Sequence[str], unreadable: list[str]) -> Iterato
 def _item(path: Path, name: str, folder: Path) -> Item | None:
     if path.name.endswith(".parquet") and (head := run_head(path)) is not None:
         made = any(note["code"] == SIMULATED for note in head["notes"])
-        told = [n["data"] for n in head["notes"] if n["code"] in OF_LIMITS and "reach_rad" in n["data"]]
-        fins = {str(d.get("signal")): float(d["reach_rad"]) for d in told}
+        limit_notes = [n["data"] for n in head["notes"] if n["code"] in OF_LIMITS and "reach_rad" in n["data"]]
+        fins = {str(d.get("signal")): float(d["reach_rad"]) for d in limit_notes}
         return Item(name, SIMULATED if made else RUN, _sources(head.get("inputs") or (), folder), fins=fins)
     kind = own_kind(path) if path.suffix in (".yaml", ".yml") else None
     if kind is not None:
@@ -186,8 +186,8 @@ def _item(path: Path, name: str, folder: Path) -> Item | None:
 
 
 def _own(path: Path, name: str, kind: str, folder: Path) -> Item:
-    """Return the item of a file of this program; raises ArtifactError where it cannot be read, or is not what its kind is."""
-    if kind in SETTINGS:  # who uses it says what is wrong with it
+    """Return the item of a file of this program; raises ArtifactError where it cannot be read or lacks the shape of its kind."""
+    if kind in SETTINGS:  # the command that uses it reports what is wrong
         return Item(name, kind)
     body = read_yaml(path)
     check_kind(body, f"fieldsid/{kind}", path)
@@ -200,7 +200,7 @@ def _named(body: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
 
 
 def run_head(path: Path) -> Mapping[str, Any] | None:
-    """Return what a run of ours keeps beside its columns, None for another table; raises ArtifactError where that is spoilt."""
+    """Return the metadata of a run file, None for another table; raises ArtifactError where the metadata are damaged."""
     try:
         metadata = import_module("pyarrow.parquet").read_schema(path).metadata or {}
         body = read_json(metadata.get(METADATA_KEY, b"null"))
@@ -223,7 +223,7 @@ def _is_log(path: Path) -> bool:
 
 
 def _is_planned(path: Path, folder: Path) -> bool:
-    """Whether a table or a bag is a fin to fly, which `sysid plan` wrote beside its plan: nothing was measured."""
+    """Whether a table or a bag is a planned fin command that `sysid plan` wrote next to its plan, and not a log."""
     inside = takewhile(lambda p: p != folder, (path, *path.parents))
     plans = (p.with_name("plan.yaml") for p in inside if p.name.startswith("leg"))
     return any(plan.is_file() and own_kind(plan) == "plan" for plan in plans)
@@ -234,22 +234,22 @@ def _sources(named: Sequence[Mapping[str, Any]], folder: Path) -> tuple[Source, 
 
 
 def _found(named: str, folder: Path) -> Path | None:
-    """Return where a file is that was named from the folder, from the one above it, or from where the program runs."""
-    # the folder above the working folder, "." as a rule, is none of its path
-    there = beside((folder / named, folder.resolve().parent / named, Path(named)), folder.resolve())
+    """Return the path of a file that was named relative to the folder, to its parent folder, or to the working folder."""
+    # resolved first, as the parent of "." is not its path's parent
+    there = first_allowed((folder / named, folder.resolve().parent / named, Path(named)), folder.resolve())
     return None if there is None else there.resolve()
 
 
 def _unknown(source: Source) -> str:
-    """Return how an input is told of which nothing is known."""
+    """Return the name of an input that was not found."""
     return source.named if source.path is None else f"{source.named} (too large to be hashed)"
 
 
 def _judge(path: str, items: Mapping[str, Item], done: dict[str, Item], hashes: Hashes, folder: Path) -> Item:
-    """Say of a file why it is stale: an input has changed since, or rests on one that has."""
+    """Return the item with the reason why it is stale: an input has changed since, or is stale itself."""
     if path in done:
         return done[path]
-    item = done[path] = items[path]  # a file that names itself ends here
+    item = done[path] = items[path]  # set before the recursion, which thus ends at a file that names itself
     now = {s: hashes.of_named(s.path) for s in item.sources if s.path is not None and s.sha256}
     missing = tuple(_unknown(s) for s in item.sources if s.path is None or (s in now and now[s] is None))
     because = ""

@@ -20,7 +20,7 @@ MOST_PLACES = 6
 
 def line(found: Comparison) -> str:
     """Return the run, fit and error of the channel furthest above its noise, and where that fails most."""
-    channel = found.leading
+    channel = found.worst_channel
     worst = f", worst at {channel.where[0].condition}" if found.failing and channel.where else ""
     return f"{cut(found.run, 60)}: {channel.name} fit {channel.fit:.1f} %, error {times_noise(found.over_noise)}{worst}"
 
@@ -29,13 +29,13 @@ def page(found: Comparison, angles: Angles = RADIANS) -> Page:
     """Return errors, metrics and the places of the error."""
     from fieldsid.comparison.compare import errors_in_words
 
-    m, errors = found.leading.metrics, errors_in_words(found.merit, found.floor, angles, 3)
+    m, errors = found.worst_channel.metrics, errors_in_words(found.merit, found.floor, angles, 3)
     known = facts(
         "Statistics",
         (
             ("speed", speed_words(found.shown.record.speed)),
             *((f"{name} error", said) for name, said in errors),
-            ("judged by", f"the {found.leading.name}: Theil {number(m.theil, 3)}, R^2 {number(m.r2, 3)}"),
+            ("judged by", f"the {found.worst_channel.name}: Theil {number(m.theil, 3)}, R^2 {number(m.r2, 3)}"),
             ("whiteness", p_value(m.whiteness_p)),
         ),
     )
@@ -66,10 +66,10 @@ def frames(found: Comparison) -> Frames:
         **body_of(found.merit),
         "angle_noise_rad": found.floor.angle,
         "rate_noise_rad_s": found.floor.rate,
-        "judged_by": found.leading.name,
-        "theil": found.leading.metrics.theil,
-        "r2": found.leading.metrics.r2,
-        "whiteness_p": found.leading.metrics.whiteness_p,
+        "judged_by": found.worst_channel.name,
+        "theil": found.worst_channel.metrics.theil,
+        "r2": found.worst_channel.metrics.r2,
+        "whiteness_p": found.worst_channel.metrics.whiteness_p,
     }
     return {
         "errors": lambda: table([row], "run"),

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fieldsid.rounding import beside, in_unit, number, p_value, with_error
+from fieldsid.rounding import in_unit, number, number_against, p_value, with_error
 
 
 @pytest.mark.parametrize(
@@ -61,4 +61,4 @@ def test_a_p_value_is_no_number_far_out_in_the_tail():
     [(44.98, 45.0, "44.98"), (44.2, 45.0, "44.2"), (2.9962, 3.0, "2.996"), (45.0, 45.0, "45.0"), (0.1204, 0.12, "0.1204")],
 )
 def test_a_number_beside_its_limit_shows_on_which_side_it_is(value, limit, shown):
-    assert beside(value, limit) == shown
+    assert number_against(value, limit) == shown

@@ -19,7 +19,7 @@ from fieldsid.errors import UsageError
 from fieldsid.figures.kinds import sketch
 from fieldsid.logs.several.run_names import short_names
 from fieldsid.page import Block, Page, Whole, written
-from fieldsid.rounding import beside, number
+from fieldsid.rounding import number, number_against
 from fieldsid.views._words import merit_blocks
 from fieldsid.views.comparison import MOST_PLACES, blocks_of
 
@@ -124,7 +124,7 @@ def _gate(entries: Sequence[Mapping[str, Any]], least: float | None) -> None:
     found = [(e["run"], name, e[f"{name}_fit_percent"]) for e in entries for name in e["over_floor"]]
     failed = [(run, name, fit) for run, name, fit in found if not fit >= least]
     for run, name, fit in failed:
-        complain(f"gate failed: {run} has {name} fit {beside(fit, least)} %, below {least:g} %")
+        complain(f"gate failed: {run} has {name} fit {number_against(fit, least)} %, below {least:g} %")
     if failed:
         raise typer.Exit(1)
 

@@ -22,7 +22,7 @@ from fieldsid.fitting.problem.problem import Problem
 from fieldsid.logs.run import Note
 from fieldsid.models.model import Noise
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.rounding import beside
+from fieldsid.rounding import number_against
 
 MIN_STD_ERRORS = 3.0
 """Standard errors below which an authority is not significant."""
@@ -65,7 +65,7 @@ def far_from_zero(value: float, error: float) -> str:
     """Return in words how far a value that is not significant is from zero."""
     if abs(value) < 2.0 * error:  # its 95 % interval holds zero
         return "cannot be told from zero"
-    return f"is {beside(abs(value) / error, MIN_STD_ERRORS)} standard errors from zero, less than {MIN_STD_ERRORS:g}"
+    return f"is {number_against(abs(value) / error, MIN_STD_ERRORS)} standard errors from zero, less than {MIN_STD_ERRORS:g}"
 
 
 def _causes(problem: Problem, solution: Solution, floor: Noise, slot: int) -> Iterator[tuple[str, str]]:

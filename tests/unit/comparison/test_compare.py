@@ -35,7 +35,7 @@ def test_the_right_model_is_down_to_the_noise():
     assert c.merit.rate_rms == pytest.approx(0.0035, rel=0.1)
     assert c.merit.rate_rms / c.floor.rate == pytest.approx(1.0, rel=0.1)
     assert all(channel.metrics.whiteness_p > 1e-3 for channel in c.channels)
-    assert c.leading.metrics.r2 > 0.99
+    assert c.worst_channel.metrics.r2 > 0.99
     assert c.failing == ()
 
 
@@ -50,7 +50,7 @@ def test_a_missing_lag_shows_at_the_onset():
 def test_a_compass_error_is_judged_by_the_angle():
     truth = model("compass_deviation", deviation_sin=0.2, deviation_cos=0.0)
     (c,) = compare(model(), [run_of(truth, "turning_circle")])
-    assert c.leading.name == "angle"
+    assert c.worst_channel.name == "angle"
 
 
 def test_the_channel_further_above_its_noise_leads_and_the_other_is_not_hidden():
@@ -58,9 +58,9 @@ def test_the_channel_further_above_its_noise_leads_and_the_other_is_not_hidden()
     (c,) = compare(replace(truth, values=truth.values | {"C0": 0.04}), [run_of(truth)])
     assert c.merit.angle_fit < 50.0 < c.merit.rate_fit  # a rate that is a little off adds up in the angle
     assert [channel.name for channel in c.failing] == ["angle", "rate"]
-    assert c.leading.over_floor == pytest.approx(c.merit.angle_rms / c.floor.angle)
-    assert c.leading.over_floor > c.channels[1].over_floor
-    assert c.where == c.leading.where
+    assert c.worst_channel.over_floor == pytest.approx(c.merit.angle_rms / c.floor.angle)
+    assert c.worst_channel.over_floor > c.channels[1].over_floor
+    assert c.where == c.worst_channel.where
 
 
 def test_in_a_log_without_noise_the_channel_of_less_fit_leads_and_no_multiple_of_its_digits_is_said():
@@ -72,7 +72,7 @@ def test_in_a_log_without_noise_the_channel_of_less_fit_leads_and_no_multiple_of
     angle, rate = sorted(c.channels, key=lambda channel: channel.name)
     assert rate.over_floor > angle.over_floor > 100.0
     assert c.merit.angle_fit < c.merit.rate_fit
-    assert c.leading is angle
+    assert c.worst_channel is angle
     assert left_in_words(angle.over_floor, angle.fit) == f"fit {c.merit.angle_fit:.1f} %"
     assert left_in_words(4.26, 50.0) == "4.3 x its noise"
 
@@ -83,7 +83,7 @@ def test_the_figure_shows_the_channels_that_fail_in_their_order_and_shades_nothi
     bad, good = (compare(replace(truth, values=truth.values | {"C0": c0}), [run])[0] for c0 in (0.04, 0.02))
     titles = [ax.get_title(loc="left").split("\n")[0] for ax in figure(bad, truth, "bad").axes]
     assert [t.partition(" at ")[0] for t in titles if t] == ["the angle fails most", "the rate fails most"]
-    assert view_of(bad).spans == tuple((s.start_s, s.end_s) for s in bad.leading.worst)
+    assert view_of(bad).spans == tuple((s.start_s, s.end_s) for s in bad.worst_channel.worst)
     assert not any(ax.get_title(loc="left") for ax in figure(good, truth, "good").axes)
     assert view_of(good).spans == ()
 

@@ -8,7 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from fieldsid.records.named_inputs import LARGEST_HASHED, MOST_HASHED, beside, inputs_in, sha256_of, sha256_of_named, where_now
+from fieldsid.records.named_inputs import (
+    LARGEST_HASHED,
+    MOST_HASHED,
+    first_allowed,
+    inputs_in,
+    sha256_of,
+    sha256_of_named,
+    where_now,
+)
 
 
 @pytest.fixture
@@ -42,7 +50,7 @@ def test_entries_of_any_kind_name_nothing(trial):
 
 def test_a_pipe_is_not_there(trial):
     os.mkfifo(trial / "pipe")
-    assert beside([trial / "pipe"], trial) is None
+    assert first_allowed([trial / "pipe"], trial) is None
     assert sha256_of_named(trial / "pipe") is None
 
 
