@@ -1,1 +1,1 @@
-"""An archive of logs: each read, identified and diagnosed by itself, one row per run; here or on a cluster, and resumed."""
+"""An archive of logs: each is read, identified and diagnosed separately, one row per run; locally or on a cluster, resumable."""

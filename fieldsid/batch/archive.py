@@ -1,6 +1,6 @@
-"""A batch as a folder: the answer of each log in a file of its own as soon as it is there, and the table of them all.
+"""A batch as a folder: the answer for each log in a separate file as soon as it is computed, and the table of all answers.
 
-A batch that was stopped goes on where it was: what is answered is not asked again.
+A batch that was stopped can be continued: logs with an answer are not processed again.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from fieldsid.records.reading import read_json, read_text
 SCHEMA = "fieldsid/batch-log/1"
 ANSWERS = "logs"
 ANSWER: Shape = {"schema": text, "rows": at_least_one({"status": text})}
-"""What a log's answer holds beside the columns of its rows."""
+"""The shape of a log's answer, without the columns of its rows."""
 
 Work = Callable[[Sequence[Task]], Iterator[tuple[Task, list[Row]]]]
 
 
 def known_rows(folder: Path, task: Task) -> list[Row] | None:
-    """Return the rows that an earlier batch found for a task, None where it has none or failed at it."""
+    """Return the rows of an earlier batch for a task; None where there are none or the task failed."""
     path = _answer(folder, task)
     try:
         body = read_json(read_text(path))
@@ -41,13 +41,13 @@ def known_rows(folder: Path, task: Task) -> list[Row] | None:
 
 
 def _fits(name: str, value: object) -> bool:
-    """Whether a cell of a row is one of its column: words in some, numbers in the others."""
+    """Whether a cell of a row has the type of its column: text or number."""
     is_shown = any(name in columns(axis) for axis in Axis)
     return not is_shown or value is None or isinstance(value, str if name in _WORDS else (int, float))
 
 
 def all_rows(folder: Path, tasks: Sequence[Task], work: Work, done: Callable[[], None]) -> tuple[list[Row], int]:
-    """Return the rows of all tasks in their order, those that are not known worked out and kept, and how many logs were known."""
+    """Return the rows of all tasks in order, computing and storing the missing ones, and the number of logs already known."""
     found = {task: rows for task in tasks if (rows := known_rows(folder, task)) is not None}
     known = len(found)
     for _ in range(known):
@@ -61,7 +61,7 @@ def all_rows(folder: Path, tasks: Sequence[Task], work: Work, done: Callable[[],
 
 
 def write_table(folder: Path, axis: Axis, rows: Iterable[Row]) -> tuple[Path, Path]:
-    """Write the table as Parquet and as CSV, both whole or not at all; raises ArtifactError."""
+    """Write the table as Parquet and as CSV, each completely or not at all; raises ArtifactError."""
     import pandas as pd
 
     names = columns(axis)
@@ -78,7 +78,7 @@ def write_table(folder: Path, axis: Axis, rows: Iterable[Row]) -> tuple[Path, Pa
 
 
 def _no_formula(text: str) -> str:
-    """Return a text as a cell that a spreadsheet takes for text, whatever a log's name begins with."""
+    """Return a text as a cell that a spreadsheet does not take for a formula."""
     return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
 
 

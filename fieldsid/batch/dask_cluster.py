@@ -1,7 +1,7 @@
-"""The workers of a Dask cluster that is there already. A worker that is lost has its logs done by the others.
+"""The workers of an existing Dask cluster. The logs of a worker that fails are processed by the others.
 
-Logs are given out a few at a time, so that neither the scheduler nor the workers hold more. The workers need fieldsid, and the
-logs under the same paths. Source: dask.distributed documentation, resilience.
+Logs are submitted a few at a time, to limit the memory of the scheduler and the workers. The workers need fieldsid, and the logs
+under the same paths. Source: dask.distributed documentation, resilience.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fieldsid.errors import UsageError
 
 CONNECT_S = 10
 AHEAD = 2
-"""Logs that wait at each worker's thread beside the one it is at."""
+"""Number of logs that wait for each thread of a worker."""
 LEAST_AHEAD = 8
 
 
@@ -60,7 +60,7 @@ def run_on_cluster(tasks: Sequence[Task], scheduler: str) -> Iterator[tuple[Task
 
 
 def _rows(future: Any, task: Task) -> list[Row]:
-    """Return a finished future's rows; where it has none, the row that says why."""
+    """Return the rows of a finished future; where it has none, the row with the reason."""
     if future.status == "finished":
         rows: list[Row] = future.result()
         return rows

@@ -20,7 +20,7 @@ from fieldsid.batch.task import Task
 from fieldsid.batch.worker import ENVIRONMENT
 
 LOGS_A_PROCESS = 50
-"""Logs after which a process is replaced: what libraries keep of each would add up over an archive."""
+"""Logs after which a process is replaced: memory that libraries do not release would add up over an archive."""
 TRIES = 2
 LOOK_S = 0.5
 PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
@@ -28,7 +28,7 @@ PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
 
 @dataclass
 class _Process:
-    """A worker, what it is at and since when, and how many logs it has had."""
+    """A worker process, its task and the start of that, and the number of logs it has had."""
 
     process: subprocess.Popen[bytes]
     task: Task | None = None
@@ -45,7 +45,7 @@ class _Process:
                 stdin.write(json.dumps(task.plain()).encode() + b"\n")
                 stdin.flush()
             except BrokenPipeError:
-                return  # it has ended: its output says so, and the log is tried again
+                return  # it has ended: its closed output shows that, and the log is tried again
 
     def end(self) -> None:
         self.process.kill()
@@ -58,7 +58,7 @@ class _Process:
                     continue
 
     def memory_mb(self) -> float:
-        """Return its resident memory, 0 where the system does not tell."""
+        """Return its resident memory in MB, 0 where the system does not report it."""
         try:
             pages = int(Path(f"/proc/{self.process.pid}/statm").read_text(encoding="ascii").split()[1])
         except (OSError, IndexError, ValueError):
@@ -67,10 +67,10 @@ class _Process:
 
 
 def run_here(tasks: Sequence[Task], workers: int, *, timeout_s: float, memory_mb: float) -> Iterator[tuple[Task, list[Row]]]:
-    """Yield each task with its rows as they come, worked on by so many processes.
+    """Yield each task with its rows as they are computed, by `workers` processes.
 
-    A process that takes longer than timeout_s on a log, or more than memory_mb, is ended and the log's row says so. A log whose
-    process ends by itself is tried once more, by another.
+    A process that takes longer than timeout_s on a log, or more than memory_mb, is ended, and the row of the log says so. A log
+    whose process ends unexpectedly is tried once more by another.
     """
     with closing(_Crew(tasks)) as crew:
         for _ in range(min(workers, len(tasks))):
@@ -86,7 +86,7 @@ def run_here(tasks: Sequence[Task], workers: int, *, timeout_s: float, memory_mb
 
 
 class _Crew:
-    """The processes at work, and the tasks that wait for one of them."""
+    """The running processes and the waiting tasks."""
 
     def __init__(self, tasks: Sequence[Task]) -> None:
         self.waiting, self.tries = deque(tasks), dict.fromkeys(tasks, 0)
@@ -95,7 +95,7 @@ class _Crew:
 
     @property
     def is_at_work(self) -> bool:
-        """Whether one of them is at a task."""
+        """Whether one of the processes has a task."""
         return any(one.task for one in self.members)
 
     def hire(self) -> None:
@@ -114,11 +114,11 @@ class _Crew:
             self.hire()
 
     def heard(self) -> list[_Process]:
-        """Wait a moment and return the processes that have said something or ended."""
+        """Wait a moment and return the processes with output or that have ended."""
         return [key.data for key, _ in self._selector.select(LOOK_S)]
 
     def answers(self, one: _Process) -> Iterator[tuple[Task, list[Row]]]:
-        """Yield what a process has answered, if it has, and give it the next task."""
+        """Yield the answer of a process, if there is one, and give it the next task."""
         part, task = os.read(_output(one).fileno(), 1 << 16), one.task
         one.answer += part
         if not part:
@@ -131,13 +131,13 @@ class _Crew:
                 self._give_next(one)
 
     def close(self) -> None:
-        """End them all."""
+        """End all processes."""
         for one in self.members:
             one.end()
         self._selector.close()
 
     def _ended(self, one: _Process, task: Task | None) -> Iterator[tuple[Task, list[Row]]]:
-        """Take the task of a process that ended by itself up again; the second time yield a row that says so."""
+        """Queue the task of a process that ended unexpectedly again; the second time yield a row that says so."""
         if task is not None:
             code = one.process.wait()
             if self.tries[task] < TRIES:

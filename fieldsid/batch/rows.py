@@ -1,6 +1,6 @@
-"""One log becomes rows of the table, one a run: what was read, what was identified, which effect is missing.
+"""The rows of one log in the table, one for each run: its data, its parameters, and the missing effect.
 
-What cannot be used becomes a row that says why: one bad log never stops the others.
+A log that cannot be used gives a row with the reason, so that it does not stop the others.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from fieldsid.vehicle import Vehicle
 
 FIRST = ("log", "run", "status", "start_utc", "time_from", "speed_m_s", "verdict", "effects")
 EARLIEST_NS = 300_000_000 * 10**9
-"""A clock before 1979 has no date."""
+"""Times before 1979 are not taken as a date."""
 Row = dict[str, Any]
 
 
@@ -44,7 +44,7 @@ def columns(axis: Axis) -> tuple[str, ...]:
 
 
 def rows_of(task: Task) -> list[Row]:
-    """Return the rows of one log, at least one; never raises but where the process itself is ended."""
+    """Return the rows of one log, at least one; raises only what ends the process."""
     begin = clock.perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -54,7 +54,7 @@ def rows_of(task: Task) -> list[Row]:
 
 
 def failed_row(task: Task, status: str, what: str, found: str = "", hint: str = "") -> Row:
-    """Return the row of a log that gave none of its own."""
+    """Return the row of a log that could not be processed, with the reason."""
     return {
         "log": task.log, "run": stem_of(Path(task.log)), "status": status, "what": what, "found": found, "hint": hint,
         "tool": f"fieldsid {__version__}",
@@ -113,7 +113,7 @@ def _vehicle(path: str | None) -> Vehicle | None:
 
 
 def _about(task: Task, run: Run) -> Row:
-    """Return what a run is, before anything is fitted to it."""
+    """Return the columns of a run that do not need a fit."""
     start, source = _start(run, Path(task.log))
     return {
         "log": task.log,
@@ -128,7 +128,7 @@ def _about(task: Task, run: Run) -> Row:
 
 
 def _start(run: Run, log: Path) -> tuple[float, str]:
-    """Return when a run began in s since 1970: by the log's clock where it has a date, else by the change of the file."""
+    """Return the start of a run in s since 1970: by the log's clock where it has a date, else by the file's modification time."""
     origins = [int(n.data["origin_ns"]) for n in run.notes if n.code == "time_origin" and "origin_ns" in n.data]
     if origins and origins[0] > EARLIEST_NS:
         return origins[0] / 1e9 + float(run.time[0]), "log"
@@ -164,7 +164,7 @@ def _identified(run: Run, settings: Settings) -> Row:
 
 
 def _diagnosed(run: Run, axis: Axis) -> Row:
-    """Return the verdict on a run that was identified; where there is none the row keeps its parameters and says why."""
+    """Return the verdict on an identified run, or the reason where there is none; the row keeps its parameters."""
     from fieldsid.diagnosis import diagnose
 
     try:

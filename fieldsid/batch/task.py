@@ -1,4 +1,4 @@
-"""What is asked of one log, and the name its answer is kept under: the same while neither the log nor the question changes."""
+"""The task for one log, and the name of its stored answer, which is the same while neither the log nor the settings change."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from fieldsid._version import __version__
 from fieldsid.logs.load import MAPPING_FILE
 
 QUESTION = 1
-"""Version of what is asked: raised where a row would come out differently."""
+"""Version of the task: increased where a row would come out differently."""
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What is asked of every log: the axis, the method, whether the missing effect is sought, and the files that say more."""
+    """The settings for every log: the axis, the method, whether to diagnose, and the paths of vehicle and mapping."""
 
     axis: str
     method: str = "auto"
@@ -30,19 +30,19 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One log and what is asked of it."""
+    """One log with the settings for it."""
 
     log: str
     settings: Settings
 
     @property
     def key(self) -> str:
-        """What tells this task from others: the log's place, size and change, the question, and the files that say more."""
-        found = Path(self.log).parent / MAPPING_FILE  # what a log is read with where no mapping is named
+        """The hash of what determines the answer: path, size and time of the log, version, settings, contents of their files."""
+        found = Path(self.log).parent / MAPPING_FILE  # the default mapping of a log
         picked_up = next((str(p) for p in (Path(MAPPING_FILE), found) if p.is_file()), None)
         named = (self.settings.mapping or picked_up, self.settings.vehicle)
-        said = [Path(name).read_text(encoding="utf-8", errors="replace") if name else "" for name in named]
-        parts = [QUESTION, __version__, str(Path(self.log).resolve()), *_stamp(Path(self.log)), asdict(self.settings), said]
+        contents = [Path(name).read_text(encoding="utf-8", errors="replace") if name else "" for name in named]
+        parts = [QUESTION, __version__, str(Path(self.log).resolve()), *_stamp(Path(self.log)), asdict(self.settings), contents]
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:24]
 
     def plain(self) -> dict[str, Any]:
@@ -56,7 +56,7 @@ def task_of(body: Mapping[str, Any]) -> Task:
 
 
 def logs_in(paths: list[Path]) -> list[Path]:
-    """Return the logs that paths name, each once: a folder that is no bag stands for all files in and below it."""
+    """Return the distinct logs of some paths: a folder that is not a bag stands for all files in and below it."""
     from fieldsid.logs.readers.bags.stores import is_bag
 
     found: dict[str, Path] = {}
@@ -67,7 +67,7 @@ def logs_in(paths: list[Path]) -> list[Path]:
 
 
 def _below(folder: Path) -> list[Path]:
-    """Return the files and bags in a folder, hidden ones left out."""
+    """Return the files and bags in and below a folder, without hidden ones."""
     from fieldsid.logs.readers.bags.stores import is_bag
 
     out: list[Path] = []

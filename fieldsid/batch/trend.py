@@ -1,10 +1,11 @@
-"""Parameters over months: what they would be at one speed, and where they changed beyond their errors and the runs' own scatter.
+"""Parameters over months, scaled to one speed, and the changes beyond their errors and the scatter from run to run.
 
-Damping goes with u and authority with u^2, so that runs at other speeds are carried to the middle one. Changes are found by
-optimal partitioning: among all ways to cut the series into stretches of constant value that of the least
+Runs at other speeds are scaled to the median one, as damping is proportional to u and authority to u^2. Changes are found by
+optimal partitioning: the series is divided into stretches of constant value so that
     sum (x - mean)^2 / (se^2 + tau^2) + 3 log(n) per change
-is taken; tau, the scatter from run to run beyond the stated errors, is estimated from differences of neighbours, which a change
-hardly enters. Source: Jackson et al. 2005, IEEE Signal Processing Letters 12(2); Killick, Fearnhead and Eckley 2012, JASA 107.
+is least. tau is the scatter from run to run beyond the stated errors, estimated from differences of neighbours, on which a change
+has little influence. Source: Jackson et al. 2005, IEEE Signal Processing Letters 12(2); Killick, Fearnhead and Eckley 2012, JASA
+107.
 """
 
 from __future__ import annotations
@@ -25,15 +26,15 @@ from fieldsid.records.keys import Key, Number
 
 FEWEST_RUNS = 6
 SHORTEST_STRETCH = 4
-"""Runs on either side of a change: fewer are odd runs, not a change."""
+"""Least number of runs on either side of a change; fewer are outliers."""
 ODD_WINDOW, ODD = 7, 5.0
-"""Runs whose median a run is compared with, and standard deviations beyond which it is odd and left out (Hampel's rule)."""
+"""Window of the running median, and standard deviations from it beyond which a run is an outlier (Hampel's rule)."""
 PRICE = 3.0
-"""Times log(n) that a change must gain: Schwarz's price of its mean and its place, and one more for the places searched."""
+"""Penalty of a change in units of log(n): Schwarz's for its mean and its place, and one more for the search over places."""
 OF_MEDIAN = 2.198
-"""Variance over the median of its squared normal deviates."""
+"""Ratio of the variance of a normal variable to the median of its squared deviations."""
 LARGEST_RELATIVE_ERROR = 0.5
-"""Standard error, as a share of the value's usual size, above which a run says nothing of a parameter's trend."""
+"""Standard error, relative to the usual size of the parameter, above which a run is left out of its trend."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +55,9 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Trend:
-    """One parameter over the runs in the order of their starts, (n,): values and errors at one speed, stretches' means, changes.
+    """One parameter over the runs (n,) in the order of their starts: values and errors at one speed, means, changes.
 
-    `speed` is that speed in m/s (NaN where unknown), `scatter` tau.
+    `speed` is that speed in m/s (NaN where unknown), `scatter` is tau.
     """
 
     name: Annotated[str, Key("Its name.", "parameter")]
@@ -77,13 +78,13 @@ class Trend:
 
 
 def trends_of(rows: Sequence[Row], axis: Axis) -> tuple[Trend, ...]:
-    """Return the trend of each base parameter of an axis that enough runs know."""
+    """Return the trend of each base parameter of an axis that enough runs have."""
     names = NAMES[axis]
     done = sorted((r for r in rows if r.get("status") == "done"), key=lambda r: str(r["start_utc"]))
     speeds = np.array([_number(r.get("speed_m_s")) for r in done])
     middle = float(np.nanmedian(speeds)) if np.isfinite(speeds).any() else float("nan")
     powers = {names.damping: 1.0, names.authority: 2.0, names.trim: 2.0}
-    # files copied at once have one date, and no order
+    # files that were copied together have one date and no order
     if len({r["start_utc"] for r in done}) < FEWEST_RUNS:
         return ()
     found = (_trend(done, n, speeds, middle, powers.get(n, 0.0)) for n in names.base)
@@ -126,7 +127,7 @@ def scatter_of(values: FloatArray, std_errors: FloatArray) -> float:
     """Return the scatter from run to run beyond the stated errors, from the median squared difference of neighbours."""
     squares = np.diff(values) ** 2
     stated = std_errors[1:] ** 2 + std_errors[:-1] ** 2
-    # the median of squares over what they would be with tau: bisected, for the errors differ from run to run
+    # tau at which the median of the normalised squares is the expected one, by bisection, as the errors differ between runs
     low, high = 0.0, float(np.sqrt(squares.max(initial=0.0)))
     if OF_MEDIAN * float(np.median(squares / stated)) <= 1.0:
         return 0.0
@@ -137,7 +138,7 @@ def scatter_of(values: FloatArray, std_errors: FloatArray) -> float:
 
 
 def odd_runs(values: FloatArray, spread: FloatArray) -> IntArray:
-    """Return the places (k,) of values (n,) far from the median of those about them, in their standard deviations (n,)."""
+    """Return the indices (k,) of values (n,) far from the running median in terms of their standard deviations (n,)."""
     half = ODD_WINDOW // 2
     padded = np.pad(values, half, mode="reflect")
     middle = np.median(np.lib.stride_tricks.sliding_window_view(padded, ODD_WINDOW), axis=1)
@@ -145,7 +146,7 @@ def odd_runs(values: FloatArray, spread: FloatArray) -> IntArray:
 
 
 def change_points(values: FloatArray, weight: FloatArray, allowed: BoolArray) -> IntArray:
-    """Return the places (k,) at which a series (n,) of inverse variances (n,) takes another value, by optimal partitioning.
+    """Return the indices (k,) at which the mean of a series (n,) with weights (n,) changes, by optimal partitioning.
 
     allowed (n,): where a stretch may begin; runs of one date have no order.
     """

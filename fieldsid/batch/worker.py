@@ -1,6 +1,6 @@
-"""A process that works on one log after the other: a task a line on standard input, its rows a line on standard output.
+"""A process that works on one log after the other: one line per task on standard input, one line of rows on standard output.
 
-A process of its own, so that a log that ends it, by memory or by a library's fault, ends no other.
+It is a separate process so that a log that ends it, by memory or by a fault of a library, does not affect others.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from typing import Any
 from fieldsid.runtime.worker_pool import IS_WORKER
 
 ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", IS_WORKER: "1"}
-"""One core for each: the processes share the machine, and none of them makes copies of itself."""
+"""One core for each process, as they share the machine, and no forked workers."""
 
 
 def worked(task: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the rows of a plain task as plain values; what a cluster's worker is given to do."""
+    """Return the rows of a plain task as plain values; this is the function that a cluster's worker runs."""
     os.environ.update(ENVIRONMENT)
     from fieldsid.artifacts import plain
     from fieldsid.batch.rows import rows_of
@@ -28,9 +28,9 @@ def worked(task: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def main() -> None:
-    """Answer tasks until there are no more."""
+    """Answer tasks until standard input ends."""
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # what a library prints is no answer
+    os.dup2(2, 1)  # standard output is for answers: prints of libraries go to standard error
     for line in sys.stdin:
         answers.write(json.dumps(worked(json.loads(line)), allow_nan=False) + "\n")
         answers.flush()

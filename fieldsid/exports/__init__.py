@@ -1,4 +1,4 @@
-"""Where a schedule goes: one file per target, found by the registry; `_patch.py` puts it into an existing YAML file."""
+"""Export targets of a schedule: one file per target, found by the registry; `_patch.py` writes into an existing YAML file."""
 
 from __future__ import annotations
 

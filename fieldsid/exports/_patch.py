@@ -1,6 +1,6 @@
-"""Put a schedule under a key of an existing YAML file: comments and order kept, nothing else touched, the difference shown.
+"""Write a schedule under a key of an existing YAML file, with comments and order preserved, and show the difference.
 
-The text of the key's value alone is replaced. The result is read again and must differ under that key alone.
+Only the text of the key's value is replaced. The result is parsed again and must differ under that key only.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def patch_yaml(path: Path, key: str, columns: Mapping[str, Sequence[float]]) -> 
 
 
 def patch_text(path: Path, text: str) -> Patch:
-    """Return the change that makes a text of a whole file; raises ArtifactError where the file cannot be read."""
+    """Return the change that replaces the text of a file; raises ArtifactError where the file cannot be read."""
     return Patch(path, _text(path), text)
 
 
@@ -95,7 +95,7 @@ def _text(path: Path) -> str:
 
 
 def _values(path: Path, text: str) -> dict[str, Any]:
-    """Return what the text says; raises ArtifactError where it is none of what is read, as with tags of its own."""
+    """Return the mapping of a YAML text; raises ArtifactError where it is not valid or has custom tags."""
     try:
         return yaml_mapping(text.replace("\r\n", "\n"), path)
     except ArtifactError as error:
@@ -105,18 +105,18 @@ def _values(path: Path, text: str) -> dict[str, Any]:
 
 
 def _find(path: Path, tree: Node, key: str) -> tuple[Any, Node, Node]:
-    """Return the mapping that holds a dotted key, the key's own node and that of its value."""
+    """Return the mapping with a dotted key, the node of the key, and that of its value."""
     parts = _parts(key)
     for depth, part in enumerate(parts):
-        held = {name.value: (name, value) for name, value in tree.value} if isinstance(tree, MappingNode) else {}
-        if part not in held:
+        keys = {name.value: (name, value) for name, value in tree.value} if isinstance(tree, MappingNode) else {}
+        if part not in keys:
             place = ".".join(parts[:depth]) or "the top"
             raise UsageError(
                 f"key `{key}` is not in `{path}`: nothing named `{part}` under {place}",
-                found=", ".join(held) or "no keys there",
-                hint=near(part, list(held)) if held else "name a key that holds a mapping",
+                found=", ".join(keys) or "no keys there",
+                hint=near(part, list(keys)) if keys else "name a key that holds a mapping",
             )
-        parent, (name, tree) = tree, held[part]
+        parent, (name, tree) = tree, keys[part]
     if not parts:
         raise UsageError("`--key` is empty", found=repr(key), hint="write `--key control.heading.gains`")
     return parent, name, tree
@@ -127,20 +127,20 @@ def _parts(key: str) -> list[str]:
 
 
 def _replaced(text: str, parent: Any, name: Node, value: Node, columns: Mapping[str, Sequence[float]]) -> str:
-    """Return the text with the columns as a key's value; keys that are there already keep their place and comments."""
+    """Return the text with the columns as a key's value; existing keys keep their place and comments."""
     rows = {n: f": [{', '.join(decimal(v) for v in vs)}]" for n, vs in columns.items()}
     begin, end = name.end_mark.index, _end(text, name, value)
     if parent.flow_style:
         return f"{text[:begin]}: {{{', '.join(n + row for n, row in rows.items())}}}{text[end:]}"
     inside = isinstance(value, MappingNode) and not value.flow_style and value.start_mark.index > begin
-    held = value.value if inside else []
-    indent = " " * (held[0][0].start_mark.column if held else name.start_mark.column + 2)
-    new = "".join(f"\n{indent}{n}{row}" for n, row in rows.items() if n not in {own.value for own, _ in held})
-    if not held:
+    present = value.value if inside else []
+    indent = " " * (present[0][0].start_mark.column if present else name.start_mark.column + 2)
+    new = "".join(f"\n{indent}{n}{row}" for n, row in rows.items() if n not in {own.value for own, _ in present})
+    if not present:
         return f"{text[:begin]}:{new}{text[end:]}"
     line = text.find("\n", end)
     text = text[:line] + new + text[line:] if line >= 0 else text + new
-    for own, row in reversed(held):
+    for own, row in reversed(present):
         start, stop = own.end_mark.index, _end(text, own, row)
         if own.value not in rows:
             start, stop = text.rfind("\n", 0, start), (text + "\n").find("\n", stop)
@@ -149,10 +149,10 @@ def _replaced(text: str, parent: Any, name: Node, value: Node, columns: Mapping[
 
 
 def _end(text: str, name: Node, value: Node) -> int:
-    """Return the place where a key's value ends: of a block where its last value does, before what comments follow."""
+    """Return the index at which a key's value ends; that of a block is the end of its last value, before any comments."""
     if value.start_mark.index == value.end_mark.index:  # nothing
         return text.index(":", name.end_mark.index) + 1
-    if value.start_mark.index < name.end_mark.index:  # an alias, whose value stands elsewhere
+    if value.start_mark.index < name.end_mark.index:  # an alias, whose value is elsewhere
         return re.compile(r"\s*:\s*\*[^\s,\]}]+").match(text, name.end_mark.index).end()  # type: ignore[union-attr]
     if isinstance(value, MappingNode) and value.value and not value.flow_style:
         return _end(text, *value.value[-1])
@@ -162,7 +162,7 @@ def _end(text: str, name: Node, value: Node) -> int:
 
 
 def _check(patch: Patch, key: str, columns: Mapping[str, Sequence[float]]) -> None:
-    """Refuse a change that says something else than the columns under the key, or anything else elsewhere."""
+    """Refuse a change after which the key does not have the columns, or any other key differs."""
     old, new = (_values(patch.path, text) for text in (patch.before, patch.after))
     parts = _parts(key)
     for tree in (old, new):

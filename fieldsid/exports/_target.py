@@ -1,4 +1,4 @@
-"""The contract of an export target, and what several of them share: plain numbers, flat columns, the head of comments."""
+"""The contract of an export target, and functions for several targets: numbers as text, columns, comments."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from fieldsid.text.one_line import one_line
 DECIMALS = 6
 NAMES = {Axis.YAW: "heading", Axis.PITCH: "pitch"}
 MISTAKES = (jinja2.TemplateError, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
-"""What a template that is wrong ends in, jinja's own errors and those of what is reckoned in it."""
+"""The errors that a wrong template raises: those of jinja, and those of the expressions in it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
     """One target: name, one sentence, file suffix, and render(schedule, node, template) -> the file's text.
 
-    `node` is the name the gains go under in the vehicle's software; `template` a user's own, None for the shipped one.
+    `node` is the name of the gains in the vehicle's software; `template` is a user's template, None for the shipped one.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Target:
 
 
 def templated(name: str, says: str, template: str, node: str) -> Target:
-    """Return the target whose file is a template's, of its kind."""
+    """Return the target whose file is rendered from a template, with the suffix of the template."""
     return Target(name, says, Path(template).suffix, partial(from_template, template), node, template)
 
 
@@ -55,9 +55,9 @@ def columns_of(schedule: Schedule) -> dict[str, list[float]]:
 
 
 def notes_of(schedule: Schedule) -> list[str]:
-    """Return the lines a reader of the exported file needs: law, signs, units, support, origin and margins.
+    """Return the comment lines of an exported file: law, signs, units, support, origin and margins.
 
-    They are comments in a file for a vehicle: each is one line, whatever names a schedule holds.
+    Each is a single line, whatever names a schedule has, as the file goes to a vehicle.
     """
     p = schedule.provenance
     models = ", ".join(f"{Path(str(m['path'])).name} (sha256 {str(m['sha256'])[:12]})" for m in p.get("models", []))
@@ -83,7 +83,8 @@ def notes_of(schedule: Schedule) -> list[str]:
 def from_template(shipped: str, schedule: Schedule, node: str, own: Path | None) -> str:
     """Render a template with the schedule's rows (numbers as text), columns and notes; raises ArtifactError."""
     path = own or template_path(f"exports/{shipped}")
-    # Configuration text, not HTML: nothing is escaped. A template may be somebody else's: it reaches its numbers and no Python.
+    # Configuration text, not HTML: nothing is escaped. A template may come from somebody else: the sandbox gives it no access to
+    # Python.
     options: dict[str, Any] = {"trim_blocks": True, "lstrip_blocks": True, "keep_trailing_newline": True}
     environment = ImmutableSandboxedEnvironment(undefined=jinja2.StrictUndefined, autoescape=False, **options)
     try:
@@ -100,12 +101,12 @@ def from_template(shipped: str, schedule: Schedule, node: str, own: Path | None)
 
 
 def _fins(schedule: Schedule) -> list[dict[str, str]]:
-    """Return each of several fins as text: its name, what it is told for a command of one rad, and its limit."""
+    """Return each of several fins as text: its name, its share of a command of one rad, and its limit."""
     known = schedule.fins
     if known is None:
         return []
-    told = zip(known.names, known.shares, known.limits, strict=True)
-    return [{"name": name, "share": decimal(share), "limit": decimal(limit)} for name, share, limit in told]
+    fins = zip(known.names, known.shares, known.limits, strict=True)
+    return [{"name": name, "share": decimal(share), "limit": decimal(limit)} for name, share, limit in fins]
 
 
 def _context(schedule: Schedule, node: str) -> dict[str, Any]:

@@ -1,9 +1,9 @@
 """PX4 parameters of `uuv_att_control`: one set of gains, a line of MAV id, component, name, value and type for each.
 
-PX4 steers a torque of -1 .. 1 by P sin(reference - angle) - D rate, positive to starboard and nose up. Where its allocation gives
-the whole fin, +/- fin_limit, for a torque of one, P = |kp| / fin_limit (1/rad) and D = |kd| / fin_limit (s/rad): which way the
-fin turns is the allocation's. It has no integral, no feed-forward and no table over speed: the row of the highest speed is in
-force, whose fin is the strongest, the others stand as comments.
+PX4 commands a torque of -1 .. 1 by P sin(reference - angle) - D rate, positive to starboard and nose up. Where its allocation
+maps a torque of one to the full fin, fin_limit, P = |kp| / fin_limit (1/rad) and D = |kd| / fin_limit (s/rad); the sign of the
+fin is part of the allocation. PX4 has no integral, no feed-forward and no table over speed: the row of the highest speed is
+active, at which the fin is strongest, and the others are comments.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ def render(schedule: Schedule, node: str, template: Path | None) -> str:
     lines = [f"# {line}" for line in (*notes_of(schedule), *LEFT_OUT)]
     last = len(schedule.rows) - 1
     for i, row in enumerate(schedule.rows):
-        held = body_of(row)
-        lines.append("# row: " + ", ".join(f"{name} = {decimal(float(held[name]))}" for name in schedule.columns))
+        body = body_of(row)
+        lines.append("# row: " + ", ".join(f"{name} = {decimal(float(body[name]))}" for name in schedule.columns))
         lines += [("" if i == last else "# ") + line for line in _parameters(schedule, row, node)]
     return "\n".join(lines) + "\n"
 
 
 def _parameters(schedule: Schedule, row: Row, node: str) -> list[str]:
-    """Return a row's lines, of MAV 1, component 1 and type 9, a real of 32 bits.
+    """Return the lines of a row, of MAV 1, component 1 and type 9, a 32-bit float.
 
-    Both gains of a loop have the sign of the authority, and PX4's have none.
+    Both gains of a loop have the sign of the authority; those of PX4 are positive.
     """
-    way = -1.0 if row.gains.kp < 0.0 else 1.0
+    sign = -1.0 if row.gains.kp < 0.0 else 1.0
     gains = {"P": row.gains.kp, "D": row.gains.kd}
     name = f"{node}_{schedule.axis.value.upper()}"
-    return [f"1\t1\t{name}_{k}\t{decimal(way * v / row.fin_limit)}\t9" for k, v in gains.items()]
+    return [f"1\t1\t{name}_{k}\t{decimal(sign * v / row.fin_limit)}\t9" for k, v in gains.items()]
 
 
 EXPORT = Target(name="px4", says="PX4 .params of uuv_att_control, one set of gains", suffix=".params", render=render, node="UUV")

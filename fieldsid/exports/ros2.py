@@ -25,7 +25,7 @@ def render(schedule: Schedule, node: str, template: Path | None) -> str:
 
 
 def _of_fins(plane: str, fins: PlaneFins) -> list[str]:
-    """Return the block of the fins that make the command: what each is told for one rad, and its limit."""
+    """Return the block of the fins that make up the command: the share of each in one rad, and its limit."""
     numbers = [f"      {key}: [{', '.join(map(decimal, v))}]" for key, v in (("shares", fins.shares), ("limits", fins.limits))]
     return [f"    {plane}_fins:", "      names: [" + ", ".join(f'"{name}"' for name in fins.names) + "]", *numbers]
 

@@ -1,4 +1,4 @@
-"""Plain YAML: a list of rows with everything known of each, for software that reads any YAML."""
+"""Plain YAML: a list of rows with all their fields, for software that reads any YAML."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The report of a trial: one HTML file that needs no network, with figures that can be zoomed and read off, and its PDF."""
+"""The report of a trial: one HTML file without external resources, with interactive figures; and its PDF."""

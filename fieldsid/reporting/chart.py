@@ -1,7 +1,7 @@
-"""Charts as SVG: panels over one x axis, lines, dots, bands and bars; whole without a script, which adds zoom and reading off.
+"""Charts as SVG: panels over one x axis with lines, dots, bands and bars; complete without a script, which adds zoom and readout.
 
-Colours are classes of the page's style sheet, so that light, dark and print each have their own. Coordinates inside a panel are
-those of the drawing; the panel's own data range stands in its attributes, by which the script gives numbers back.
+Colours are classes of the page's style sheet, which defines them for light, dark and print. Coordinates inside a panel are those
+of the drawing; the attributes of the panel have its data range, from which the script computes the values.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from fieldsid.numerics.arrays import FloatArray
 
 WIDTH, LEFT, RIGHT, TOP, BOTTOM, GAP = 480, 56, 10, 18, 36, 22
 SMALLEST_PLAIN = 1e-3
-"""The smallest tick that is written without a power of ten: more digits would be cut off at the page's edge."""
+"""The smallest tick label without a power of ten: longer labels would be cut off at the edge of the page."""
 MOST_POINTS = 700
-"""Points of one line: as many as a wide screen tells apart."""
+"""Most points of one line, which is the resolution of a wide screen."""
 TICKS_X, TICKS_Y = 6, 4
 SAME = 2e-4
-"""Values closer than this, relative to the largest, are drawn level: the tables print four digits, and they are one there."""
+"""Relative range of values that are drawn level: with the four digits of the tables they are equal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class Panel:
 
 
 def chart(panels: Sequence[Panel], x_label: str, title: str) -> str:
-    """Return panels over one x axis as an SVG element with a title for who cannot see it."""
+    """Return panels over one x axis as an SVG element with a title for screen readers."""
     has_points = any(s.form == "points" for p in panels for s in p.series)
     x0, x1 = _range([s.x for p in panels for s in p.series], pad=0.03 if has_points else 0.0)
     height = TOP + sum(p.height + GAP for p in panels) - GAP + BOTTOM
@@ -110,13 +110,13 @@ def legend(series: Sequence[Series]) -> str:
 
 
 def thinned(x: FloatArray, *ys: FloatArray) -> tuple[FloatArray, ...]:
-    """Return series at evenly chosen samples, where there are more than a chart shows."""
+    """Return series reduced to evenly spaced samples where there are more than MOST_POINTS."""
     step = max(1, ceil(x.size / MOST_POINTS))
     return (x[::step], *(y[::step] for y in ys))
 
 
 def nice_ticks(low: float, high: float, count: int) -> list[float]:
-    """Return about so many round numbers between two."""
+    """Return about `count` round numbers between low and high."""
     if not (isfinite(low) and isfinite(high)) or high <= low:
         return [low]
     raw = (high - low) / count
@@ -133,8 +133,8 @@ def _range(values: Sequence[FloatArray], pad: float, *, from_zero: bool = False)
     if from_zero:
         low, high = min(low, 0.0), max(high, 0.0)
     size = max(abs(low), abs(high))
-    room = pad * (high - low) if high - low > SAME * size else 0.5 * size or 1.0
-    return low - room, high + room
+    margin = pad * (high - low) if high - low > SAME * size else 0.5 * size or 1.0
+    return low - margin, high + margin
 
 
 def _panel(panel: Panel, top: float, x: tuple[float, float]) -> str:
@@ -165,7 +165,7 @@ def _panel(panel: Panel, top: float, x: tuple[float, float]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Scale:
-    """From data to the panel's own coordinates."""
+    """The map from data to the coordinates of the panel."""
 
     x_range: tuple[float, float]
     y_range: tuple[float, float]
@@ -223,7 +223,7 @@ def _x_axis(top: float, x: tuple[float, float], label: str) -> str:
 
 
 def _shown(value: float) -> str:
-    """Return a tick's number, short enough for the margin: `0.0015`, `5e\u22124`."""
+    """Return the label of a tick, short enough for the margin: `0.0015`, `5e\u22124`."""
     if 0.0 < abs(value) < SMALLEST_PLAIN:
         digits, _, power = f"{value:.3e}".partition("e")
         return f"{float(digits):g}e{int(power)}".replace("-", "\u2212")

@@ -1,4 +1,4 @@
-"""The charts of a report, one function each: free runs, laws over speed, radius, gains, the loop, places of failure."""
+"""The charts of a report, one function each: free runs, laws over speed, radius, gains, modelling loop, places of failure."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ def free_run(found: Comparison, title: str) -> tuple[str, str]:
 
 
 def loop_motion(loop: Loop, *, has_last: bool) -> tuple[str, str]:
-    """Return the chart of the first model's free run over its measurement, that of the last beside it if asked, and its legend.
+    """Return the chart of the measurement and the first model's free run, and its legend; with `has_last` also the last model's.
 
-    The worst stretches of the first are shaded.
+    The worst stretches of the first model are shaded.
     """
     models, title = [(loop.start, loop.before, "second")], f"the {loop.start} and the measurement"
     if has_last:
@@ -75,16 +75,16 @@ def loop_steps(loop: Loop) -> str:
 
 
 def failures(places: Sequence[Place], title: str) -> str:
-    """Return bars of what each condition has of the squared error beyond its share of the time, in per cent."""
+    """Return bars of the share of the squared error of each condition less its share of the samples, in per cent."""
     worse = [p for p in places[:MOST_BARS] if p.beyond > 0.0]
     rows = [(DEGREES.words(p.condition), 100.0 * p.beyond, f"+{100.0 * p.beyond:.0f} %, {p.rms_ratio:.2f} x") for p in worse]
     return bars(rows, title)
 
 
 def over_speed(source: ParameterSource, name: str, unit: str) -> str | None:
-    """Return a parameter's points over speed with 95 % errors, and its law with its band where two speeds allow one.
+    """Return the chart of a parameter over speed with 95 % errors, and its law with a band where there are two speeds.
 
-    The authority is drawn over the speed squared: a fin's lift is a straight line there.
+    The authority is drawn over the squared speed, where the lift of a fin is a straight line.
     """
     points = [p for p in source.points if name in p.values]
     if not points:
@@ -124,7 +124,7 @@ def radius(body: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def gains(schedule: Schedule) -> str:
-    """Return the gains of a schedule and its phase margin over speed, and the margin that was asked for."""
+    """Return the chart of the gains of a schedule and its phase margin over speed, with the required margin."""
     x = np.array(schedule.speeds, dtype=float)
 
     def line(values: Sequence[float], kind: str, name: str) -> tuple[Series, Series]:
@@ -135,8 +135,8 @@ def gains(schedule: Schedule) -> str:
     drawn = {label: [getattr(r.gains, name) for r in schedule.rows] for label, name in kinds.items()}
     panels = [Panel(label, line(y, "simulated", kinds[label])) for label, y in drawn.items() if any(y)]
     margin = line([r.phase_margin_deg for r in schedule.rows], "second", "phase margin")
-    asked = Series(x, np.full(x.size, schedule.phase_margin_deg), "quiet", "asked for")
-    panels.append(Panel("phase margin, deg (line: asked for)", (asked, *margin), height=100, from_zero=True))
+    required = Series(x, np.full(x.size, schedule.phase_margin_deg), "quiet", "asked for")
+    panels.append(Panel("phase margin, deg (line: asked for)", (required, *margin), height=100, from_zero=True))
     return chart(panels, "speed, m/s", "gains and phase margin over speed")
 
 

@@ -1,4 +1,4 @@
-"""What was made from what, in few rows: each file with the start of its SHA-256, many inputs of one folder in one line."""
+"""The table of files and their inputs: each with the start of its SHA-256, many inputs of one folder in one line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HASH = 8
 
 
 def lineage(state: FolderState) -> Block:
-    """Return a row for each file; a log that a run was made from stands in the row of that run."""
+    """Return a table with a row for each file; the log of a run is in the row of that run."""
     hashes = Hashes(state.folder, state.entries)
     used = {_name(s, state) for run in state.of_kind(RUN) for s in run.sources}
     items = [i for i in state.items if not (i.kind == LOG and i.path in used)]
@@ -28,13 +28,13 @@ def lineage(state: FolderState) -> Block:
 def _row(item: Item, state: FolderState, now: Mapping[str, str]) -> tuple[str, ...]:
     maker = made_by(state.entries, item.path)
     named = [(s, _name(s, state)) for s in item.sources]
-    told = [f"{name} ({s.sha256[:HASH]})" for s, name in named if s.sha256 and now.get(name) != s.sha256]
-    plain = [name for s, name in named if not s.sha256 or now.get(name) == s.sha256]
+    with_hash = [f"{name} ({s.sha256[:HASH]})" for s, name in named if s.sha256 and now.get(name) != s.sha256]
+    unchanged = [name for s, name in named if not s.sha256 or now.get(name) == s.sha256]
     return (
         item.path,
         now[item.path][:HASH],
         item.kind,
-        "; ".join([*_together(plain, now), *told]),
+        "; ".join([*_together(unchanged, now), *with_hash]),
         "" if maker is None else maker.name,
         item.standing,
     )
@@ -45,7 +45,7 @@ def _name(source: Source, state: FolderState) -> str:
 
 
 def _together(names: Iterable[str], rows: Collection[str]) -> list[str]:
-    """Return names, more than a few of one folder and suffix as one part: which they are, or that they are all of the table's."""
+    """Return names; more than a few of one folder and suffix are combined, by their pattern or as all of the table's."""
     kinds: dict[tuple[str, str], list[str]] = {}
     for name in dict.fromkeys(names):
         path = PurePosixPath(name)

@@ -1,4 +1,4 @@
-"""What a report is made of: the files of a folder, or those given, read and compared; what cannot be used is said."""
+"""The material of a report: the files of a folder, or given files, read and compared; with reasons for those not used."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ from fieldsid.vehicle import Vehicle, find_vehicle
 
 T = TypeVar("T")
 MOST_RUNS, MOST_MODELS = 12, 4
-"""Runs and models whose free runs are drawn: what is left out is said."""
+"""Most runs and models whose free runs are drawn; the report names how many are left out."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Shown(Brief):
-    """One model over the runs: its path from the folder, the model, its comparisons, and those that it was fitted to."""
+    """One model with its path from the folder, and its comparisons with the runs, also with those it was fitted to."""
 
     path: str
     model: Model
     found: tuple[Comparison, ...]
 
     def was_fitted_to(self, run: str) -> bool:
-        """Whether the model has seen a run."""
+        """Whether the model was fitted to a run."""
         return run in self.model.runs
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class AxisMaterial(Brief):
-    """All of one axis: the models shown, the best first, their line and loop, points over speed, the newest of other files."""
+    """The material of one axis: models, the best first, their ancestry and loop, points over speed, the newest other files."""
 
     axis: str
     shown: tuple[Shown, ...]
@@ -58,7 +58,7 @@ class AxisMaterial(Brief):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Material(Brief):
-    """A folder's state, its runs, its axes, notes and vehicle; `skipped` says what could not be used and why."""
+    """A folder's state, runs, axes, notes and vehicle; `skipped` names what could not be used, with the reason."""
 
     state: FolderState
     runs: tuple[Run, ...]
@@ -70,7 +70,7 @@ class Material(Brief):
 
 
 def material_of(state: FolderState) -> Material:
-    """Return what a report of a folder's files is made of; raises UsageError where there is neither a run nor a model."""
+    """Return the material of a report on a folder's files; raises UsageError where there is neither a run nor a model."""
     if not (state.of_kind(RUN) or state.of_kind(MODEL)):
         found = f"nothing but {', '.join(f'`{i.path}`' for i in state.items[:3])}" if state.items else "nothing"
         raise UsageError(
@@ -93,8 +93,8 @@ def _runs(state: FolderState, vehicle: Vehicle | None, skipped: list[str]) -> li
         sources = [s.path for i in state.of_kind(MODEL) for s in i.sources if s.path is not None]
         places = [p for p in dict.fromkeys(sources) if p.suffix not in (".yaml", ".yml")]
     if len(places) > MOST_RUNS:
-        said = "those that the model was not fitted to come first, then others evenly by name"
-        skipped.append(f"{len(places) - MOST_RUNS} of {len(places)} runs are not drawn: {said}")
+        order = "those that the model was not fitted to come first, then others evenly by name"
+        skipped.append(f"{len(places) - MOST_RUNS} of {len(places)} runs are not drawn: {order}")
         places = _chosen(places, _fitted_to(state))
     limits = {} if vehicle is None else vehicle.signal_limits
     read = {p: partial(load_run, p, state.mapping_of(p), fin_max_rad=limits, recognise=True) for p in places}
@@ -103,7 +103,7 @@ def _runs(state: FolderState, vehicle: Vehicle | None, skipped: list[str]) -> li
 
 
 def _tried(read: Callable[[], T], what: str, skipped: list[str]) -> T | None:
-    """Return what can be read; what cannot is None, and why is said."""
+    """Return the value of `read`; None where it fails, with the reason added to `skipped`."""
     try:
         return read()
     except FieldsidError as error:
@@ -112,13 +112,13 @@ def _tried(read: Callable[[], T], what: str, skipped: list[str]) -> T | None:
 
 
 def _fitted_to(state: FolderState) -> set[str]:
-    """Return the names of the runs that the best models were fitted to."""
+    """Return the names of the runs to which the best models were fitted."""
     best = {path for axis in ("yaw", "pitch") for path in chosen_models(state, axis)}
     return {r for i in state.of_kind(MODEL) if i.path in best for r in i.runs}
 
 
 def _chosen(places: Sequence[Path], fitted: set[str]) -> list[Path]:
-    """Return as many runs as are drawn, those that judge first, then others evenly over the list."""
+    """Return the runs to be drawn: those to which no model was fitted first, then others spread evenly over the list."""
     unseen = [p for p in places if p.stem not in fitted][:MOST_RUNS]
     others = [p for p in places if p not in unseen]
     count = MOST_RUNS - len(unseen)
@@ -173,7 +173,7 @@ def _shown(state: FolderState, path: Path, runs: Sequence[Run], skipped: list[st
 
 
 def _last(state: FolderState, kind: str, axis: str, skipped: list[str]) -> Item | None:
-    """Return the newest file of a kind for an axis that says enough to be drawn; a turning radius is that of the yaw."""
+    """Return the newest complete file of a kind for an axis; a turning radius belongs to the yaw axis."""
     return state.newest(i for i in state.of_kind(kind) if (i.axis or "yaw") == axis and _is_complete(i, skipped))
 
 

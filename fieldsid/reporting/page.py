@@ -1,4 +1,4 @@
-"""The page: the templates of `templates/report/`, filled with what the sections say; one text, no other file is needed."""
+"""The page: the templates of `templates/report/` filled with the sections, as one text that needs no other file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PAGE, STYLE, SCRIPT = "report.html", "report.css", "report.js"
 
 
 def html_of(context: Mapping[str, Any]) -> str:
-    """Return what `sections.context_of` says as one HTML text; raises ArtifactError where a template has a mistake."""
+    """Return the HTML text of a context by `sections.context_of`; raises ArtifactError where a template has a mistake."""
     folder = template_path("report")
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(folder),

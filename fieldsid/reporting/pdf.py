@@ -1,4 +1,4 @@
-"""A page as PDF, printed by a browser that is installed: what it shows on paper is what the style sheet says of print."""
+"""A page as PDF, printed by an installed browser with the print rules of the style sheet."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def print_pdf(html: str, path: Path, *, force: bool = False) -> Path:
     with TemporaryDirectory() as folder, replacing(path, force=force) as whole:
         page, printed = Path(folder) / "report.html", Path(folder) / "report.pdf"  # a file with a name, for another program
         page.write_text(html, encoding="utf-8")
-        # a browser does not open its own sandbox for the administrator, who is who works in a container
+        # a browser does not start its sandbox for root, the usual user in a container
         boxed = [] if getattr(os, "geteuid", lambda: 1)() else ["--no-sandbox"]
         words = [
             program, "--headless=new", *boxed, "--disable-gpu", "--no-first-run", f"--user-data-dir={folder}/profile",
@@ -61,7 +61,7 @@ def print_pdf(html: str, path: Path, *, force: bool = False) -> Path:
                 f"`{program}` does not print", found=f"no end after {LONGEST_S} s", hint="print the HTML"
             ) from error
         if not printed.exists() or not printed.stat().st_size:
-            said = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
-            raise ArtifactError(f"`{program}` printed nothing", found=said[:200], hint="write HTML, and print it by hand")
+            message = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+            raise ArtifactError(f"`{program}` printed nothing", found=message[:200], hint="write HTML, and print it by hand")
         whole.write_bytes(printed.read_bytes())
     return path

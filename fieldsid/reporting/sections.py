@@ -1,4 +1,4 @@
-"""What the report says: verdicts first, then each part with its numbers, as plain data that the templates lay out."""
+"""The sections of the report: verdicts first, then each part with its numbers, as plain data for the templates."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from fieldsid.views.turn_prediction import turns_of
 
 
 def context_of(material: Material) -> dict[str, Any]:
-    """Return what the page's template shows of a report's material."""
+    """Return the template's context for a report's material."""
     state, (why, command) = material.state, material.next_step
     name = material.vehicle.name if material.vehicle is not None else state.folder.resolve().name
     return {
@@ -104,14 +104,14 @@ def _state_verdict(state: FolderState) -> list[dict[str, str]]:
     stale = sorted((i for i in state.items if i.stale), key=lambda i: i.stale.endswith(" is stale"))  # causes first
     if not stale:
         return []
-    said = "; ".join(f"{i.path}: {i.stale}" for i in stale[:3]) + (f" and {len(stale) - 3} more" if len(stale) > 3 else "")
-    return [{"what": f"{counted(len(stale), 'stale file')}", "says": said, "state": "warn"}]
+    reasons = "; ".join(f"{i.path}: {i.stale}" for i in stale[:3]) + (f" and {len(stale) - 3} more" if len(stale) > 3 else "")
+    return [{"what": f"{counted(len(stale), 'stale file')}", "says": reasons, "state": "warn"}]
 
 
 def _axis(axis: AxisMaterial) -> dict[str, Any]:
     best = axis.shown[0]
     failing = [(c.run, ch, c) for c in best.found for ch in c.failing]
-    told = axis.shown[:1] if axis.line else axis.shown
+    models = axis.shown[:1] if axis.line else axis.shown
     return {
         "name": axis.axis,
         "pairs": [_pair(shown, c, axis) for shown in axis.shown for c in shown.found],
@@ -127,7 +127,7 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
         "candidates": _candidates(axis.diagnosis),
         "diagnosis": axis.diagnosis.body if axis.diagnosis is not None else None,
         "loop": None if axis.loop is None else _loop(axis.loop),
-        "parameters": _parameters(told),
+        "parameters": _parameters(models),
         "laws": _laws(axis),
         "radius": None if axis.turning is None else _radius(axis.turning),
         "gains": None if axis.schedule is None or axis.gains is None else _gains(axis.gains, axis.schedule.path),
@@ -135,7 +135,7 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
 
 
 def _loop(loop: Loop) -> dict[str, Any]:
-    """Return the loop in four charts: the first model fails, where; with what was added, and the error after each step."""
+    """Return the loop in four charts: failure of the first model, its places, the last model, the error after each step."""
     (before, before_key), (after, after_key) = (figures.loop_motion(loop, has_last=last) for last in (False, True))
     return {
         "run": loop.run, "start": loop.start, "added": ", ".join(loop.added),
@@ -148,7 +148,7 @@ def _loop(loop: Loop) -> dict[str, Any]:
 
 
 def _followed(channel: Channel) -> str:
-    """Return a channel with what the model leaves of it."""
+    """Return the name of a channel with the error of the model in it."""
     return f"{channel.name} {left_in_words(channel.over_floor, channel.fit, 2)}"
 
 
@@ -168,7 +168,7 @@ def _pair(shown: Shown, found: Any, axis: AxisMaterial) -> dict[str, Any]:
 
 
 def _errors(shown: Shown) -> Block:
-    """Return how well a model follows each run: over the noise, and whether it was fitted to it, before the errors themselves."""
+    """Return a table of a model's errors on each run: over the noise, whether it was fitted to the run, and in their units."""
     merits, units = merit_blocks(((c.run, c.shown.record.speed, c.merit, c.floor) for c in shown.found), DEGREES)
     rows = tuple(
         (run, f"{c.over_noise:.2f}" if c.over_noise < MANY else "no noise", "yes" if shown.was_fitted_to(c.run) else "no", *cells)
@@ -182,12 +182,12 @@ def _candidates(item: Item | None) -> tuple[Block, str] | None:
     return None if item is None else candidates(item.body, DEGREES)
 
 
-def _parameters(told: Sequence[Shown]) -> Block:
-    """Return the parameters of models in one table, whose they are beside them where there are several."""
-    blocks = [parameter_block(s.model) for s in told]
-    if len(told) == 1:
-        return replace(blocks[0], title=f"{blocks[0].title}: {told[0].path}")
-    rows = tuple((*row, s.path) for s, b in zip(told, blocks, strict=True) for row in b.rows)
+def _parameters(models: Sequence[Shown]) -> Block:
+    """Return the parameters of models in one table, with the model's file in a column where there are several."""
+    blocks = [parameter_block(s.model) for s in models]
+    if len(models) == 1:
+        return replace(blocks[0], title=f"{blocks[0].title}: {models[0].path}")
+    rows = tuple((*row, s.path) for s, b in zip(models, blocks, strict=True) for row in b.rows)
     return Block("Parameters", rows, (*blocks[0].columns, "model"))
 
 
@@ -198,9 +198,9 @@ def _laws(axis: AxisMaterial) -> list[dict[str, str]]:
     for name, unit in figures.parameters_of(axis.axis):
         drawn = figures.over_speed(axis.source, name, unit)
         law = None if axis.source.laws is None else axis.source.laws.by_name.get(name)
-        said = f"|{name}| grows as {law.exponent.says}" if law is not None and law.exponent else ""
+        growth = f"|{name}| grows as {law.exponent.says}" if law is not None and law.exponent else ""
         if drawn:
-            out.append({"name": name, "chart": drawn, "says": said})
+            out.append({"name": name, "chart": drawn, "says": growth})
     return out
 
 
@@ -221,12 +221,12 @@ def _vehicle(material: Material) -> list[tuple[str, str]]:
         ("length", v.length_m, "m"), ("rudder limit", v.rudder_max_rad, "rad"), ("elevator limit", v.elevator_max_rad, "rad"),
         ("fin rate", v.fin_rate_rad_s, "rad/s"), ("slowest", v.speed_min_m_s, "m/s"), ("fastest", v.speed_max_m_s, "m/s"),
     )  # fmt: skip
-    told = [(name, f"{number(value, 3)} {unit}") for name, value, unit in pairs if value is not None]
+    facts = [(name, f"{number(value, 3)} {unit}") for name, value, unit in pairs if value is not None]
     planes = () if v.fins is None else ((v.fins.of("yaw"), "rudder"), (v.fins.of("pitch"), "elevator"))
-    return [*told, *(("fins", ", ".join(fins.says(plane))) for fins, plane in planes if fins is not None)]
+    return [*facts, *(("fins", ", ".join(fins.says(plane))) for fins, plane in planes if fins is not None)]
 
 
 def _commands(state: FolderState) -> list[dict[str, str]]:
-    """Return the commands that made what is there: those of the journal that ended well and wrote something or gave a result."""
-    told = [e for e in state.entries if e.exit in DONE and e.name not in ("report", "status")]
-    return [{"line": shortened(e.command, state.folder), "verdict": e.verdict, "time": e.when} for e in told]
+    """Return the successful commands of the journal, without reports and overviews."""
+    successful = [e for e in state.entries if e.exit in DONE and e.name not in ("report", "status")]
+    return [{"line": shortened(e.command, state.folder), "verdict": e.verdict, "time": e.when} for e in successful]

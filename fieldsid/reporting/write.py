@@ -1,4 +1,4 @@
-"""A report written: what a folder's state comes to, as HTML or PDF by the suffix of the file."""
+"""Write the report on a folder's state, as HTML or PDF by the suffix of the file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ KINDS = (".html", ".pdf")
 
 
 def check_report(path: Path, *, force: bool) -> None:
-    """Refuse a file that no report can be written to, before any work; raises UsageError and ArtifactError."""
+    """Refuse a file to which no report can be written, before any work; raises UsageError and ArtifactError."""
     if path.suffix not in KINDS:
         raise UsageError("a report is HTML or PDF", found=f"`{path}`", hint=f"write `{path.with_suffix('.html')}`")
     check_output(path, force=force)
@@ -27,7 +27,7 @@ def check_report(path: Path, *, force: bool) -> None:
 
 
 def written(state: FolderState, path: Path, *, force: bool) -> tuple[Mapping[str, Any], str]:
-    """Write a report and return what it shows and its HTML text; raises UsageError and ArtifactError."""
+    """Write a report and return its context and its HTML text; raises UsageError and ArtifactError."""
     check_report(path, force=force)
     context = context_of(material_of(state))
     text = html_of(context)

@@ -1,4 +1,4 @@
-"""Work whose only result is on the disk, done by forked workers while this process goes on."""
+"""Work whose only result is on the disk, done by forked workers in the background."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ MAX_WORKERS = 2
 
 
 class BackgroundTasks:
-    """Tasks in forked workers, waited for where the context is left; a task that failed there is done again here.
+    """Tasks in forked workers, for which the end of the context waits; a task that failed there is repeated in this process.
 
-    So its error is raised here. Where the context is left with an error, no task is done again.
+    Its error is thus raised here. Where the context ends with an error, no task is repeated.
     """
 
     def __init__(self) -> None:
         self._tasks: list[tuple[Worker, Callable[[], None]]] = []
 
     def run(self, task: Callable[[], None]) -> None:
-        """Do a task in a worker; here, at once, where MAX_WORKERS are running or this process cannot be forked."""
+        """Run a task in a worker, or here at once where MAX_WORKERS are running or this process cannot be forked."""
         busy = sum(worker.is_running() for worker, _ in self._tasks)
         worker = fork_worker(lambda: _no_bytes(task)) if busy < MAX_WORKERS else None
         if worker is None:

@@ -1,7 +1,7 @@
-"""Ctrl-C that is never lost: where a library swallows it while it is imported, or Python cannot raise it, it is asked for again.
+"""Make every Ctrl-C effective: where a library may discard it during an import, or Python cannot raise it, it is raised again.
 
-Python raises KeyboardInterrupt wherever the program is. In the middle of an import a library may take it for a module that is
-not there, or clear it away in C, and in what is called when an object goes nothing can be raised: the job would go on to its end.
+Python raises KeyboardInterrupt at any point of the program. During an import a library may mistake it for a missing module or
+discard it in C, and in a finaliser no exception can be raised: the program would then continue to its end.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from types import FrameType
 from typing import Never
 
 AGAIN_S = 0.05
-"""How long after an interrupt that may be lost it is asked for again."""
+"""Time after which an interrupt that may have been discarded is raised again."""
 
 
 class _Asked:
-    """Whether an interrupt was asked for that may be lost, and the program has not met it yet."""
+    """Whether there was an interrupt that may have been discarded, and that the program has not handled yet."""
 
     is_open = False
 
@@ -27,14 +27,14 @@ _ASKED = _Asked()
 
 
 def heed_interrupts() -> None:
-    """Have every Ctrl-C end what this process does; where its caller has them ignored, as `nohup` does, they stay ignored."""
+    """Make every Ctrl-C end this process's work; where its caller ignores them, as `nohup` does, they stay ignored."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         sys.unraisablehook = _unraisable
         signal.signal(signal.SIGINT, _interrupted)
 
 
 def meet_interrupt() -> bool:
-    """Return whether an interrupt was asked for that nobody met, which then is met."""
+    """Return whether there was an unhandled interrupt, and mark it as handled."""
     was_open, _ASKED.is_open = _ASKED.is_open, False
     return was_open
 

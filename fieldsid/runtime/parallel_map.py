@@ -1,4 +1,4 @@
-"""A map shared with a worker that is forked for it: this process and the worker each take the next item left."""
+"""A map shared with a forked worker: this process and the worker each take the next item that remains."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def parallel_map(
 ) -> list[R]:  # fmt: skip
     """Return function(item) of every item, in order.
 
-    What the function changes is seen in one of the two processes only: all that matters must be in the value it returns, which
-    `write` and `read`, by the place of the items, turn to bytes and back. Where the worker ends without an answer, its items are
-    evaluated here; an error of the function is raised here.
+    Side effects of the function occur in one of the two processes only: every result must be in the value that it returns.
+    `write` and `read` convert the values, by the index of the items, to bytes and back. Where the worker ends without an answer,
+    its items are evaluated here; an error of the function is raised here.
     """
     done = _shared(function, items, write, read) if 1 < len(items) <= MAX_ITEMS else {}
     return [done[i] if i in done else function(item) for i, item in enumerate(items)]
@@ -34,21 +34,21 @@ def _shared(
     function: Callable[[T], R], items: Sequence[T],
     write: Callable[[dict[int, Any]], bytes], read: Callable[[bytes], dict[int, Any]],
 ) -> dict[int, R]:  # fmt: skip
-    """Return what this process and a worker have worked out, by the place of the items; nothing where there is no worker."""
-    left = job_queue(len(items))
+    """Return the values computed by this process and a worker, by the index of the items; empty where there is no worker."""
+    remaining = job_queue(len(items))
     try:
-        worker = fork_worker(lambda: write(dict(_taken(function, items, left))))
+        worker = fork_worker(lambda: write(dict(_taken(function, items, remaining))))
         if worker is None:
             return {}
         with worker:
-            own = dict(_taken(function, items, left))
+            own = dict(_taken(function, items, remaining))
             answer = worker.answer()
     finally:
-        os.close(left)
+        os.close(remaining)
     return own if answer is None else own | read(answer)
 
 
-def _taken(function: Callable[[T], R], items: Sequence[T], left: int) -> Iterator[tuple[int, R]]:
-    """Yield the places and values of the items that this process takes."""
-    while number := os.read(left, 1):
+def _taken(function: Callable[[T], R], items: Sequence[T], remaining: int) -> Iterator[tuple[int, R]]:
+    """Yield the indices and values of the items that this process takes."""
+    while number := os.read(remaining, 1):
         yield number[0], function(items[number[0]])

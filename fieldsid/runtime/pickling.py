@@ -1,4 +1,4 @@
-"""Values as the bytes that go between this process and one that it began."""
+"""Pickling of values that are sent between this process and a child process."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 
 class WorkerPickler(pickle.Pickler):
-    """A pickler that writes read-only mappings too."""
+    """A pickler that can also write read-only mappings."""
 
     def __init__(self, out: BytesIO) -> None:
         super().__init__(out, protocol=5)
@@ -21,7 +21,7 @@ class WorkerPickler(pickle.Pickler):
 
 
 def _read_only(values: dict[str, object]) -> MappingProxyType[str, object]:
-    """Return a read-only mapping; its own class cannot be named in what is pickled."""
+    """Return a read-only mapping; its class cannot be pickled by name."""
     return MappingProxyType(values)
 
 
@@ -33,5 +33,5 @@ def dumps(value: object, writer: Callable[[BytesIO], WorkerPickler] = WorkerPick
 
 
 def loads(answer: bytes) -> Any:
-    """Return the value that this process, one it began, or the one that began it has written."""
+    """Return the value from bytes written by `dumps` in this, a child or the parent process."""
     return pickle.loads(answer)  # noqa: S301 - nobody else wrote it

@@ -1,6 +1,6 @@
-"""A process of its own beside one that must not wait: given a task, asked now and then for the answer.
+"""A second process for tasks of a process that must not wait: it is given a task and polled for the answer.
 
-Begun anew rather than forked: threads, sockets and files of the first are none of its own. It ends with the first.
+It is spawned rather than forked, so that it does not share threads, sockets and files of the first. It ends with the first.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fieldsid.runtime.worker_pool import IS_WORKER
 
 
 class SecondProcess:
-    """One process and at most one task; started with the first of them."""
+    """One process with at most one task at a time; started with the first task."""
 
     def __init__(self) -> None:
         self._ours: Connection | None = None
@@ -26,7 +26,7 @@ class SecondProcess:
         self.is_busy = False
 
     def give(self, function: Callable[..., Any], *arguments: Any) -> None:
-        """Let it call a function of a module with arguments that can be sent; what it is at is to be done."""
+        """Let the process call a module-level function with picklable arguments; the previous task must have been answered."""
         if self._ours is None:
             context = get_context("spawn")
             self._ours, theirs = context.Pipe()
@@ -37,9 +37,9 @@ class SecondProcess:
         self.is_busy = True
 
     def answer(self, *, wait: bool = False) -> Any:
-        """Return what was answered, a FieldsidError where the function raised one; None while there is nothing.
+        """Return the answer, or the FieldsidError that the function raised; None while there is no answer.
 
-        Raises FieldsidError where the process has ended by itself.
+        Raises FieldsidError where the process has ended unexpectedly.
         """
         if self._ours is None or not self.is_busy or not (wait or self._ours.poll()):
             return None
@@ -51,7 +51,7 @@ class SecondProcess:
             raise FieldsidError("the process beside this one has ended", found="no answer", hint="try it alone") from error
 
     def close(self) -> None:
-        """End it, whatever it is at."""
+        """End the process, also within a task."""
         if self._ours is not None:
             self._ours.close()
             self._process.terminate()
@@ -60,8 +60,8 @@ class SecondProcess:
 
 
 def _work(theirs: Connection) -> None:
-    """Answer tasks until there are no more."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # typed at the first process, which ends this one
+    """Answer tasks until the connection is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is handled by the first process, which ends this one
     os.environ[IS_WORKER] = "1"
     while True:
         try:

@@ -1,4 +1,4 @@
-"""The standard streams of the process, each of them there: one that is closed or cannot be written stops no work."""
+"""Ensure that the standard streams exist, so that a closed or unwritable stream does not stop the program."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Any
 
 
 class _Unheard(io.FileIO):
-    """A file that takes all it is given: messages that nobody can get are no reason to end otherwise."""
+    """A file that accepts all output: messages that cannot be delivered must not change how the program ends."""
 
     def write(self, data: Any) -> int:
-        """Write as a file does, and where it cannot, say that all was written."""
+        """Write the data; where that fails, return as if all had been written."""
         try:
             return super().write(data) or 0
         except OSError:
@@ -20,9 +20,9 @@ class _Unheard(io.FileIO):
 
 
 def have_streams() -> bool:
-    """Open those streams that are closed, so that no file gets their numbers, and return whether the output was open.
+    """Open the closed standard streams, so that no file gets their descriptors, and return whether the output was open.
 
-    A closed input is an empty one; messages that cannot be written are lost. Letters that a console lacks are shown as codes.
+    A closed input reads as empty; messages that cannot be written are discarded. Characters that a console lacks are escaped.
     """
     closed = [name for name in ("stdin", "stdout", "stderr") if vars(sys)[name] is None]
     if "stdin" in closed:

@@ -1,12 +1,12 @@
-"""Workers: copies of this process, each made for one piece of work, that answer with bytes.
+"""Workers: forked copies of this process, each for one piece of work, that answer with bytes.
 
-A worker sees all that this process holds without its being pickled; its answer alone is. A ProcessPoolExecutor of one worker
+A worker sees all objects of this process without pickling; only its answer is pickled. A ProcessPoolExecutor of one worker
 (`concurrent.futures`), initialised once with the records, the effects and the compiled kernels, was measured against a worker
 forked for each shared map on five runs of `sysid diagnose` (four yaw, one pitch; 3 or 5 logs of 44 to 57 s; medians of three; two
 cores):
 
     a worker forked for each map        1.29 to 2.13 s
-    executor, start method fork         1.39 to 2.35 s      8 to 10 % more, and every closure pickled with what it holds
+    executor, start method fork         1.39 to 2.35 s      8 to 10 % more, and every closure pickled with its variables
     executor, start method spawn        2.23 to 3.23 s     52 to 73 % more
     one process, one core               1.72 to 3.01 s     30 to 45 % more
 
@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Never, Self
 
 IS_WORKER = "FIELDSID_IS_WORKER"
-"""What is set in the environment of a process that makes no copies of itself."""
+"""Environment variable that is set in a process that must not fork."""
 END_OF_ANSWER = b"end of answer"
 """The last bytes of a complete answer."""
 PR_SET_PDEATHSIG = 1
@@ -35,10 +35,10 @@ PR_SET_PDEATHSIG = 1
 
 
 class Worker:
-    """A forked worker. Where its context is left with an error, or it ended without an answer, its end is waited for.
+    """A forked worker. The end of its context waits for it where there is an error or the worker gave no answer.
 
-    Otherwise it may end by itself. The system takes some milliseconds to clear a copy of this process away, in which this process
-    works on: the end is asked for when the next worker is forked, see `_ending`.
+    Otherwise this process continues at once, as the system takes some milliseconds to remove a copy of this process; the worker
+    is reaped when the next one is forked, see `_ending`.
     """
 
     def __init__(self, process: int, source: int) -> None:
@@ -55,7 +55,7 @@ class Worker:
         return not select.select([self._stream], [], [], 0.0)[0]
 
     def kill(self) -> None:
-        """End the worker, whatever it is doing, and wait for its end."""
+        """Kill the worker and wait for its end."""
         os.kill(self.process, signal.SIGKILL)
         self._stream.close()
         os.waitpid(self.process, 0)
@@ -72,11 +72,11 @@ class Worker:
 
 
 _ending: list[int] = []
-"""Workers that have answered and whose end was not asked for; the system keeps a number of the last until this process ends."""
+"""Workers that have answered but have not been reaped; the last ones remain as zombies until this process ends."""
 
 
 def job_queue(count: int) -> int:
-    """Return the end of a pipe from which each number below count is read once, by whichever process reads it."""
+    """Return the read end of a pipe with the numbers below count, each of which only one of the processes reads."""
     source, target = os.pipe()
     with os.fdopen(target, "wb") as stream:
         stream.write(bytes(range(count)))
@@ -84,10 +84,10 @@ def job_queue(count: int) -> int:
 
 
 def fork_worker(work: Callable[[], bytes]) -> Worker | None:
-    """Return a forked worker that does some work; None where this process cannot be forked.
+    """Return a forked worker that does the work; None where this process cannot be forked.
 
-    What the work changes is seen in the worker only; its output and its errors are seen nowhere. The worker ends with the process
-    it was forked from, however that ends.
+    Side effects of the work occur in the worker only; its output and errors are discarded. The worker ends with its parent
+    process, however that ends.
     """
     source, target = os.pipe()
     process = fork()
@@ -103,9 +103,9 @@ def fork_worker(work: Callable[[], bytes]) -> Worker | None:
 
 
 def fork() -> int | None:
-    """Copy this process, and return 0 in the worker, its number here; None where this process cannot be forked.
+    """Fork this process, and return 0 in the worker, its process id here; None where this process cannot be forked.
 
-    The worker has no output, and ends with this process. It must end by `os._exit`, whatever happens in it.
+    The worker has no output, and ends with this process. It must always end by `os._exit`.
     """
     if not can_fork():
         return None
@@ -114,7 +114,7 @@ def fork() -> int | None:
     parent = os.getpid()
     try:
         process = os.fork()
-    except OSError:  # where memory or processes are short
+    except OSError:  # there is too little memory, or there are too many processes
         return None
     if process == 0:
         _enter_worker(parent)
@@ -122,10 +122,10 @@ def fork() -> int | None:
 
 
 def _enter_worker(parent: int) -> None:
-    """Make this process a worker of its parent: without output, and with no workers of its own."""
+    """Make this process a worker of its parent: without output and without further workers."""
     try:
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-        if os.getppid() != parent:  # it ended before the signal was asked for
+        if os.getppid() != parent:  # the parent ended before the signal was requested
             os._exit(0)
         os.environ[IS_WORKER] = "1"
         _ending.clear()
@@ -137,7 +137,7 @@ def _enter_worker(parent: int) -> None:
 
 
 def _work(work: Callable[[], bytes], target: int) -> Never:
-    """Write the answer of the work and end the worker, without what a process does at its end."""
+    """Write the answer of the work and end the worker without the usual clean-up at exit."""
     try:
         answer = work()
         with os.fdopen(target, "wb") as stream:
