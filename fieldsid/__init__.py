@@ -7,7 +7,7 @@
     print(fit.summary())
 
 The functions take the arguments of the commands of their names (`sysid identify --help`) and return records: `summary()` is a
-record in words, `to_frame()` a pandas table, `plot()` a matplotlib figure. A name is loaded when it is first asked for.
+record in words, `to_frame()` a pandas table, `plot()` a matplotlib figure. A name is loaded when it is first used.
 """
 
 from importlib import import_module
@@ -15,7 +15,7 @@ from importlib import import_module
 from fieldsid._version import __version__
 
 TYPE_CHECKING = False
-"""What `typing` has by this name: nothing more is imported here before `python -m fieldsid` leaves the working folder out."""
+"""As in `typing`, which is not imported here: `python -m fieldsid` must first remove the working folder from the path."""
 if TYPE_CHECKING:
     from typing import Any
 
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from fieldsid.schedule.verify import Verification
     from fieldsid.turning.prediction import TurnPrediction
 
-_ROOMS = {
+_MODULES = {
     "fieldsid.change.record": ("Change",),
     "fieldsid.comparison.compare": ("Comparison",),
     "fieldsid.diagnosis": ("Candidate", "Diagnosis"),
@@ -64,7 +64,7 @@ _ROOMS = {
     "fieldsid.schedule.verify": ("Verification",),
     "fieldsid.turning.prediction": ("TurnPrediction",),
 }
-"""Where the names are: the same as above, which is for mypy and editors alone."""
+"""The modules of the names: the same as the imports above, which are for mypy and editors only."""
 
 __all__ = [
     "Axis", "Candidate", "Change", "Comparison", "Diagnosis", "Extension", "FieldsidError", "Fit", "Laws", "Model",
@@ -75,10 +75,10 @@ __all__ = [
 
 
 def __getattr__(name: str) -> "Any":
-    room = next((room for room, names in _ROOMS.items() if name in names), None)
-    if room is None:
+    module = next((module for module, names in _MODULES.items() if name in names), None)
+    if module is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(room), name)
+    return getattr(import_module(module), name)
 
 
 def __dir__() -> list[str]:

@@ -1,4 +1,4 @@
-"""Files the tool writes: schema, version, hashes of the inputs and the parent; written whole or not at all."""
+"""Write files with schema, version, and hashes of the inputs and the parent; each completely or not at all."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from fieldsid.records.keys import body_of, has_keys
 from fieldsid.records.named_inputs import sha256_of
 
 OWN_HANDLES = Path("/proc/self/fd")
-"""Where Linux shows a process the files that it has open, by their number: the way to one that has no name."""
+"""Folder in which Linux lists the open files of a process by descriptor, through which a file without a name can be linked."""
 
 
 def check_output(path: Path, *, force: bool = False) -> None:
-    """Raise ArtifactError where a file cannot be written: it exists and `force` is false, or its place cannot hold it."""
+    """Raise ArtifactError where a file cannot be written: it exists and `force` is false, or its folder is not writable."""
     if os.path.isdir(path):  # noqa: PTH112 - says no where a folder is closed, and does not raise
         raise ArtifactError(f"`{path}` is a folder, not a file", found="a folder", hint=f"name a file in it: `{path}/NAME`")
     if os.path.exists(path) and not force:  # noqa: PTH110 - says no where a folder is closed, and does not raise
@@ -46,9 +46,8 @@ def check_output(path: Path, *, force: bool = False) -> None:
 def replacing(path: Path, *, force: bool = False) -> Iterator[Path]:
     """Yield a temporary path to write to, which becomes `path` when the block ends without an error.
 
-    Raises ArtifactError when `path` exists and `force` is false, or when it cannot be written; then nothing
-    is left behind and an existing file is as it was. Where the system has files without a name, nothing is left behind
-    either by a process that is killed.
+    Raises ArtifactError where `path` exists and `force` is false, or where it cannot be written; then no temporary file remains
+    and an existing file is unchanged. Where the system has files without a name, none remains after a killed process either.
     """
     check_output(path, force=force)
     try:
@@ -70,12 +69,12 @@ def replacing(path: Path, *, force: bool = False) -> Iterator[Path]:
 
 
 def _nameless(folder: Path) -> int | None:
-    """Return an open file of a folder that has no name there; None where the system or the folder's disk has no such files."""
+    """Return the descriptor of an open file without a name in a folder; None where system or disk do not support it."""
     if not hasattr(os, "O_TMPFILE") or not OWN_HANDLES.is_dir():
         return None
     try:
         return os.open(folder, os.O_TMPFILE | os.O_RDWR, 0o600)
-    except OSError:  # what is wrong with the folder is met again, and said, where a named file is made in it
+    except OSError:  # an error of the folder is raised again when a file with a name is created in it
         return None
 
 
@@ -89,7 +88,7 @@ def _at_handle(handle: int) -> Iterator[Path]:
 
 @contextmanager
 def _named(path: Path) -> Iterator[Path]:
-    """Yield a hidden file beside a path, gone at the end unless it was moved."""
+    """Yield a hidden file in the folder of a path, removed at the end unless it was moved."""
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent)
     os.close(handle)
     try:
@@ -100,11 +99,11 @@ def _named(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def _given_a_name(handle: int, path: Path) -> Iterator[Path]:
-    """Yield a hidden name beside a path for a file that has none: a link does not replace what is there, a name can."""
+    """Yield a hidden name, in the folder of a path, for a file without one: a link cannot replace a file, a rename can."""
     name = path.parent / f".{path.name}.{secrets.token_hex(6)}{path.suffix}"
     folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
     try:
-        # by the folder's handle: only then Python asks the system to follow the link that the handle's path is
+        # with the folder's descriptor: only then does Python let the system follow the link in OWN_HANDLES
         os.link(OWN_HANDLES / str(handle), name.name, dst_dir_fd=folder, follow_symlinks=True)
         yield name
     finally:
@@ -113,7 +112,7 @@ def _given_a_name(handle: int, path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str, *, force: bool = False) -> Path:
-    """Write a text file whole or not at all; raises ArtifactError."""
+    """Write a text file completely or not at all; raises ArtifactError."""
     with replacing(path, force=force) as temporary:
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace")  # of a name that is no UTF-8
     return path
@@ -144,7 +143,7 @@ def save_record(
 
 
 def to_yaml(body: Mapping[str, Any]) -> str:
-    """Return a mapping as block YAML in its own order, numbers as plain YAML numbers."""
+    """Return a mapping as block YAML in the given order, numbers as plain YAML numbers."""
     yaml = YAML()
     yaml.default_flow_style = False
     yaml.width = 120

@@ -1,11 +1,11 @@
-"""How a record shows itself where a user works: short in a console, whole in a notebook, as a table and as a figure.
+"""Display of records: one line in a console, all of it in a notebook, as tables and as figures.
 
-A record inherits one of three classes: `Brief` (a short repr made of its fields), `Displayed` (what matters in one line, and
-as a summary, HTML and pandas tables) or `Plotted` (as a figure too). The classes hold no words, tables or drawings: they ask the
-registry `fieldsid.views` for the view named like the record's class, and not before somebody asks them. So the methods
-are written once, an editor and mypy see them on every record, a record's room imports neither pandas nor a figure, and
-a record is given a view by one new file. A decorator would hide the methods from mypy; methods in each record would be
-written twenty times, and their figures would turn the arrow of the imports round.
+A record inherits one of three classes: `Brief` (a short repr made of its fields), `Displayed` (one line, summary, HTML and pandas
+tables) or `Plotted` (figures too). The classes contain no text, tables or drawings: when a method is called, it takes the view
+named like the record's class from the registry `fieldsid.views`. The methods are thus written once, editors and mypy see them on
+every record, the module of a record imports neither pandas nor matplotlib, and one new file gives a record a view. A decorator
+would hide the methods from mypy; methods in each record would be repeated twenty times, and their figures would reverse the
+direction of the imports.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 Frames: TypeAlias = "Mapping[str, Callable[[], DataFrame]]"
 Figures: TypeAlias = Mapping[str, Callable[[], Any]]
-"""What makes the tables and the figures of a record, by the names of its parts."""
+"""The functions that make the tables and the figures of a record, by the names of its parts."""
 LONGEST = 399
-"""Characters of a repr: a list of records stays readable."""
+"""Most characters of a repr, so that a list of records stays readable."""
 MOST_ITEMS, LONGEST_TEXT = 3, 60
 
 
@@ -46,12 +46,11 @@ def _unread(_table: DataFrame, _name: str) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class View(Generic[T]):
-    """How records of one class are shown; `name` is the class's in small letters, `turn_row` of TurnRow.
+    """The view of the records of one class; `name` is that of the class in snake case, `turn_row` for TurnRow.
 
-    `line` says what matters, `page` everything in words, angles in the unit that it is
-    given or in rad. `frames` and `figures` make tables and matplotlib figures by the
-    name of a part, the first unasked. `label` tells records of one kind apart. `read` makes a record of a table, `system`
-    python-control systems at a speed.
+    `line` returns the main result in one line, `page` everything in words, with angles in the given unit or in rad. `frames` and
+    `figures` return functions for tables and matplotlib figures by the name of a part; the first is the default. `label`
+    distinguishes records of one class. `read` makes a record from a table, `system` python-control systems at a speed.
     """
 
     name: str
@@ -71,12 +70,12 @@ def view_of(kind: type) -> View[Any]:
 
 
 def page_of(record: Any, *more: Any) -> Page:
-    """Return the page of a record; more: what its view takes besides, the unit of angles first."""
+    """Return the page of a record; `more` are further arguments of its view, the unit of angles first."""
     return view_of(type(record)).page(record, *more)
 
 
 class Brief:
-    """A record whose repr is short however much it holds: of arrays the shape, of long fields the beginning."""
+    """A record with a short repr: arrays are shown by their shape, long fields by their beginning."""
 
     __slots__ = ()
 
@@ -86,7 +85,7 @@ class Brief:
 
 
 class Displayed(Brief):
-    """A record that says in one line what matters, and all of it as a summary, as HTML and as pandas tables."""
+    """A record with its main result in one line, and all of it as a summary, as HTML and as pandas tables."""
 
     __slots__ = ()
 

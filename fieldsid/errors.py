@@ -1,4 +1,4 @@
-"""The errors a user can meet: each says what is wrong, what was found and a hint that can be pasted."""
+"""The errors for the user: each says what is wrong, what was found, and gives a hint that can be pasted."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 80
 
 
 def shortened(value: object) -> str:
-    """Return a value as Python writes it, cut where it is long or deep: what an error quotes of a file that anybody wrote."""
+    """Return the repr of a value, cut where it is long or deep, for the quotation of an untrusted file in an error."""
     return _SHORT.repr(value)
 
 
 class FieldsidError(Exception):
     """Base of every error this package raises on purpose; the command line turns it into exit code 2.
 
-    `signal` is the one whose line of a mapping, or whose cells, it is about; empty where it is about none, or about all.
+    `signal` is the signal in whose line of a mapping, or whose cells, the error is; empty where it concerns none or all.
     """
 
     def __init__(self, what: str, *, found: str = "", hint: str = "", signal: str = "") -> None:
@@ -32,7 +32,7 @@ class FieldsidError(Exception):
 
     @property
     def shown(self) -> tuple[str, str, str]:
-        """The three parts for a reader, whatever names they hold: only what was found may have lines, below its first."""
+        """The three parts as text without control characters: only `found` may have several lines."""
         found = f"\n{' ' * len(FOUND)}".join(map(one_line, self.found.split("\n")))
         return one_line(self.what), found, one_line(self.hint)
 
@@ -42,11 +42,11 @@ class FieldsidError(Exception):
 
 
 class UsageError(FieldsidError):
-    """An argument or option that cannot be meant."""
+    """An argument or option that makes no sense."""
 
 
 class LogError(FieldsidError):
-    """A log file that cannot be read as asked."""
+    """A log file that cannot be read with the given options."""
 
 
 class MappingError(FieldsidError):
@@ -62,7 +62,7 @@ class ArtifactError(FieldsidError):
 
 
 class DataError(FieldsidError):
-    """Data that do not allow what was asked: too short, not excited, wrong sign."""
+    """Data that do not allow the requested result: too short, not excited, wrong sign."""
 
 
 class ModelError(FieldsidError):
@@ -70,8 +70,8 @@ class ModelError(FieldsidError):
 
 
 class DivergenceError(ModelError):
-    """A fit or a search that came to a motion without bound, or to a number that is none."""
+    """A fit or a search that arrived at an unbounded motion, or at a number that is not finite."""
 
 
 class EffectError(FieldsidError):
-    """An effect, ours or a user's, that is wrong or cannot take part."""
+    """An effect of the package or a user that is wrong or cannot be used."""

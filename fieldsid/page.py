@@ -1,4 +1,4 @@
-"""A page: what a record has to say, as plain words in blocks; the same page as fixed text and as HTML."""
+"""A page: the contents of a record as plain text in blocks, which is written as fixed text and as HTML."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from textwrap import fill
 INDENT = "  "
 GAP = "  "
 WIDTH = 100
-"""Columns from which on a sentence goes on in the next line."""
+"""Width in columns at which sentences are wrapped."""
 _BESIDE_A_NUMBER = pattern(r" (?=\.\.|\+/-)|(?<=\.\.) |(?<=\+/-) |(?<=\d) (?=%|1/s|[A-Za-z]{1,3}\b)")
-"""The blanks of `1.2 +/- 0.3 rad/s`, `5 .. 9 deg` and `8 %`, at which no line ends."""
+"""The spaces in `1.2 +/- 0.3 rad/s`, `5 .. 9 deg` and `8 %`, at which lines are not broken."""
 LONGEST_WORD = 60
-"""Characters of a name or a path in a line, beyond which its middle is left out."""
+"""Most characters of a name or a path in a line; the middle of a longer one is left out."""
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """One block of a page: its title, the heads of its columns (none where they need none) and its rows, all as words.
+    """One block of a page: its title, the heads of its columns (may be empty) and its rows, all as text.
 
-    The first `left` columns are words and stand at the left, the others are numbers and stand at the right. A terminal
-    keeps what is first in a row in one piece up to `kept` letters, whatever stands beside it: it is a name to be pasted.
+    The first `left` columns are text and aligned left, the others are numbers and aligned right. A terminal does not break the
+    first cell of a row up to `kept` characters, as it is a name to be pasted.
     """
 
     title: str
@@ -34,16 +34,16 @@ class Block:
 
 
 class Whole(str):
-    """A sentence that a terminal shows as one line however long it is, for it names files or runs."""
+    """A sentence that a terminal does not wrap, as it names files or runs."""
 
     __slots__ = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """What a record says: a title, what must be read before any number, blocks and sentences in their order.
+    """The contents of a record: a title, warnings to be read first, and blocks and sentences in order.
 
-    A sentence belongs to what stands before it, unless it begins with an empty line; those of the closing are whole.
+    A sentence belongs to the block before it, unless it begins with an empty line; the closing sentences are not wrapped.
     """
 
     title: str
@@ -53,17 +53,17 @@ class Page:
 
 
 def facts(title: str, pairs: Iterable[tuple[str, str]]) -> Block:
-    """Return a block of names and what they are, without those that nothing is known of."""
+    """Return a block of names and values, without those whose value is empty."""
     return Block(title, tuple(pair for pair in pairs if pair[1]), left=2)
 
 
 def paragraph(lines: Sequence[str], kind: type[str] = str) -> tuple[str, ...]:
-    """Return sentences that stand together, apart from what stands before them, each of a kind, such as Whole."""
+    """Return sentences as one paragraph, separated from the text before it, each of a kind, such as Whole."""
     return tuple(kind(line if i else f"\n{line}") for i, line in enumerate(lines))
 
 
 def written(**files: str | Iterable[str] | None) -> tuple[str, ...]:
-    """Return a line for each file that was written, as `figure: history.png`: what it is, and one path or several."""
+    """Return a line for each kind of file that was written, as `figure: history.png`, with one path or several."""
     named = ((what, [given] if isinstance(given, str) else given or ()) for what, given in files.items())
     return tuple(f"{what}: {file}" for what, paths in named for file in paths)
 
@@ -92,17 +92,17 @@ def html_of(page: Page) -> str:
 
 
 def has_content(block: Block | str) -> bool:
-    """Whether a block says anything."""
+    """Whether a block or sentence has any content."""
     return bool(block.rows if isinstance(block, Block) else block)
 
 
 def counted(count: int, word: str, many: str = "") -> str:
-    """Return `1 run`, `2 runs`; `many` is a plural that is no `s` more."""
+    """Return `1 run`, `2 runs`; `many` is the plural where it is not formed with `s`."""
     return f"{count} {word if count == 1 else many or f'{word}s'}"
 
 
 def cut(text: str, longest: int) -> str:
-    """Return a text on one line, its end left out where it is longer than so many characters."""
+    """Return a text on one line, cut where it is longer than `longest` characters."""
     line = " ".join(text.split())
     return line if len(line) <= longest else f"{line[: longest - 3]}..."
 
@@ -114,9 +114,9 @@ def listed(names: Sequence[str], most: int = 4) -> str:
 
 
 def folded(line: str, width: int = WIDTH, *, first: str = "", rest: str = INDENT) -> str:
-    """Return a line as several of a width, words and names unbroken and a number in one line with its error and its unit.
+    """Return a line wrapped to a width, without breaks within words or between a number, its error and its unit.
 
-    first and rest: what the first of them, and what the others begin with.
+    `first` and `rest` are the prefixes of the first and of the other lines.
     """
     glued = _BESIDE_A_NUMBER.sub("\u00a0", line)
     folds = fill(glued, width, initial_indent=first, subsequent_indent=rest, break_long_words=False, break_on_hyphens=False)
@@ -124,7 +124,7 @@ def folded(line: str, width: int = WIDTH, *, first: str = "", rest: str = INDENT
 
 
 def dense(block: Block) -> Block:
-    """Return a block without the columns that nothing stands in."""
+    """Return a block without its empty columns."""
     if not block.rows:
         return block
     kept = [i for i in range(len(block.rows[0])) if any(row[i] for row in block.rows)]
@@ -149,7 +149,7 @@ def _block_text(block: Block) -> str:
 def _fact_lines(rows: Sequence[tuple[str, ...]]) -> list[str]:
     width = max(len(name) for name, _ in rows)
     rest = " " * (len(INDENT) + width + len(GAP))
-    return [folded(said, first=f"{INDENT}{name.ljust(width)}{GAP}", rest=rest) for name, said in rows]
+    return [folded(value, first=f"{INDENT}{name.ljust(width)}{GAP}", rest=rest) for name, value in rows]
 
 
 def _block_html(block: Block) -> str:

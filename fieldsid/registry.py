@@ -19,20 +19,20 @@ from typing import Any
 from fieldsid.errors import FieldsidError, UsageError
 
 MIN_LIKENESS, MIN_OWN_LIKENESS = 0.5, 1.0 / 3.0
-"""Likeness, of 1, from which on a known name may be the one meant, that of the whole and that of what both do not end in."""
+"""Least similarity (0 to 1) of a suggested name: of the full names, and of the names without their common last words."""
 SUGGESTED = 3
 """Names that a hint offers at most."""
 
 _added: dict[str, dict[str, Any]] = {}
 _refused: dict[str, dict[str, FieldsidError]] = {}
-"""Why what was to be added takes no part, by the name it would be asked for by."""
+"""The errors of members that could not be added in this process, by name."""
 _unfit: dict[str, dict[str, FieldsidError]] = {}
-"""The same of entry points, for as long as the process lasts."""
+"""The errors of entry points that could not be loaded, by name; kept until the process ends."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outside:
-    """Where an entry point leads: what it says, the distribution with its version, the file; empty where that is not known."""
+    """The origin of an entry point: its value, the distribution with its version, the file; empty where not known."""
 
     value: str
     distribution: str
@@ -40,22 +40,22 @@ class Outside:
 
 
 def add(package: str, item: Any) -> None:
-    """Make a member known by its name for the rest of the process; one added before under that name is replaced."""
+    """Register a member by its name for the rest of the process; an earlier one of that name is replaced."""
     _added.setdefault(package, {})[item.name] = item
 
 
 def refuse(package: str, name: str, error: FieldsidError) -> None:
-    """Keep why what was to be added under a name takes no part: whoever asks for that name is told so by `pick`."""
+    """Record the error of a member that could not be added; `pick` raises it for that name."""
     _refused.setdefault(package, {})[name] = error
 
 
 def refusal(package: str, name: str) -> FieldsidError | None:
-    """Return why the member of a name takes no part, None where none of that name was refused or failed."""
+    """Return the error of the member of a name, None where none of that name was refused or failed to load."""
     return _refused.get(package, {}).get(name) or _unfit.get(package, {}).get(name)
 
 
 def refused() -> tuple[FieldsidError, ...]:
-    """Return why members take no part, of all registries read so far: what was refused, and entry points that failed."""
+    """Return the errors of all registries read so far: of refused members, and of entry points that failed to load."""
     found = [error for why in (_refused, _unfit) for errors in why.values() for error in errors.values()]
     return tuple({id(error): error for error in found}.values())
 
@@ -75,9 +75,9 @@ def members(package: str, attribute: str) -> Mapping[str, Any]:
 def _installed(package: str, attribute: str) -> Mapping[str, Any]:
     """Return the objects named `attribute` of a package's modules, by name, then those of entry points.
 
-    A module whose name starts with an underscore is a helper and is passed over; so is a folder, a room of helpers. Entry
-    points of the group named like the package add members from outside; one that cannot be loaded, or whose name is taken,
-    takes no part: see `refused`. Raises FieldsidError where a file of the package's own and its object are named differently.
+    Modules whose name starts with an underscore and subfolders are helpers and are skipped. Entry points of the group named like
+    the package add members from outside; one that cannot be loaded, or whose name is taken, is left out: see `refused`. Raises
+    FieldsidError where a file of the package and its object are named differently.
     """
     found: dict[str, Any] = {}
     for info in pkgutil.iter_modules(import_module(package).__path__):
@@ -90,7 +90,7 @@ def _installed(package: str, attribute: str) -> Mapping[str, Any]:
 
 
 def _from_outside(package: str, attribute: str, kind: type, taken: frozenset[str]) -> dict[str, Any]:
-    """Return the members of entry points by name; keep why each other one takes no part."""
+    """Return the members of entry points by name; record the errors of those that cannot be loaded."""
     unfit = _unfit[package] = {}
     found: dict[str, Any] = {}
     points = sorted(entry_points(group=package), key=lambda point: (point.name, point.value))
@@ -115,13 +115,13 @@ def _taken_name(package: str, point: EntryPoint, points: Sequence[EntryPoint]) -
 
 
 def _loaded(point: EntryPoint, attribute: str, kind: type) -> Any:
-    """Return what an entry point leads to, knowing where it came from; raises FieldsidError, whatever the code there raises."""
+    """Return the object of an entry point, with its origin recorded; raises FieldsidError for any error of its code."""
     place = f"the entry point `{point.name} = {point.value}`"
     try:
         item = _named(point.load(), attribute, point.name)
     except FieldsidError as error:
         raise FieldsidError(f"{place}: {error.what}", found=error.found, hint=error.hint) from error
-    except (Exception, SystemExit) as error:  # code of somebody else's may raise anything
+    except (Exception, SystemExit) as error:  # foreign code may raise anything
         raise FieldsidError(
             f"{place} cannot be loaded",
             found=f"{_place_of(error) or _distribution(point)}: {type(error).__name__}: {error}",
@@ -151,7 +151,7 @@ def _distribution(point: EntryPoint) -> str:
 
 
 def pick(package: str, attribute: str, name: str) -> Any:
-    """Return one member by name; raises UsageError naming the near matches, or what is wrong with the one of that name."""
+    """Return one member by name; raises UsageError naming near matches, or the error of the member of that name."""
     known = members(package, attribute)
     if name in known:
         return known[name]
@@ -165,12 +165,12 @@ def pick(package: str, attribute: str, name: str) -> Any:
 
 
 def define(package: str, text: str, file: str) -> Any:
-    """Return the member of a registry that a text defines, as the package's own `define` reads it; file is where it lived."""
+    """Return the member of a registry that a text defines, by the `define` of the package; `file` is its original path."""
     return import_module(package).define(text, file)
 
 
 def near(word: str, known: Mapping[str, Any] | list[str] | tuple[str, ...]) -> str:
-    """Return a sentence naming what a mistyped word may have meant."""
+    """Return a sentence with the names that a mistyped word may have meant."""
     close = difflib.get_close_matches(word, list(known), n=SUGGESTED, cutoff=MIN_LIKENESS)
     close = [name for name in close if _own_likeness(word, name) >= MIN_OWN_LIKENESS]
     if not close:
@@ -179,7 +179,7 @@ def near(word: str, known: Mapping[str, Any] | list[str] | tuple[str, ...]) -> s
 
 
 def _own_likeness(word: str, other: str) -> float:
-    """Return how alike, of 1, two names are before the words that both end in: a unit that both have says nothing of either."""
+    """Return the similarity (0 to 1) of two names without their common last words, such as a unit."""
     ours, theirs = (re.split(r"[^A-Za-z0-9]+", name) for name in (word, other))
     while min(len(ours), len(theirs)) > 1 and ours[-1] == theirs[-1]:
         ours.pop()

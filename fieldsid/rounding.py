@@ -1,6 +1,6 @@
 """A value and its error, rounded together by the rule of the Particle Data Group (Review of Particle Physics, 5.3).
 
-And a number as it decides: processors add up in different orders, and of two that are equal but for that the first is taken.
+And a number rounded for decisions: processors sum in different orders, and numbers that differ by that only must count as equal.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from re import Match
 from re import compile as pattern
 
 MANY = 100.0
-"""Times its noise from which on an error is of a log with none to speak of, as of a towing tank or a simulation."""
+"""Ratio of error to noise from which on a log counts as one without noise, as from a towing tank or a simulation."""
 ROUNDED_SHARE = 1e-12
-"""Share of a value below which its error is what computing with doubles left."""
+"""Relative error of a value below which the error is due to rounding of doubles."""
 MOST_DIGITS = 9
-"""Digits of a number beyond those that the order of a sum leaves open."""
+"""Significant digits of a number that do not depend on the order of summation."""
 TWO_SIDED_95 = 1.96
-"""Quantile 0.975 of the normal distribution: standard errors to either side that 95 of 100 lie within."""
+"""Quantile 0.975 of the normal distribution: half the width of a 95 % interval in standard errors."""
 
 
 def digits_of_error(error: float) -> int:
@@ -33,22 +33,22 @@ def digits_of_error(error: float) -> int:
 
 
 def times_noise(error: float, of: str = "the noise") -> str:
-    """Return an error over the noise in words; of a log with none to speak of no factor, which would say nothing."""
+    """Return an error over the noise in words; for a log without noise there is no factor."""
     return f"{error:.2f} x {of}" if error < MANY else f"far more than {of}, of which the log has next to none"
 
 
 def noise_fall(before: float, after: float, of: str = "the noise floor") -> str:
-    """Return in words from where to where an error over the noise went."""
+    """Return in words the error over the noise before and after."""
     return f"{f'{before:.2f}' if before < MANY else f'{times_noise(before, of)},'} to {times_noise(after, of)}"
 
 
 def nine_digits(value: float) -> float:
-    """Return a number to nine digits: those beyond hang on the order in which a sum was added up."""
+    """Return a number rounded to nine digits, as later ones depend on the order of summation."""
     return float(f"{value:.8e}")
 
 
 def with_error(value: float, error: float, *, sign: str = "+/-") -> str:
-    """Return `2.281 +/- 0.013`; the value alone, to four digits, where the error is not positive or is a double's rounding."""
+    """Return `2.281 +/- 0.013`; the value alone, to four digits, where the error is not positive or only due to rounding."""
     if not math.isfinite(value):
         return "-"
     if not (math.isfinite(error) and error > ROUNDED_SHARE * abs(value)):
@@ -59,7 +59,7 @@ def with_error(value: float, error: float, *, sign: str = "+/-") -> str:
 
 
 def at_its_bound(value: float) -> str:
-    """Return `20.00 (at its bound)`: what stands on a bound has no error."""
+    """Return `20.00 (at its bound)`, as a value on a bound has no error."""
     return f"{number(value)} (at its bound)"
 
 
@@ -85,7 +85,7 @@ def number(value: float | None, digits: int = 4) -> str:
 
 
 def number_against(value: float, limit: float, digits: int = 3) -> str:
-    """Return a number to so many significant digits, or as many more as show on which side of a limit it is."""
+    """Return a number to `digits` significant digits, or more where they are needed to show on which side of a limit it is."""
     for more in range(digits, MOST_DIGITS):
         shown = number(value, more)
         if not math.isfinite(value) or value == limit or (float(shown) - limit) * (value - limit) > 0.0:
@@ -94,31 +94,31 @@ def number_against(value: float, limit: float, digits: int = 3) -> str:
 
 
 def probability(p: float) -> str:
-    """Return a probability to three digits, and which side of the last one it is on: `0.982`, `> 0.999`."""
+    """Return a probability to three digits, or as a bound: `0.982`, `> 0.999`."""
     return f"{p:.3f}" if 0.001 <= p <= 0.999 else "< 0.001" if p < 0.001 else "> 0.999"
 
 
 def p_value(p: float) -> str:
-    """Return a p-value with its sign: `p = 0.031`, and `p < 0.001` below that, where a tail is no number to rely on."""
+    """Return a p-value with its relation: `p = 0.031`, and `p < 0.001` below that, where a tail probability is not reliable."""
     return f"p = {p:.2g}" if p >= 0.001 else "p < 0.001"
 
 
 def in_unit(unit: str) -> str:
-    """Return a unit as it is printed behind a number: nothing where the number is a plain one, whose unit is 1."""
+    """Return a unit as it is printed after a number: empty for the unit 1 of a dimensionless number."""
     return "" if unit == "1" else unit
 
 
 @dataclass(frozen=True, slots=True)
 class Angles:
-    """The unit that angles are shown in, and what one in rad is multiplied by for that: the one place that turns units."""
+    """The unit in which angles are shown, and the factor from rad: all conversions for display are made here."""
 
     unit: str
     factor: float
 
     def of(self, unit: str) -> tuple[float, str]:
-        """Return what a number in a unit is multiplied by to be shown, and the unit it is then in; a plain number has none.
+        """Return the factor by which a number in a unit is multiplied for display, and its unit then; empty for the unit 1.
 
-        Of a unit the radian is changed wherever it stands, to the power it stands in.
+        Every radian in the unit is converted, with its exponent.
         """
         if self.factor == 1.0 or "rad" not in unit:
             return 1.0, in_unit(unit)
@@ -137,7 +137,7 @@ class Angles:
         return with_error(factor * value, factor * std_error), unit, interval(factor * low, factor * high)
 
     def words(self, text: str) -> str:
-        """Return a sentence with the angles in it as they are shown: `rate: 0.05 .. 0.1 rad/s`."""
+        """Return a sentence with the angles in it converted for display: `rate: 0.05 .. 0.1 rad/s`."""
         return text if self.factor == 1.0 else _ANGLE.sub(self._turned, text)
 
     def _turned(self, found: Match[str]) -> str:

@@ -1,4 +1,4 @@
-"""YAML to validated records: an unknown key is refused with the near match, a wrong type with its place."""
+"""Validation of YAML records: an unknown key is refused with near matches, a wrong type with its place."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fieldsid.registry import near
 
 
 class StrictModel(BaseModel):
-    """Base of every hand-written file: frozen, no unknown keys, no text where a number belongs."""
+    """Base of all hand-written files: frozen, without unknown keys, and without text in place of a number."""
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", arbitrary_types_allowed=True)
 
@@ -73,7 +73,7 @@ def _explained(model: type[StrictModel], failure: ValidationError, place: str, e
 
 
 def _most_telling(failure: ValidationError) -> Any:
-    """Prefer a key that nobody knows: it explains the errors that come with it."""
+    """Return the error to report: an unknown key if there is one, as it explains the other errors."""
     errors = failure.errors(include_url=False)
     return next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
 

@@ -1,4 +1,4 @@
-"""Where the files that a user copies and edits are: in the wheel, or at the top of the source tree."""
+"""The templates that a user copies and edits: in the wheel, or at the top of the source tree."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def template_names() -> tuple[str, ...]:
     """Return every template's path below the folder, in order, with forward slashes."""
     root = template_root()
     files = (p.relative_to(root) for p in root.rglob("*") if p.is_file())
-    return tuple(sorted(p.as_posix() for p in files if "__pycache__" not in p.parts))  # an installer compiles what is Python
+    return tuple(sorted(p.as_posix() for p in files if "__pycache__" not in p.parts))  # an installer compiles Python files
 
 
 def template_path(name: str) -> Path:

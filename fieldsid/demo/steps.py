@@ -1,8 +1,8 @@
-"""The steps of the tour: each a command as a user would type it, and what its result means, in words with its numbers.
+"""The steps of the tour: each is a command as a user would type it, with the meaning of its result in words and numbers.
 
-PLAN comes before the vehicle swims, STEPS are what is done with its logs.
-A line is a template over the names of `places` and over what earlier steps have learned; a word with `*` stands for the
-files it matches. A step whose line needs what nobody has learned is left out. A later step is one more entry in STEPS.
+PLAN comes before the flight, STEPS work on its logs. A line is a template with the names of `places` and the names that earlier
+steps define (`Step.learns`); a word with `*` stands for the files it matches. A step whose line needs an undefined name is left
+out. To add a step, add an entry to STEPS.
 """
 
 from __future__ import annotations
@@ -24,32 +24,32 @@ from fieldsid.rounding import number, with_error
 from fieldsid.turning.prediction import turn_words
 
 Result = Mapping[str, Any]
-Told = tuple[str, str]
-"""What a step came to: in a few words with its numbers, a line of the short tour, and what it means."""
+Report = tuple[str, str]
+"""The report on a step: its result in a few words with numbers, for the short tour, and its meaning."""
 CHECKED = " ".join(f"--validate {{runs}}/check_{speed:.1f}.parquet" for speed in CHECK_SPEEDS)
-"""The runs that judge; the option stands before each, as a shell gives only the first of a pattern's files to an option."""
+"""The validation runs, each with its option, as a shell passes only the first file of a pattern to an option."""
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One step: its heading, its command line after `sysid`, what tells its result, and its axes.
+    """One step: its heading, its command line after `sysid`, the function that reports on its result, and its axes.
 
-    learns gives, from the result, what later lines may name.
+    `learns` returns names, defined by the result, for use in the lines of later steps.
     """
 
     title: str
     line: str
-    tells: Callable[[Result], Told]
+    tells: Callable[[Result], Report]
     axes: tuple[Axis, ...] = tuple(Axis)
     learns: Callable[[Result], Mapping[str, str]] = lambda _result: {}
 
     def possible(self, known: Mapping[str, str]) -> bool:
-        """Whether everything the line names is known."""
+        """Whether all names in the line are defined."""
         return {name for _, name, _, _ in Formatter().parse(self.line) if name} <= set(known)
 
 
 def places(folder: Path, axis: str) -> dict[str, str]:
-    """Return what the lines' templates stand for."""
+    """Return the names with which the lines' templates are filled."""
     return {
         "folder": str(folder),
         "plan": str(folder / "plan"),
@@ -65,7 +65,7 @@ def places(folder: Path, axis: str) -> dict[str, str]:
 
 
 def words_of(line: str, known: Mapping[str, str]) -> list[str]:
-    """Return the words of a line, templates filled in, still with their patterns."""
+    """Return the words of a line with templates filled in, but patterns not yet expanded."""
     return [word.format(**known) for word in line.split()]
 
 
@@ -78,7 +78,7 @@ def expanded(words: Sequence[str]) -> list[str]:
     return out
 
 
-def _planned(result: Result) -> Told:
+def _report_plan(result: Result) -> Report:
     leg = result["legs"][0]
     window = leg["window"]
     seconds = window["length_s"] - window["lead_s"] - window["recover_s"]
@@ -93,36 +93,36 @@ def _planned(result: Result) -> Told:
     )
 
 
-def _inspected(_result: Result) -> Told:
+def _report_inspect(_result: Result) -> Report:
     return "degrees under the logger's own names; a mapping is proposed", (
         "The logger writes degrees under names of its own. The proposed mapping says which column is which signal and in which "
         "unit; look it over, then import with it."
     )
 
 
-def _imported(result: Result) -> Told:
+def _report_import(result: Result) -> Report:
     means = "Each log is now a run: SI and radians, headings unwrapped, one clock. From here on no command needs the mapping."
     return f"{len(result['runs'])} runs: SI and radians, one clock", means
 
 
-def _identified(result: Result) -> Told:
+def _report_identify(result: Result) -> Report:
     fits = result["fits"]
     name = next(iter(fits[0]["parameters"]))
     values = ((f["speed_m_s"], f["parameters"][name]) for f in fits)
     parts = "; ".join(f"{number(speed, 2)} m/s: {with_error(p['value'], p['std_error'])}" for speed, p in values)
-    brief, verdict = _left(fits)
+    brief, verdict = _error_over_noise(fits)
     return brief, f"{name} over speed is {parts} 1/s. {verdict}"
 
 
-def _joined(result: Result) -> Told:
-    brief, verdict = _left(result["fits"])
+def _report_joint_fit(result: Result) -> Report:
+    brief, verdict = _error_over_noise(result["fits"])
     speeds = len(result["fits"][0]["runs"])
     means = f"One model for {speeds} speeds: damping shared, authority by speed. {verdict} Its judge are runs it has not seen."
     return brief, means
 
 
-def _left(fits: Sequence[Result]) -> Told:
-    """Return what fits leave over the sensors' noise, and what that means."""
+def _error_over_noise(fits: Sequence[Result]) -> Report:
+    """Return the error of fits over the sensors' noise in words, and its meaning."""
     left = max(over_noise(f, f["noise_floor"]) for f in fits)
     brief = f"{len(fits)} model{'s' * (len(fits) > 1)}, what is left is {left:.1f} x the sensors' noise"
     if is_noise(left):
@@ -130,10 +130,10 @@ def _left(fits: Sequence[Result]) -> Told:
     return brief, f"What is left is {left:.1f} x the sensors' noise: the model's form, not its numbers, lacks something."
 
 
-def _compared(result: Result) -> Told:
+def _report_compare(result: Result) -> Report:
     run = max(result["runs"], key=lambda r: float(r["over_noise"]))
     brief = f"{run['run']}: error {run['over_noise']:.2f} x the noise"
-    opening = f"On {run['run']}, which the fit has not seen, the {_fits(run)}. "
+    opening = f"On {run['run']}, which the fit has not seen, the {_channel_fits(run)}. "
     if not run["failing"]:
         return f"{brief}: nothing is left", f"{opening}That is the noise: here the model lacks nothing."
     worst = run["where"][0]
@@ -144,18 +144,18 @@ def _compared(result: Result) -> Told:
     )
 
 
-def _held(result: Result) -> Told:
-    said = "; ".join(f"on {run['run']} the {_fits(run)}" for run in result["runs"])
-    return _compared(result)[0], f"The same runs again, now with the effect: {said}."
+def _report_compare_again(result: Result) -> Report:
+    fits = "; ".join(f"on {run['run']} the {_channel_fits(run)}" for run in result["runs"])
+    return _report_compare(result)[0], f"The same runs again, now with the effect: {fits}."
 
 
-def _fits(run: Result) -> str:
-    """Return the fit of each channel and its error over its noise, the one that is followed worse first."""
+def _channel_fits(run: Result) -> str:
+    """Return the fit of each channel and its error over its noise, the worse channel first."""
     over = run["over_floor"].items()
     return " and the ".join(f"{n} fit is {number(run[f'{n}_fit_percent'], 3)} % ({x:.1f} x its noise)" for n, x in over)
 
 
-def _diagnosed(result: Result) -> Told:
+def _report_diagnosis(result: Result) -> Report:
     verdict, named = result["verdict"], result["effects"]
     if not named:
         means = f"The verdict is {verdict}: no effect of the catalogue is named, and none is added below."
@@ -168,11 +168,11 @@ def _diagnosed(result: Result) -> Told:
     )
 
 
-def _named(result: Result) -> Mapping[str, str]:
+def _named_effects(result: Result) -> Mapping[str, str]:
     return {"effects": ",".join(result["effects"])} if result["effects"] else {}
 
 
-def _extended(result: Result) -> Told:
+def _report_extension(result: Result) -> Report:
     before, after = (f"{result['over_floor'][when]:.2f}" for when in ("before", "after"))
     brief = f"error on unseen runs {before} -> {after} x the noise, {'kept' if result['kept'] else 'not kept'}"
     if not result["kept"]:
@@ -185,42 +185,42 @@ def _extended(result: Result) -> Told:
     return brief, means
 
 
-def _grown(result: Result) -> Mapping[str, str]:
+def _extended_model(result: Result) -> Mapping[str, str]:
     return {"extended": str(result["model"])}
 
 
-def _remembered(result: Result) -> Told:
+def _report_history(result: Result) -> Report:
     return f"parent, data and error of each step; drawn in {result['figure']}", (
         "Each model knows its parent, its data by their hash, and the error before and after: "
         f"the figure shows it falling to the noise floor, {result['figure']}."
     )
 
 
-def _refitted(result: Result) -> Told:
+def _report_refit(result: Result) -> Report:
     fits = result["fits"]
     name = next(iter(fits[0]["parameters"]))
     errors = {f["run"]: 100.0 * abs(p["std_error"] / p["value"]) for f in fits for p in [f["parameters"][name]]}
-    said = {run: f"{error:.1f} %" for run, error in errors.items() if run.startswith("learn")}
-    planned = said.pop(f"learn_{SPEED:.1f}")
+    accuracy = {run: f"{error:.1f} %" for run, error in errors.items() if run.startswith("learn")}
+    planned = accuracy.pop(f"learn_{SPEED:.1f}")
     return f"{len(fits)} speeds, {name} to {max(errors.values()):.1f} % or better", (
         "With the effect in the model every run may be fitted, those that judged too, which gives two more speeds. The planned "
-        f"run tells {name} to {planned}, the other two to {' and '.join(said.values())}. {_left(fits)[1]}"
+        f"run tells {name} to {planned}, the other two to {' and '.join(accuracy.values())}. {_error_over_noise(fits)[1]}"
     )
 
 
-def _replaced(result: Result) -> Mapping[str, str]:
+def _new_fits(result: Result) -> Mapping[str, str]:
     return {"fits": str(Path(result["fits"][0]["model"]).parent / "*.yaml")}
 
 
-def _lawful(result: Result) -> Told:
+def _report_laws(result: Result) -> Report:
     powers = {name: law["exponent"] for name, law in result["laws"].items() if law.get("exponent")}
     brief = ", ".join(f"|{name}| as u^{power['value']:.2f}" for name, power in powers.items())
-    said = "; ".join(f"|{name}| grows as {power['says']}" for name, power in powers.items())
-    means = f"{said or 'Each parameter has its law over speed'}. The laws carry the model to speeds that were not flown."
+    growth = "; ".join(f"|{name}| grows as {power['says']}" for name, power in powers.items())
+    means = f"{growth or 'Each parameter has its law over speed'}. The laws carry the model to speeds that were not flown."
     return brief or "a law for each parameter", means
 
 
-def _turned(result: Result) -> Told:
+def _report_turns(result: Result) -> Report:
     tightest = min(result["rows"], key=lambda row: float(row["radius_m"]))
     radius, speed, (low, high) = float(tightest["radius_m"]), f"{number(tightest['speed_m_s'], 2)} m/s", tightest["interval95"]
     brief = f"{number(radius, 3)} m at {speed}, 95 % {number(low, 3)} .. {number(high, 3)} m, {tightest['trust']}"
@@ -229,7 +229,7 @@ def _turned(result: Result) -> Told:
     return brief, f"The tightest turn is {turn}, and it is {tightest['trust']}: {shows}"
 
 
-def _scheduled(result: Result) -> Told:
+def _report_schedule(result: Result) -> Report:
     ends = [(r["kp"], f"{number(r['speed_m_s'], 2)} m/s") for r in (result["rows"][0], result["rows"][-1])]
     brief, sizes = (" to ".join(f"{number(size(kp), 2)} at {speed}" for kp, speed in ends) for size in (float, abs))
     return f"kp {brief}", (
@@ -238,7 +238,7 @@ def _scheduled(result: Result) -> Told:
     )
 
 
-def _verified(result: Result) -> Told:
+def _report_verification(result: Result) -> Report:
     ours, constant = (max(float(c["settling_s"]) for c in result[part]) for part in ("scheduled", "constant"))
     fin, its = (100.0 * result[part][-1]["fin_use"] for part in ("scheduled", "constant"))
     margin = f"{result['worst']['phase_margin_deg']:.0f} deg"
@@ -249,14 +249,14 @@ def _verified(result: Result) -> Told:
     )
 
 
-def _exported(_result: Result) -> Told:
+def _report_export(_result: Result) -> Report:
     return "ROS 2 parameters", (
         "Flat arrays of equal length, a decimal point in every number: a ROS 2 node loads them as they are. `--into` puts them "
         "into a configuration file you already have, and shows the difference first."
     )
 
 
-def _reported(result: Result) -> Told:
+def _report_page(result: Result) -> Report:
     return f"{result['file']}: open it in a browser", (
         f"{result['file']} is one page of {result['bytes'] / 1e6:.1f} MB that needs no network: verdicts first, then "
         f"{result['figures']} figures to zoom and read off, every number, what was made from what, and how to repeat it."
@@ -266,66 +266,66 @@ def _reported(result: Result) -> Told:
 PLAN = Step(
     "What to fly?",
     f"plan --axis {{axis}} --speeds {SPEED} --fin-rate {LIMITS.fin_rate:g} --write csv -o {{plan}}",
-    _planned,
+    _report_plan,
 )
 STEPS: tuple[Step, ...] = (
-    Step("What is in the log?", "inspect {trial}/learn_1.4.csv --write-mapping {mapping}", _inspected),
-    Step("From log to run", "import {trial}/*.csv --mapping {mapping} -o {runs}", _imported),
+    Step("What is in the log?", "inspect {trial}/learn_1.4.csv --write-mapping {mapping}", _report_inspect),
+    Step("From log to run", "import {trial}/*.csv --mapping {mapping} -o {runs}", _report_import),
     Step(
         "A model for each speed",
         "identify {runs}/learn_*.parquet --axis {axis} -o {models} --no-figures",
-        _identified,
+        _report_identify,
     ),
     Step(
         "One model for all speeds",
         "identify {runs}/learn_*.parquet --axis {axis} --joint -o {models} --no-figures",
-        _joined,
+        _report_joint_fit,
     ),
     Step(
         "Does it hold on runs it has not seen?",
         "compare {models}/joint_{axis}.yaml {runs}/check_*.parquet -o {models}",
-        _compared,
+        _report_compare,
     ),
     Step(
         "Which physical effect is missing?",
         f"diagnose {{runs}}/learn_*.parquet --axis {{axis}} {CHECKED} -o {{models}}/diagnosis.yaml "
         "--figure {models}/diagnosis.png",
-        _diagnosed,
-        learns=_named,
+        _report_diagnosis,
+        learns=_named_effects,
     ),
     Step(
         "Add it, and watch the error fall",
         f"extend {{models}}/joint_{{axis}}.yaml {{runs}}/learn_*.parquet --add {{effects}} {CHECKED}",
-        _extended,
-        learns=_grown,
+        _report_extension,
+        learns=_extended_model,
     ),
-    Step("How did this model come about?", "history {extended} --figure {models}/history.png", _remembered),
-    Step("Does it hold now?", "compare {extended} {runs}/check_*.parquet -o {final}", _held),
+    Step("How did this model come about?", "history {extended} --figure {models}/history.png", _report_history),
+    Step("Does it hold now?", "compare {extended} {runs}/check_*.parquet -o {final}", _report_compare_again),
     Step(
         "A better model for each speed",
         "identify {runs}/*.parquet --axis {axis} --effects {effects} -o {final}/speeds --no-figures",
-        _refitted,
-        learns=_replaced,
+        _report_refit,
+        learns=_new_fits,
     ),
-    Step("How do the numbers change with speed?", "fit {fits} -o {final}/law_{axis}.yaml", _lawful),
-    Step("How tight does it turn?", "turn-radius {fits} --speeds 1.0,1.4,1.8 -o {turning}", _turned, (Axis.YAW,)),
+    Step("How do the numbers change with speed?", "fit {fits} -o {final}/law_{axis}.yaml", _report_laws),
+    Step("How tight does it turn?", "turn-radius {fits} --speeds 1.0,1.4,1.8 -o {turning}", _report_turns, (Axis.YAW,)),
     Step(
         "Gains for every speed",
         "schedule design {fits} --fin-max 0.26 -o {turning}/gains.yaml",
-        _scheduled,
+        _report_schedule,
         (Axis.YAW,),
     ),
     Step(
         "Are they good, also between the speeds?",
         "schedule verify {turning}/gains.yaml --require-phase-margin 30 -o {turning}/gains.png",
-        _verified,
+        _report_verification,
         (Axis.YAW,),
     ),
     Step(
         "Into the vehicle",
         "schedule export {turning}/gains.yaml --to ros2 -o {turning}/heading_ros2.yaml",
-        _exported,
+        _report_export,
         (Axis.YAW,),
     ),
-    Step("All of it in one file", "report {folder}", _reported),
+    Step("All of it in one file", "report {folder}", _report_page),
 )

@@ -1,7 +1,7 @@
-"""The trial of the tour: runs at three speeds to learn from and two to judge by, as the vehicle's own logger writes them.
+"""The trial of the tour: training runs at three speeds and validation runs at two, as the vehicle's logger writes them.
 
-At the speed it was made for the plan is flown; at the other two the maneuver that excites what is hidden.
-The files are semicolon-separated text in degrees, with the logger's own column names: nothing the program knows beforehand.
+The plan is flown at its speed, the maneuver that excites the hidden effect at the other two.
+The files are semicolon-separated text in degrees with column names of the logger, which the program does not know beforehand.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ WRAPPED = "yaw_rad"
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """The files of a trial, to learn from and to judge by, and the maneuvers flown besides the planned one."""
+    """The training and validation files of a trial, and the maneuvers flown in addition to the planned one."""
 
     train: tuple[Path, ...]
     check: tuple[Path, ...]

@@ -1,7 +1,7 @@
-"""The vehicle of the tour: a small torpedo whose dynamics hold one effect more than the textbook's.
+"""The vehicle of the tour: a small torpedo whose dynamics have one effect more than the textbook model.
 
-How strong the hidden effect is follows from the effect's own declaration: the first of its start value, its scan values
-and their multiples that the textbook's model, fitted to the motion, cannot follow to the sensors' noise.
+The strength of the hidden effect follows from its declaration: it is the first of its start value, its scan values and their
+multiples with which the fitted textbook model has an error above the sensors' noise.
 """
 
 from __future__ import annotations
@@ -45,10 +45,10 @@ STRENGTHS: Mapping[str, Mapping[str, float]] = MappingProxyType(
         "heave_coupling": {"cross_damping": 1.0, "cross_rate": -0.6},
     }
 )
-"""Strengths chosen by hand; every other effect's follows from its declaration."""
+"""Strengths chosen by hand; those of all other effects follow from their declarations."""
 VISIBLE, SEEN = 2.0, 1.3
-"""Rms residual of the fitted textbook model, over the sensor's noise, from which on the effect counts as visible on the
-maneuver to learn from, and as seen at all on the one to judge by."""
+"""Rms residual of the fitted textbook model over the sensor noise, from which on the effect counts as visible in the training
+maneuver, and as noticeable in the validation maneuver."""
 SEED = 5
 
 
@@ -70,7 +70,7 @@ def hidden_vehicle(effect: str) -> Model:
 
 
 def varied(role: str, time: FloatArray, speed: float) -> FloatArray:
-    """Return a helper signal (n,) that moves as it does on a real dive, so that an effect which needs it shows."""
+    """Return a helper signal (n,) that varies as on a real dive, so that an effect which needs it becomes visible."""
     shapes = {
         "surge": speed * (1.0 + 0.3 * np.sin(2 * np.pi * time / 17.0)),
         "thrust": 50.0 * (1.0 + 0.4 * np.sign(np.sin(2 * np.pi * time / 11.0))),
@@ -100,7 +100,7 @@ def _model(axis: Axis, effects: tuple[str, ...], values: Mapping[str, float]) ->
 
 
 def _strengths(effect: Effect) -> Iterator[dict[str, float]]:
-    """Yield values of an effect's shared coefficients, from the likely to the gross."""
+    """Yield values of an effect's shared coefficients, from the likely to the extreme."""
     starts = {c.name: c.start for c in effect.shared}
     yield starts
     for c in effect.shared:
@@ -138,11 +138,11 @@ def judging_maneuver(model: Model) -> Maneuver:
 
 
 def misfit(model: Model, maneuver: Maneuver | None = None) -> float:
-    """Return the residual over the noise, of angle or rate, that the textbook's model leaves of a model's motion.
+    """Return the residual of the fitted textbook model over the noise, of angle or rate, on the motion of a model.
 
     The motion is that of the training maneuver if none is given.
     """
     record = record_of(flown(model, maneuver or training_maneuver(model), SPEED, SEED), model.axis)
     problem = Problem((record,), layout_of((record,), model.axis, (), speed_groups((record,))))
-    left, _ = problem.residual(levenberg_marquardt(problem, equation_error_start((record,), problem.layout), NOISE).x, 0)
-    return float(np.max(np.sqrt(np.mean(left**2, axis=1)) / (NOISE.angle, NOISE.rate)))
+    residual, _ = problem.residual(levenberg_marquardt(problem, equation_error_start((record,), problem.layout), NOISE).x, 0)
+    return float(np.max(np.sqrt(np.mean(residual**2, axis=1)) / (NOISE.angle, NOISE.rate)))

@@ -1,7 +1,7 @@
-"""The sheet every figure is drawn on: size, colours that a colour-blind reader tells apart, and saving.
+"""The sheet of every figure: size, colours that colour-blind readers can distinguish, and saving.
 
-Colours are those of Okabe and Ito 2008. No global state: figures are made without pyplot, so that drawing in a library
-call leaves a notebook's own settings as they are.
+The colours are those of Okabe and Ito 2008. There is no global state: figures are made without pyplot, so that a library call
+does not change the settings of a notebook.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Sheet(Figure):
 
 
 def sheet(width: float = 9.0, height: float = 7.0, title: str = "") -> Figure:
-    """Return an empty figure of a size in inches, with a canvas of its own and a title at the left."""
+    """Return an empty figure of a size in inches, with a separate canvas and a title at the left."""
     figure = Sheet(figsize=(width, height), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     if title:
@@ -70,7 +70,7 @@ def dress(ax: Axes, *, x: str = "", y: str = "", title: str = "") -> Axes:
 
 
 def band(ax: Axes, half: float, label: str = "_") -> None:
-    """Draw the two edges of a band about zero, which hide neither the grid nor what lies inside."""
+    """Draw the two edges of a band about zero, without covering the grid and the data inside."""
     for edge in (-half, half):
         ax.axhline(edge, color="0.55", linewidth=0.9, linestyle="--", label=label if edge > 0.0 else "_")
 
@@ -87,13 +87,13 @@ def legend_above(ax: Axes, columns: int = 4) -> None:
 
 
 def dots(ax: Axes, x: FloatArray, y: FloatArray, label: str = "measured") -> None:
-    """Draw measured samples as dots, thinned evenly where there are more than the eye can tell apart."""
+    """Draw measured samples as dots, thinned evenly where there are more than the eye can resolve."""
     step = max(1, int(np.ceil(x.size / MOST_DOTS)))
     ax.plot(x[::step], y[::step], linestyle="none", marker=".", markersize=2.6, color=MEASURED, label=label, rasterized=True)
 
 
 def save(figure: Figure, path: Path, *, force: bool = False, tasks: BackgroundTasks | None = None) -> Path:
-    """Write a figure as PNG, SVG or PDF by its suffix, whole or not at all; given background tasks, as one of them.
+    """Write a figure completely or not at all, as PNG, SVG or PDF by its suffix; with `tasks`, in the background.
 
     Raises UsageError for another suffix, ArtifactError where it cannot be written.
     """
@@ -106,7 +106,7 @@ def save(figure: Figure, path: Path, *, force: bool = False, tasks: BackgroundTa
 
 
 def _write(figure: Figure, path: Path, *, force: bool) -> None:
-    for text in figure.findobj(Text):  # the dollars and braces of a log's name are no formula
+    for text in figure.findobj(Text):  # the name of a log may have dollars and braces, which are not a formula
         text.set_parse_math(parse_math=False)
     with warnings.catch_warnings():
         # A letter that the font lacks is drawn as a box; the figure's file has the name.

@@ -14,7 +14,7 @@ from fieldsid.rounding import TWO_SIDED_95
 
 TITLE_WIDTH = 100
 MOST_TIMES = 3.0
-"""A band beyond so many times the gains is cut: it says that they are not known, however far it goes."""
+"""Multiple of the gains at which a band is cut: a wider one only shows that the gains are not known."""
 BEFORE, AFTER = canvas.SECOND, canvas.SIMULATED
 
 

@@ -46,7 +46,7 @@ def _draw_places(failing: Sequence[Channel], right: SubFigure) -> None:
 
 
 def view_of(found: Comparison) -> motion.MotionView:
-    """Return the panels' view of a comparison; what is down to the noise has no worst stretches."""
+    """Return the panels' view of a comparison; a channel that is down to the noise has no worst stretches."""
     shown, floor = found.shown, found.floor
     spans = tuple((s.start_s, s.end_s) for c in found.failing[:1] for s in c.worst)
     return motion.MotionView(shown.record, shown.angle, shown.rate, shown.fin, floor.angle, floor.rate, spans)

@@ -1,8 +1,8 @@
-"""The figure of what a fit leaves: the residuals' autocorrelation, and their correlation with the fin, each with its 99 % band.
+"""The figure of a fit's residuals: autocorrelation, and correlation with the fin, each with its 99 % band.
 
-White residuals keep their autocorrelation within 2.58/sqrt(n). What the fin still explains shows in the cross-correlation: at
-positive lags something of the vehicle is missing, at negative ones the fin answers the motion. Its band is
-2.58 sqrt(sum_k R_e(k) R_u(k) / n), for both are coloured. Source: Ljung 1999, section 16.6.
+The autocorrelation of white residuals stays within 2.58/sqrt(n). A cross-correlation with the fin at positive lags shows that the
+model lacks something of the vehicle, at negative lags that the fin responds to the motion. Its band is
+2.58 sqrt(sum_k R_e(k) R_u(k) / n), as both are coloured. Source: Ljung 1999, section 16.6.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ LONGEST_LAG_S, MOST_LAGS = 5.0, 400
 
 
 def figure(view: MotionView, title: str) -> Figure:
-    """Return a sheet with a row for each channel that was measured: its own correlation, and that with the fin."""
+    """Return a sheet with a row for each measured channel: its autocorrelation, and its correlation with the fin."""
     rows = residuals_of(view)
     sheet = canvas.sheet(11.0, 1.0 + 2.5 * len(rows))
     axes = sheet.subplots(len(rows), 2, squeeze=False, sharex="col")
     shares = []
     for (name, residual), (left, right) in zip(rows, axes, strict=True):
         step = float(np.median(view.record.steps))
-        share = draw_own(residual, step, left)
+        share = draw_autocorrelation(residual, step, left)
         draw_with_fin(residual, view.fin, step, right)
         canvas.dress(left, y=f"{name} residual")
         shares.append(f"{name} {100.0 * share:.0f} %")
@@ -43,7 +43,7 @@ def figure(view: MotionView, title: str) -> Figure:
 
 
 def residuals_of(view: MotionView) -> list[tuple[str, FloatArray]]:
-    """Return the residuals (n,) in deg or deg/s by channel, zero where nothing was measured; none of a channel without any."""
+    """Return the residuals (n,) in deg or deg/s by channel, zero where nothing was measured, for measured channels."""
     pairs = (
         ("angle", view.measured_angle - np.degrees(view.angle)),
         ("rate", view.measured_rate - np.degrees(view.rate)),
@@ -52,17 +52,17 @@ def residuals_of(view: MotionView) -> list[tuple[str, FloatArray]]:
     return [(name, np.where(ok, r - np.mean(r[ok]), 0.0)) for name, r, ok in known if ok.sum() > 2]
 
 
-def draw_own(residual: FloatArray, step: float, ax: Axes) -> float:
+def draw_autocorrelation(residual: FloatArray, step: float, ax: Axes) -> float:
     """Draw the autocorrelation of a residual (n,) sampled every step s; return the share of lags outside the band."""
     reach = _reach(residual.size, step)
-    own = shifted_correlations(residual, residual, reach)[reach + 1 :]
+    autocorrelation = shifted_correlations(residual, residual, reach)[reach + 1 :]
     band = canvas.TWO_SIDED_99 / sqrt(residual.size)
     lags = step * np.arange(1, reach + 1)
     canvas.band(ax, band)
-    ax.vlines(lags, 0.0, own, color=canvas.SECOND, linewidth=1.0)
+    ax.vlines(lags, 0.0, autocorrelation, color=canvas.SECOND, linewidth=1.0)
     ax.axhline(0.0, color="0.4", linewidth=0.8)
-    ax.set_ylim(min(-0.3, float(own.min()) - 0.05), max(0.5, float(own.max()) + 0.05))
-    return float(np.mean(np.abs(own) > band))
+    ax.set_ylim(min(-0.3, float(autocorrelation.min()) - 0.05), max(0.5, float(autocorrelation.max()) + 0.05))
+    return float(np.mean(np.abs(autocorrelation) > band))
 
 
 def draw_with_fin(residual: FloatArray, fin: FloatArray, step: float, ax: Axes) -> None:
@@ -81,5 +81,5 @@ def draw_with_fin(residual: FloatArray, fin: FloatArray, step: float, ax: Axes) 
 
 
 def _reach(count: int, step: float) -> int:
-    """Return the lags that are drawn: up to five seconds, a quarter of the run and so many lines."""
+    """Return the number of lags that are drawn: at most five seconds, a quarter of the run, and a number of lines."""
     return max(1, min(round(LONGEST_LAG_S / step), count // 4, MOST_LAGS))

@@ -1,4 +1,4 @@
-"""The figure of a diagnosis: what each candidate takes away of the error and how probable it is, and where the model fails."""
+"""The figure of a diagnosis: the error with each candidate and its probability, and where the model fails."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ MOST_BARS = 10
 TITLE_WIDTH = 150
 LABEL_WIDTH = 30
 BELOW = 0.36
-"""How far below the middle of its bar the ring of the fitted runs lies: the bar's label is beside the bar."""
+"""Distance of the ring of the fitted runs below the middle of its bar, as the label is next to the bar."""
 MOST_TIMES = 3.0
-"""Bars longer than so many times the first are cut: an addition that makes things worse needs no scale of its own."""
+"""Multiple of the first bar at which longer bars are cut: an effect that raises the error must not determine the scale."""
 
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """One candidate: its error on fitted and on unseen runs, in words, the share explained, the probability, if it is named.
+    """One candidate: error on fitted and on unseen runs, error in words, share explained, probability, whether it is named.
 
-    The errors are over the noise floor, in a log without noise over those of the model as it is, which has no probability.
-    worse: it raises the error, and explains nothing.
+    The errors are over the noise floor, or for a log without noise over those of the present model, which has no probability.
+    `worse`: the candidate raises the error and explains nothing.
     """
 
     effect: str
@@ -57,7 +57,7 @@ def figure(found: Diagnosis) -> Figure:
 
 
 def bars_of(found: Diagnosis) -> list[Bar]:
-    """Return the bars of a diagnosis: the model as it is, then the candidates in their order."""
+    """Return the bars of a diagnosis: the present model, then the candidates in order."""
     named = "+".join(found.effects)
     base = [found.base.train, found.base.validation]
     whole = [Noise(e.angle_rms_rad, e.rate_rms_rad_s) if found.noiseless else found.noise_floor for e in base]

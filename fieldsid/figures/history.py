@@ -57,7 +57,7 @@ def folded(text: str) -> str:
 
 
 def summary(gains: Sequence[Gain]) -> str:
-    """Return the whole fall in words."""
+    """Return the fall of the error in words."""
     where = "unseen runs" if gains[-1].unseen else "the runs fitted to"
     before, after = gains[0].over_floor[0], gains[-1].over_floor[1]
     if before < MANY:
@@ -80,7 +80,7 @@ def falls_of(gains: Sequence[Gain], channel: str) -> list[Fall]:
 
 
 def draw(falls: Sequence[Fall], labels: Sequence[str], ax: Axes) -> None:
-    """Draw each addition as a line from before to after; a gap between two lines means that they were judged on other data."""
+    """Draw each addition as a line from before to after; a gap between two means that they were judged on other data."""
     top = 0.0
     for i, fall in enumerate(falls):
         first = i == 0

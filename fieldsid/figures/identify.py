@@ -23,7 +23,7 @@ def figure(fit: Fit, index: int = 0) -> Figure:
 
 
 def residual_figure(fit: Fit, index: int = 0) -> Figure:
-    """Return the correlations of what the fit leaves of one of its runs."""
+    """Return the correlations of the residuals of one of the fit's runs."""
     shown = fit.predictions[index]
     return correlation.figure(view_of(shown, fit), f"{shown.record.name}, {fit.model.axis.value}: what the model leaves")
 

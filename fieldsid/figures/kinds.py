@@ -18,21 +18,21 @@ KINDS: Mapping[str, Mapping[str, str | None]] = MappingProxyType(
         "pdf": {"Creator": TOOL, "Producer": TOOL, "CreationDate": None},
     }
 )
-"""What each kind says of itself; no date, so that the same figure is the same file."""
+"""Metadata of each kind of file; without a date, so that the same figure gives the same file."""
 
 
 def sketch(module: str, *of: Any, draw: str = "figure") -> Callable[[], Any]:
-    """Return what draws a figure by a module of `fieldsid.figures`, which is loaded, matplotlib too, when it is drawn."""
+    """Return a function that draws a figure by a module of `fieldsid.figures`; it loads the module and matplotlib when called."""
     return lambda: getattr(import_module(f"fieldsid.figures.{module}"), draw)(*of)
 
 
 def is_figure(path: Path) -> bool:
-    """Whether a path is named as a figure is, and is no folder."""
+    """Whether a path has the suffix of a figure and is not a folder."""
     return path.suffix.removeprefix(".").lower() in KINDS and not path.is_dir()
 
 
 def figure_at(output: Path, name: str, *, is_one: bool = True) -> Path:
-    """Return the file of a figure: in a folder, or at a figure's name, which gets its own `name` where it is not the only one."""
+    """Return the file of a figure: in a folder, or at a figure's path, to which `name` is added where it is not the only one."""
     if not is_figure(output):
         return output / f"{name}.png"
     return output if is_one else output.with_name(f"{output.stem}_{name}{output.suffix}")

@@ -61,7 +61,7 @@ def draw_authority(law: ParameterLaw, ax: Axes) -> None:
 
 
 def draw_other(law: ParameterLaw, ax: Axes) -> None:
-    """Draw a damping, stiffness or trim against speed with the law taken."""
+    """Draw a damping, stiffness or trim against speed with the law chosen."""
     speed = np.linspace(0.9 * float(law.speeds.min()), 1.05 * float(law.speeds.max()), 100)
     line = law.line
     ax.plot(speed, law.at(speed), color=COLOURS.get(line.kind, canvas.SIMULATED), linewidth=1.6)

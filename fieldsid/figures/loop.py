@@ -1,4 +1,4 @@
-"""The figure of the loop: the first model fails and where, what was added, the overlay with it, the error step by step."""
+"""The figure of the modelling loop: where the first model fails, the free run with the effects added, the error step by step."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_BARS, TITLE_WIDTH = 8, 120
 
 
 def figure(found: Loop) -> Figure:
-    """Return a sheet of four panels, read by rows: fails, where; with what was named, and the error after each step."""
+    """Return a sheet of four panels: failure of the first model, its places, the last model, the error after each step."""
     sheet = canvas.sheet(13.0, 8.4, fill(headline(found), TITLE_WIDTH))
     (top, places), (bottom, fall) = sheet.subplots(2, 2, width_ratios=(1.5, 1.0))
     draw_motion(found, top, [(found.start, found.before, canvas.SECOND)])

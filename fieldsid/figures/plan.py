@@ -65,8 +65,8 @@ def draw_track(view: LegFigure, ax: Axes) -> None:
         ax.plot(along, across, color=canvas.QUIET, linewidth=0.6, label="_" if i else "draw of the prior")
     ax.plot(view.along, view.across, color=canvas.SIMULATED, linewidth=1.5)
     ax.plot(view.along[:1], view.across[:1], marker="o", color=canvas.SECOND, markersize=5)
-    room = view.envelope.track if yaw else view.envelope.depth_room()
-    for side in () if room is None else (-room, room):
+    limit = view.envelope.track if yaw else view.envelope.depth_room()
+    for side in () if limit is None else (-limit, limit):
         ax.axhline(side, **LIMIT)
     _draw_area(view, ax)
     if yaw:
@@ -75,7 +75,7 @@ def draw_track(view: LegFigure, ax: Axes) -> None:
 
 
 def _draw_area(view: LegFigure, ax: Axes) -> None:
-    """Draw the area there is: it begins where the run-up does; its width is seen from above alone."""
+    """Draw the available area: it begins where the run-up does; its width is shown from above only."""
     length, width = view.envelope.area_length, view.envelope.area_width
     begin = -view.run_up_m
     if view.axis is Axis.YAW and length is not None and width is not None:

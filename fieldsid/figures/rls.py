@@ -1,4 +1,4 @@
-"""Recursive estimates over time: one panel per parameter with its 95 % band and the time from which it stayed settled."""
+"""Recursive estimates over time: one panel per parameter with its 95 % band and its settling time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.rounding import TWO_SIDED_95
 
 START_UP = 0.15
-"""Share of the record whose wild first estimates do not set the scale of a panel."""
+"""First share of the record, whose inaccurate estimates do not determine the scale of a panel."""
 
 
 def draw(view: History, ax: Axes, index: int, unit: str) -> None:

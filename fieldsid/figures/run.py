@@ -20,12 +20,12 @@ PANELS = (
     ("thrust", ("thrust", "thrust_ratio")),
     ("propeller, 1/min", ("propeller_rpm",)),
 )
-"""What shares an axis; where its unit is degrees the signals are in rad."""
+"""The signals that share a panel; where its unit is degrees the signals are in rad."""
 
 
 def figure(run: Run) -> Figure:
     """Return a sheet with a panel for each kind of signal that was measured; raises DataError where none was."""
-    shown = [(y, held) for y, names in PANELS if (held := [n for n in names if run.has(n)])]
+    shown = [(y, present) for y, names in PANELS if (present := [n for n in names if run.has(n)])]
     if not shown:
         raise DataError(f"run {run.name!r} has nothing to draw", found=", ".join(run.signals) or "no signals")
     sheet = canvas.sheet(9.0, 1.0 + 1.7 * len(shown), _title(run))

@@ -1,4 +1,4 @@
-"""A schedule: gains, feed-forward and margins over speed with what was asked; steps, the fin in them, a straight leg."""
+"""A schedule: gains, feed-forward and margins over speed with the requirements; steps, their fin, a straight leg."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from fieldsid.schedule.search.objective import DRAWS_MARGIN_SHARE
 from fieldsid.schedule.verify import Verification, steps_of
 
 SHOWN_SHARE = 25.0 / 60.0
-"""Of a flight: a step that serves has settled by then."""
+"""Share of a flight that is shown: a satisfactory step has settled by then."""
 LEAST_SCALE_DEG = 1.0
-"""A feed-forward that differs by less than fins are rigged to is drawn as what it is: level."""
+"""Least range of the feed-forward scale in deg, as the neutral position of a fin is not set more accurately."""
 LEAST_LEG_DEG = 0.5
 STOP_SHARE = 0.999
 
@@ -54,7 +54,7 @@ def gains_figure(schedule: Schedule) -> Figure:
     draw_forward(schedule, forward)
     phase = schedule.column("phase_margin_deg")
     margin.plot(schedule.speeds, phase, "o-", color=canvas.SECOND, markersize=4, label="least over the draws")
-    _asked(schedule, margin)
+    _draw_required_margins(schedule, margin)
     canvas.dress(margin, x="speed, m/s", y="phase margin, deg")
     margin.set_ylim(min(0.0, 1.1 * min(phase)), max(1.1 * max(phase), 1.3 * schedule.phase_margin_deg))
     margin.legend(frameon=False, fontsize=9, ncols=3, loc="lower right")
@@ -74,7 +74,7 @@ def draw_gains(schedule: Schedule, ax: Axes) -> None:
 
 
 def draw_forward(schedule: Schedule, ax: Axes) -> None:
-    """Draw the feed-forward against speed, in degrees of fin, on a scale that is no finer than a fin is rigged."""
+    """Draw the feed-forward against speed, in degrees of fin, on a scale no finer than the accuracy of a fin."""
     values = np.degrees(np.array(schedule.column("feed_forward_rad")))
     ax.plot(schedule.speeds, values, "-", color=canvas.FOURTH, linewidth=1.4)
     _knots(schedule, values, canvas.FOURTH, ax)
@@ -86,18 +86,18 @@ def draw_forward(schedule: Schedule, ax: Axes) -> None:
 
 
 def draw_margins(schedule: Schedule, checks: Sequence[Check], ax: Axes) -> None:
-    """Draw the phase margin at the estimate and the least over the identified set, with what was asked of each."""
+    """Draw the phase margin at the estimate and the least over the identified set, with the required margins."""
     speed = np.array([c.speed for c in checks])
     ax.plot(speed, [c.phase_deg for c in checks], "o-", color=canvas.SECOND, markersize=4, label="estimate")
     ax.plot(speed, [c.phase_least_deg for c in checks], "v--", color=canvas.SIMULATED, markersize=4, label="least over the set")
-    _asked(schedule, ax)
+    _draw_required_margins(schedule, ax)
     canvas.dress(ax, x="speed, m/s", y="phase margin, deg")
     ax.set_ylim(bottom=min(0.0, 1.1 * min(c.phase_least_deg for c in checks)))
     ax.legend(frameon=False, fontsize=8, ncols=4, loc="lower right", columnspacing=1.0, handlelength=1.6)
 
 
-def _asked(schedule: Schedule, ax: Axes) -> None:
-    """Draw the margin asked of the estimate, and the share of it asked of the draws."""
+def _draw_required_margins(schedule: Schedule, ax: Axes) -> None:
+    """Draw the margin required at the estimate, and that required over the draws."""
     ax.axhline(schedule.phase_margin_deg, color="0.3", linewidth=1.0, linestyle="-.", label="asked")
     of_draws = DRAWS_MARGIN_SHARE * schedule.phase_margin_deg
     ax.axhline(of_draws, color="0.3", linewidth=1.0, linestyle=":", label="of 95 % of the draws")

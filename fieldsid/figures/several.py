@@ -16,7 +16,7 @@ TITLE_WIDTH = 110
 
 
 def figure(found: Sequence[Comparison], names: Sequence[str]) -> Figure:
-    """Return a sheet of one run: angle, rate, what each model leaves of the channel that tells most, and the fin."""
+    """Return a sheet of one run: angle, rate, the residual of each model in the most informative channel, and the fin."""
     over = ", ".join(f"{n} {c.over_noise:.2f} x" for n, c in zip(names, found, strict=True))
     sheet = canvas.sheet(10.0, 7.5, fill(f"{found[0].run}: error over the noise: {over}", TITLE_WIDTH))
     axes = sheet.subplots(4, 1, sharex=True, height_ratios=(1.2, 1.2, 0.9, 0.6))

@@ -18,7 +18,7 @@ from fieldsid.rounding import TWO_SIDED_95
 
 DATES: Any = import_module("matplotlib.dates")  # its functions have no types
 FORMATS = ("%Y", "%b\n%Y", "%d %b", "%H:%M", "%H:%M", "%S.%f")
-"""How a tick is written that stands for a year, a month, a day, an hour, a minute, a second."""
+"""Formats of ticks at a year, a month, a day, an hour, a minute, a second."""
 OF_FIRST = ("", "%b\n%Y", "%b\n%Y", "%d %b\n%Y", "%H:%M", "%H:%M")
 """The same for the first of each: no tick beyond the axis is needed to know the year."""
 
@@ -40,9 +40,9 @@ def figure(trends: Sequence[Trend], name: str) -> Figure:
 
 def summary(trends: Sequence[Trend]) -> str:
     """Return what changed, in words."""
-    told = [f"{t.name} {_by(c.share)} on {c.start_utc[:10]}" for t in trends for c in t.changes]
+    changes = [f"{t.name} {_by(c.share)} on {c.start_utc[:10]}" for t in trends for c in t.changes]
     count = max((t.values.size for t in trends), default=0)
-    return f"{', '.join(told)}; {count} runs" if told else f"no change beyond errors and scatter in {count} runs"
+    return f"{', '.join(changes)}; {count} runs" if changes else f"no change beyond errors and scatter in {count} runs"
 
 
 def draw(trend: Trend, ax: Axes) -> None:

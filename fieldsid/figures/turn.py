@@ -13,7 +13,7 @@ from fieldsid.turning.prediction import SIDES, TurnPrediction, TurnRow
 
 COLOURS = {"port": canvas.SIMULATED, "starboard": canvas.SECOND}
 SHIFT = 0.004
-"""Sides are drawn a little apart where there are few speeds, so that their error bars do not hide each other."""
+"""Shift between the sides where there are few speeds, so that their error bars do not overlap."""
 FEW = 12
 
 

@@ -1,4 +1,4 @@
-"""The hypotheses of a diagnosis as a table, for every place that shows them: of its JSON, which a file of it holds too."""
+"""The hypotheses of a diagnosis as a table, made from its JSON, so that it can also be made from a diagnosis file."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ def _errors(sides: Mapping[str, Any], body: Mapping[str, Any], angles: Angles) -
     """Return the errors on fitted and on unseen runs: over the noise floor, or in their units without noise."""
     from fieldsid.comparison.sufficient import over_noise
 
-    def said(errors: Mapping[str, float | None]) -> str:
+    def in_words(errors: Mapping[str, float | None]) -> str:
         if not body.get("noiseless"):
             return times(over_noise(errors, body["noise_floor"]))
         known = (number(None if rms is None else angles.factor * rms, 2) for rms in errors.values())
         return ", ".join(k for k in known if k != "-")
 
-    return said(sides["train"]), said(sides["validation"])
+    return in_words(sides["train"]), in_words(sides["validation"])

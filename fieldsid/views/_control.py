@@ -37,7 +37,7 @@ def model_system(model: Model, speed: float | None) -> Any:
 
 
 def plant_system(plant: LinearPlant) -> Any:
-    """Return a plant's estimate: the hull with sway or heave where it has them, the fin's lag and its delay before it."""
+    """Return the estimate of a plant: the lag and delay of the fin in series with the hull, with sway or heave if present."""
     control, names = python_control(), NAMES[plant.axis]
     a, k, c, c_r, c_f = plant.straight[:, 0].tolist()
     b, lag, delay = (float(part[0]) for part in (plant.authority, plant.lag, plant.delay))
@@ -49,8 +49,8 @@ def plant_system(plant: LinearPlant) -> Any:
         path = control.ss([[-1.0 / lag]], [[1.0 / lag]], [[1.0]], [[0.0]])
     if delay > 0.0:
         path = path * control.tf2ss(*control.pade(delay, PADE_ORDER))
-    whole = hull * path
-    return control.ss(whole.A, whole.B, whole.C, whole.D, inputs=[names.fin], outputs=[names.angle, names.rate])
+    series = hull * path
+    return control.ss(series.A, series.B, series.C, series.D, inputs=[names.fin], outputs=[names.angle, names.rate])
 
 
 def controller_system(row: Row, axis: Axis) -> Any:

@@ -1,4 +1,4 @@
-"""A record that is one row of another's table: its own words in a line, all of its plain record as names and values."""
+"""The view of a record that is one row of another record's table: one line, and all fields as names and values."""
 
 from __future__ import annotations
 

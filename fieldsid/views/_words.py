@@ -30,7 +30,7 @@ def some(count: int, word: str) -> str:
 
 
 def joined(*parts: str) -> str:
-    """Return the parts that say something, joined by commas."""
+    """Return the non-empty parts, joined by commas."""
     return ", ".join(p for p in parts if p)
 
 
@@ -50,15 +50,15 @@ def base_words(model: Model) -> str:
 
 
 def parameter_block(model: Model) -> Block:
-    """Return the parameters of a model: value, standard error, 95 % interval, unit; what stands on a bound has no error."""
+    """Return the parameters of a model: value, standard error, 95 % interval, unit; one on a bound has no error."""
     from fieldsid.dynamics.at_bound import at_bound
     from fieldsid.fitting.estimates import estimates
 
     rows, bound = [], at_bound(model)
     for e in estimates(model):
         value, _, error = with_error(e.value, e.std_error).partition(BETWEEN)
-        told = (number(e.value), "at its bound", "-") if e.name in bound else (value, error or "-", interval(*e.interval95))
-        rows.append((e.name, *told, in_unit(e.unit)))
+        cells = (number(e.value), "at its bound", "-") if e.name in bound else (value, error or "-", interval(*e.interval95))
+        rows.append((e.name, *cells, in_unit(e.unit)))
     at = f" at {model.law.reference:.2f} m/s" if isfinite(model.law.reference) else ""
     return Block(f"Parameters{at}", tuple(rows), ("", "value", "std error", "95 % interval", "unit"))
 
@@ -75,7 +75,7 @@ def parameter_rows(model: Model) -> list[dict[str, Any]]:
 
 
 def merit_blocks(runs: Iterable[tuple[str, float, GoodnessOfFit, Noise]], angles: Angles) -> tuple[Block, str]:
-    """Return how well the free run of each run is followed, of its name, speed, merit and noise, and the units of that."""
+    """Return a table of the error and fit of each run's free run, from name, speed, fit and noise, and a line with its units."""
     rows = [
         (
             name,

@@ -1,4 +1,4 @@
-"""A comparison: how well a model's free run follows one run, where it fails, and what the missing moment moves with."""
+"""A comparison: the error of a model's free run on one run, where it fails, and which signals explain the missing moment."""
 
 from __future__ import annotations
 
@@ -43,17 +43,17 @@ def page(found: Comparison, angles: Angles = RADIANS) -> Page:
 
 
 def blocks_of(found: Comparison, angles: Angles = RADIANS, top: int = MOST_PLACES) -> Iterator[Block | str]:
-    """Yield where each channel fails, the worse one first, which are down to their noise, and what the missing moment follows."""
+    """Yield where each channel fails, the worse first, which channels are down to their noise, and the missing moment."""
     from fieldsid.comparison.compare import left_in_words
 
     for c in found.failing:
         yield where_block(f"{found.run}: where the {c.name} fails, {left_in_words(c.over_floor, c.fit)}", c.where, angles, top)
     quiet = [f"{c.name} {c.over_floor:.2f} x" for c in found.channels if c not in found.failing]
     pooled = "" if found.failing else f", {found.over_noise:.2f} x"
-    said = f"{found.run}: down to the noise{pooled}: {', '.join(quiet)}" if quiet else ""
-    yield Whole(said if found.failing or not said else f"\n{said}")
-    told = ", ".join(f"{c.signal} ({percent(c.explained)})" for c in found.moves_with[:3])
-    yield f"the missing moment moves with {told}" if found.failing and told else ""
+    at_noise = f"{found.run}: down to the noise{pooled}: {', '.join(quiet)}" if quiet else ""
+    yield Whole(at_noise if found.failing or not at_noise else f"\n{at_noise}")
+    signals = ", ".join(f"{c.signal} ({percent(c.explained)})" for c in found.moves_with[:3])
+    yield f"the missing moment moves with {signals}" if found.failing and signals else ""
 
 
 def frames(found: Comparison) -> Frames:

@@ -30,8 +30,8 @@ def page(found: Diagnosis, angles: Angles = RADIANS) -> Page:
     settle = f"\nwhat would settle it: {fly.maneuver}, {fly.why}{f'; {fly.note}' if fly.note else ''}" if fly else ""
     where = where_block("where the model as it is fails", found.where, angles, MOST_PLACES)
     blocks: tuple[Block | str, ...] = (*candidates(body_of(found), angles), *_words(found), where, *_not_tried(found), settle)
-    told = tuple(b if isinstance(b, Block) else angles.words(b) for b in blocks)
-    return Page(f"Diagnosis of the {found.axis.value} axis, {found.verdict}: {found.says}", warned(found.notes), told)
+    converted = tuple(b if isinstance(b, Block) else angles.words(b) for b in blocks)
+    return Page(f"Diagnosis of the {found.axis.value} axis, {found.verdict}: {found.says}", warned(found.notes), converted)
 
 
 def _words(found: Diagnosis) -> Iterator[str]:

@@ -63,7 +63,7 @@ def _verdict(found: Extension) -> str:
 
 
 def errors(gain: Gain, angles: Angles) -> Block:
-    """Return the error before and after of each channel, on unseen and on fitted runs, beside the noise floor."""
+    """Return the error before and after of each channel, on unseen and on fitted runs, with the noise floor."""
     rows = [
         (f"{r['channel']}, {unit}, {r['runs']}", *(number(factor * r[k], 3) for k in ("before", "after", "noise_floor")))
         for r in channels_of(gain)

@@ -30,7 +30,7 @@ def line(schedule: Schedule) -> str:
 
 
 def page(schedule: Schedule) -> Page:
-    """Return what was asked for, and a row of gains for each speed."""
+    """Return the requirements, and a row of gains for each speed."""
     known = facts(
         "Statistics",
         (
@@ -44,8 +44,8 @@ def page(schedule: Schedule) -> Page:
     return Page(f"Schedule of the {schedule.axis.value} axis, {schedule.kind}", (), (known, *blocks_of(schedule)))
 
 
-def blocks_of(schedule: Schedule, angles: Angles = RADIANS, lost: Iterable[str] = ()) -> Iterator[Block | str]:
-    """Yield the gains of each speed, and what they were designed with; lost: what of the models was not counted."""
+def blocks_of(schedule: Schedule, angles: Angles = RADIANS, neglected: Iterable[str] = ()) -> Iterator[Block | str]:
+    """Yield the gains of each speed, and the assumptions of the design; `neglected` names what of the models is left out."""
     from fieldsid.schedule.verdict import fin_of
     from fieldsid.schedule.verify import steps_of
 
@@ -68,7 +68,7 @@ def blocks_of(schedule: Schedule, angles: Angles = RADIANS, lost: Iterable[str] 
     title = f"{schedule.axis.value}, {schedule.kind}: gains per speed, forward and fin in {angles.unit}"
     yield Block(title, rows, heads, left=0)
     yield f"in the file: {known['sign_convention']}" if "sign_convention" in known else ""
-    yield f"counted with: {'; '.join((fin_of(schedule.actuator), *(str(v) for v in [known.get('speed_lost')] if v), *lost))}"
+    yield f"counted with: {'; '.join((fin_of(schedule.actuator), *(str(v) for v in [known.get('speed_lost')] if v), *neglected))}"
     for binds in dict.fromkeys(r.binds for r in schedule.rows):
         yield f"bound by {binds}: {', '.join(number(r.speed, 3) for r in schedule.rows if r.binds == binds)} m/s"
     if "draws" in known:

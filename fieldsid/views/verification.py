@@ -43,7 +43,7 @@ def page(found: Verification) -> Page:
 
 
 def blocks_of(found: Verification) -> Iterator[Block | str]:
-    """Yield the margins and steps of each speed, and what a bent fin, a disturbance and a step of depth do."""
+    """Yield the margins and steps of each speed, and the effects of a bent fin, a disturbance and a step of depth."""
     from fieldsid.schedule.verdict import against_constant
 
     checks = found.scheduled
@@ -93,7 +93,7 @@ def _row(check: Check, constant: Check) -> tuple[str, ...]:
 
 
 def _settles(seconds: float, step: StepCheck) -> str:
-    """Return how long a step takes to settle; that it was flown so long in vain; nothing where it is not said."""
+    """Return the settling time in words, or that the step had not settled by the end; empty where it is not known."""
     if isnan(seconds):
         return "-"
     return f"{seconds:.1f}" if seconds != inf else f">{step.flown:.0f}"

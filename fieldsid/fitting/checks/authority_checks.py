@@ -37,28 +37,28 @@ def authority_check(problem: Problem, solution: Solution, floor: Noise, slot: in
     value, error = float(solution.x[slot]), float(np.sqrt(max(solution.covariance[slot, slot], 0.0)))
     if error == 0.0 or abs(value) >= MIN_STD_ERRORS * error:
         return None
-    shown = (
+    estimate = (
         f"{problem.layout.shown(problem.layout.names[slot])} = {value:.2g} +/- {error:.2g} 1/s^2 {far_from_zero(value, error)}"
     )
     data = {"parameter": problem.layout.names[slot], "value": value, "std_error": error, "limit": MIN_STD_ERRORS}
-    closed = [problem.records[run].name for run in _runs_of(problem, slot) if any(closed_loop_note(problem.records[run]))]
-    if closed:
+    runs = [problem.records[run].name for run in _runs_of(problem, slot) if any(closed_loop_note(problem.records[run]))]
+    if runs:
         return Note(
             "authority_unclear",
-            f"{shown}: a controller flies the fin of {', '.join(closed)}, and what it did is not told from what it answered to; "
+            f"{estimate}: a controller flies the fin of {', '.join(runs)}, and what it did is not told from what it answered to; "
             "fly pulses on top of it, or with it off",
-            {**data, "causes": ["feedback"], "runs": closed},
+            {**data, "causes": ["feedback"], "runs": runs},
         )
     share = max(share_of_fin(problem.records[run]) for run in _runs_of(problem, slot))
     if share < MIN_FIN_SHARE:
         return Note(
             "not_excited",
-            f"{shown}: the fin hardly moved the vehicle, at most {100 * share:.0f} % of the motion's power follows it (limit "
+            f"{estimate}: the fin hardly moved the vehicle, at most {100 * share:.0f} % of the motion's power follows it (limit "
             f"{100 * MIN_FIN_SHARE:.0f} %); fly larger or longer pulses",
             {**data, "causes": ["not_excited"], "share": share},
         )
     causes = dict(_causes(problem, solution, floor, slot))
-    return Note("authority_unclear", f"{shown}: {'; '.join(causes.values())}", {**data, "causes": list(causes)})
+    return Note("authority_unclear", f"{estimate}: {'; '.join(causes.values())}", {**data, "causes": list(causes)})
 
 
 def far_from_zero(value: float, error: float) -> str:

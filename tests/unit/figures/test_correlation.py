@@ -7,7 +7,7 @@ import pytest
 from matplotlib.collections import LineCollection
 
 from fieldsid.figures import canvas
-from fieldsid.figures.correlation import draw_own, draw_with_fin
+from fieldsid.figures.correlation import draw_autocorrelation, draw_with_fin
 
 RNG = np.random.default_rng(4)
 STEP = 0.05
@@ -23,11 +23,13 @@ def lines(ax):
 
 
 def test_white_residuals_stay_in_the_band_as_often_as_it_says():
-    assert np.mean([draw_own(RNG.standard_normal(2000), STEP, axes()) for _ in range(20)]) == pytest.approx(0.01, abs=0.008)
+    assert np.mean([draw_autocorrelation(RNG.standard_normal(2000), STEP, axes()) for _ in range(20)]) == pytest.approx(
+        0.01, abs=0.008
+    )
 
 
 def test_coloured_residuals_leave_it():
-    assert draw_own(np.convolve(RNG.standard_normal(2000), np.ones(20)), STEP, axes()) > 0.15
+    assert draw_autocorrelation(np.convolve(RNG.standard_normal(2000), np.ones(20)), STEP, axes()) > 0.15
 
 
 def test_what_the_fin_explains_stands_at_its_lag():
