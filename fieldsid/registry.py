@@ -1,4 +1,4 @@
-"""Registries that are folders: one file with one object of the right name is the whole registration."""
+"""Registries that are folders: a member is registered by one file with one object of the right name."""
 
 from __future__ import annotations
 

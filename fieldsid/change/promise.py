@@ -51,7 +51,7 @@ class KeptStep(Brief):
 
     @property
     def broken(self) -> Annotated[tuple[str, ...], Key()]:
-        """The numbers that are worse than 95 % of the draws said: of a step that was not held so long settling is none."""
+        """The numbers that are worse than in 95 % of the draws; settling does not count for a step that ended before that."""
         f, p, slack = self.flown, self.promised, MIN_STD_ERRORS * self.noise
         worse = {
             "overshoot": f.overshoot > p.overshoot_most + slack / abs(self.size),

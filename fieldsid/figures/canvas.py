@@ -37,7 +37,7 @@ MOST_DOTS = 4000
 
 
 class Sheet(Figure):
-    """A figure that a notebook shows by itself, without pyplot or a magic command before it."""
+    """A figure that a notebook displays without pyplot or a magic command."""
 
     def _repr_png_(self) -> bytes:
         out = BytesIO()
@@ -116,7 +116,7 @@ def _write(figure: Figure, path: Path, *, force: bool) -> None:
 
 def _draw(figure: Figure, path: Path, *, force: bool) -> None:
     engine = figure.get_layout_engine()
-    if engine is not None:  # laid out here, once: left to the writer it costs a whole drawing that is thrown away
+    if engine is not None:  # the layout is computed here once; the writer would draw the figure a second time for it
         engine.execute(figure)
         # no engine at all: one that is named "none" still makes the writer draw twice
         with rc_context({"figure.autolayout": False, "figure.constrained_layout.use": False}):

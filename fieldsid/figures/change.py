@@ -49,9 +49,9 @@ def draw(parameters: list[ParameterChange], ax: Axes) -> None:
             ]
     places = -np.arange(len(rows), dtype=float)
     ax.axvline(0.0, color="0.4", linewidth=0.8)
-    for place, (_, change, (low, high), whole) in zip(places, rows, strict=True):
-        color, size = (AFTER, 6.0) if whole else ("0.55", 4.0)
-        ax.plot([100 * low, 100 * high], [place, place], color=color, linewidth=2.0 if whole else 1.2)
+    for place, (_, change, (low, high), is_total) in zip(places, rows, strict=True):
+        color, size = (AFTER, 6.0) if is_total else ("0.55", 4.0)
+        ax.plot([100 * low, 100 * high], [place, place], color=color, linewidth=2.0 if is_total else 1.2)
         ax.plot([100 * change], [place], marker="o", markersize=size, color=color)
     ax.set_yticks(places, [r[0] for r in rows])
     ax.margins(y=0.1)

@@ -55,5 +55,5 @@ def view_of(found: Comparison) -> motion.MotionView:
 def facts(found: Comparison) -> str:
     """Return the line of facts: speed, rms against the noise, fit."""
     speed = found.shown.record.speed
-    errors = (f"{name} {said}" for name, said in errors_in_words(found.merit, found.floor, DEGREES, 2))
+    errors = (f"{name} {error}" for name, error in errors_in_words(found.merit, found.floor, DEGREES, 2))
     return "; ".join([*([f"{speed:.2f} m/s"] if isfinite(speed) else []), *errors])

@@ -60,11 +60,11 @@ def bars_of(found: Diagnosis) -> list[Bar]:
     """Return the bars of a diagnosis: the present model, then the candidates in order."""
     named = "+".join(found.effects)
     base = [found.base.train, found.base.validation]
-    whole = [Noise(e.angle_rms_rad, e.rate_rms_rad_s) if found.noiseless else found.noise_floor for e in base]
+    references = [Noise(e.angle_rms_rad, e.rate_rms_rad_s) if found.noiseless else found.noise_floor for e in base]
 
     def bar(effect: str, errors: Pair, explained: float, p: float | None, *, worse: bool = False) -> Bar:
         sides = (errors.train, errors.validation)
-        fitted, unseen = (e.over(one) for e, one in zip(sides, whole, strict=True))
+        fitted, unseen = (e.over(one) for e, one in zip(sides, references, strict=True))
         judged = isfinite(unseen)
         says = sides[judged].sized() if found.noiseless else f"{unseen if judged else fitted:.2f} x"
         return Bar(effect, fitted, unseen, says, explained, p, named=bool(named) and effect == named, worse=worse)

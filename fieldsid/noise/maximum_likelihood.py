@@ -126,7 +126,7 @@ def estimate_noise(
 
 
 def _next_damping(gained_share: float) -> float:
-    """Return the factor of the damping after a step that gained the share `kept` of the predicted gain."""
+    """Return the factor of the damping after a step that gained this share of the predicted gain."""
     return 0.1 if gained_share > 0.5 else 1.0 if gained_share > 0.25 else 3.0
 
 

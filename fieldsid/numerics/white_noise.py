@@ -45,7 +45,8 @@ def white_noise_std(values: FloatArray, ok: BoolArray) -> float:
 def robust_white_noise_std(differences: FloatArray, order: int) -> float:
     """Return the white-noise standard deviation behind differences (m,) of an order, from the median of their sizes.
 
-    Less precise than `white_noise_std`, and right where up to half the differences are jumps, or zero because values are held.
+    It is less precise than `white_noise_std`, but valid where up to half the differences are jumps, or zero as values are
+    repeated.
     """
     return float(np.median(np.abs(differences))) / (MEDIAN_OF_NORMAL * float(np.sqrt(comb(2 * order, order))))
 

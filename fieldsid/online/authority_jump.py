@@ -109,8 +109,8 @@ class AuthorityJump:
             self._before.count += oldest.count
         found = self._detected()
         if found is not None:
-            kept = [s for s in seconds if s.begin >= found.time]
-            self._before, self._seconds, self._noise = _Sums(), deque(kept), nan
+            since = [s for s in seconds if s.begin >= found.time]
+            self._before, self._seconds, self._noise = _Sums(), deque(since), nan
         return found
 
     def _sum_waiting_rows(self) -> None:

@@ -137,8 +137,8 @@ def text(value: object, place: str) -> None:
     _refuse(not isinstance(value, str), value, place, "text")
 
 
-def whole(value: object, place: str) -> None:
-    """Raise ShapeError where a value is no whole number, or a negative one."""
+def whole_number(value: object, place: str) -> None:
+    """Raise ShapeError where a value is not a whole number, or is negative."""
     _refuse(isinstance(value, bool) or not isinstance(value, int) or value < 0, value, place, "a whole number, 0 or more")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fieldsid.records.check import AXES, HEAD, Shape, at_least_one, each, maybe, number, one_of, text, whole
+from fieldsid.records.check import AXES, HEAD, Shape, at_least_one, each, maybe, number, one_of, text, whole_number
 from fieldsid.records.model import EXPONENT, MODEL, SPEED
 
 LARGEST_COEFFICIENT = 1e6
@@ -14,7 +14,7 @@ REGRESSION: Shape = {
     "powers": [EXPONENT],
     "coefficients": [number(-LARGEST_COEFFICIENT, LARGEST_COEFFICIENT)],
     "covariance": [[maybe(number(-(LARGEST_COEFFICIENT**2), LARGEST_COEFFICIENT**2))]],
-    "dof": whole,
+    "dof": whole_number,
     "r2": maybe(number()),
     "rms": maybe(number(0.0)),
 }

@@ -199,7 +199,7 @@ class _Constructor(SafeConstructor):
     """Constructs plain values after all nodes have been checked."""
 
     def construct_document(self, node: Any) -> Any:
-        """Return the value of a whole file; raises LimitError."""
+        """Return the value of a complete file; raises LimitError."""
         if _values_of(node, {}) > MOST_VALUES:
             raise LimitError(f"aliases (`*name`) that stand for more than {MOST_VALUES} keys and values in all")
         return super().construct_document(node)

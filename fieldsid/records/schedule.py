@@ -16,7 +16,7 @@ from fieldsid.records.check import (
     number,
     one_of,
     text,
-    whole,
+    whole_number,
 )
 
 CONTROLLERS = ("p", "pd", "pi", "pid", "lqr")
@@ -52,7 +52,7 @@ PROVENANCE: Shape = {
     "models?": [SOURCE],
     "runs?": [text],
     "supported_m_s?": (number(0.0), number(0.0)),
-    "draws?": whole,
+    "draws?": whole_number,
     "draws_rejected?": number(0.0, 1.0),
     "belief_refused?": flag,
     "length_m?": maybe(above_zero()),

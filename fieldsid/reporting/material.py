@@ -130,8 +130,8 @@ def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]
     best = chosen_models(state, axis)
     if not best:
         return None
-    whole = state.folder / best[0]
-    line = (_tried(lambda: history_of(whole), f"no history of {whole.name}", skipped) or ()) if len(best) == 1 else ()
+    best_model = state.folder / best[0]
+    line = (_tried(lambda: history_of(best_model), f"no history of {best_model.name}", skipped) or ()) if len(best) == 1 else ()
     ancestors = [g.path for g in reversed(line[:-1]) if g.state != "missing"]
     between = MOST_MODELS - 2
     ancestors = [*ancestors[:between], *ancestors[between:][-1:]]

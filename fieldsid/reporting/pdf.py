@@ -45,7 +45,7 @@ def check_browser(path: Path) -> str:
 def print_pdf(html: str, path: Path, *, force: bool = False) -> Path:
     """Print an HTML text to a PDF file; raises UsageError without a browser, ArtifactError where it does not print."""
     program = check_browser(path)
-    with TemporaryDirectory() as folder, replacing(path, force=force) as whole:
+    with TemporaryDirectory() as folder, replacing(path, force=force) as temporary:
         page, printed = Path(folder) / "report.html", Path(folder) / "report.pdf"  # a file with a name, for another program
         page.write_text(html, encoding="utf-8")
         # a browser does not start its sandbox for root, the usual user in a container
@@ -63,5 +63,5 @@ def print_pdf(html: str, path: Path, *, force: bool = False) -> Path:
         if not printed.exists() or not printed.stat().st_size:
             message = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
             raise ArtifactError(f"`{program}` printed nothing", found=message[:200], hint="write HTML, and print it by hand")
-        whole.write_bytes(printed.read_bytes())
+        temporary.write_bytes(printed.read_bytes())
     return path

@@ -53,7 +53,7 @@ class OwnSpeed(AsFlown):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ComparedRun:
-    """A run beside the model's free run."""
+    """A run compared with the model's free run."""
 
     merit: Annotated[GoodnessOfFit, INLINE]
     metrics: Annotated[Metrics, INLINE]

@@ -29,7 +29,7 @@ class Parameter:
     estimate: Annotated[Estimate, INLINE]
     shown: Annotated[str, Key("Its name as it is printed: that of several runs with the speed it belongs to.")]
     at_bound: bool = False
-    """Whether it stands on a bound: then no error is right."""
+    """Whether it is on a bound, where no error is valid."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from typing import Annotated, Any, BinaryIO
 from fieldsid._version import __version__
 from fieldsid.display import Brief
 from fieldsid.errors import shortened
-from fieldsid.records.check import Shape, ShapeError, check, number, text, whole
+from fieldsid.records.check import Shape, ShapeError, check, number, text, whole_number
 from fieldsid.records.keys import Key
 from fieldsid.records.named_inputs import sha256_of, sha256_of_named
 from fieldsid.records.reading import read_json
@@ -28,12 +28,12 @@ GROUPS = (("schedule",), ("effects",))
 """First words of commands with subcommands."""
 LARGEST = 32 << 20
 """Most bytes of a journal that are read, enough for 30,000 commands."""
-STAMP = {"path": text, "sha256": text, "size": whole, "modified_ns": whole}
+STAMP = {"path": text, "sha256": text, "size": whole_number, "modified_ns": whole_number}
 SHAPE: Shape = {
     "schema": text,
     "time": text,
     "command": [text],
-    "exit": whole,
+    "exit": whole_number,
     "seconds": number(),
     "verdict": text,
     "inputs": [STAMP],
@@ -151,9 +151,9 @@ class Hashes:
 
 def relative_to(path: Path, folder: Path) -> str:
     """Return a path relative to a folder where it lies inside, else in full, with forward slashes."""
-    whole = path.resolve()
-    inside = whole.is_relative_to(folder.resolve())
-    return (whole.relative_to(folder.resolve()) if inside else whole).as_posix()
+    full = path.resolve()
+    inside = full.is_relative_to(folder.resolve())
+    return (full.relative_to(folder.resolve()) if inside else full).as_posix()
 
 
 def made_by(entries: Sequence[Entry], path: str) -> Entry | None:

@@ -150,15 +150,15 @@ def _model(state: FolderState) -> tuple[str, str] | None:
         runs = _left_out(state, *run_words(state))
         return "there is no model of the runs yet", _line("identify", *runs, "--axis", axis, *_joint(state.of_kind(RUN)))
     diagnosis = next(reversed(state.done("diagnose")), None)
-    kept = state.newest(state.of_kind("diagnosis"))
-    if diagnosis is None and kept is None:
+    saved = state.newest(state.of_kind("diagnosis"))
+    if diagnosis is None and saved is None:
         if not (words := run_words(state)):
             return None
         return "no diagnosis yet", _line("diagnose", *_left_out(state, *words), "--axis", axis)
     if (unsettled := _unsettled(state, diagnosis)) is not None:
         return unsettled
     best = state.models[0]
-    named = diagnosis.named if diagnosis is not None else kept.effects if kept is not None else ()
+    named = diagnosis.named if diagnosis is not None else saved.effects if saved is not None else ()
     lacking = [e for e in named if e not in best.effects]
     since = "" if diagnosis is None else diagnosis.time
     if lacking and not any(e.time >= since for e in state.done("extend")):
@@ -197,9 +197,9 @@ def _unsettled(state: FolderState, diagnosis: Entry | None) -> tuple[str, str] |
         longer = shlex.join([*words, "--thorough", *(["--force"] if written and "--force" not in words else [])])
         return "the diagnosis explains not all, and a longer search may", longer
     planned = any(e.time >= diagnosis.time for e in state.done("plan"))
-    kept = [s.path for s in diagnosis.outputs if s.path.endswith((".yaml", ".yml"))]
-    if verdict == "undecided" and kept and not planned:
-        return "the diagnosis is undecided, and a maneuver would tell", _line("plan", "--from", kept[0], "-o", "plan")
+    saved = [s.path for s in diagnosis.outputs if s.path.endswith((".yaml", ".yml"))]
+    if verdict == "undecided" and saved and not planned:
+        return "the diagnosis is undecided, and a maneuver would tell", _line("plan", "--from", saved[0], "-o", "plan")
     return None
 
 

@@ -34,7 +34,7 @@ def page(found: Comparison, angles: Angles = RADIANS) -> Page:
         "Statistics",
         (
             ("speed", speed_words(found.shown.record.speed)),
-            *((f"{name} error", said) for name, said in errors),
+            *((f"{name} error", words) for name, words in errors),
             ("judged by", f"the {found.worst_channel.name}: Theil {number(m.theil, 3)}, R^2 {number(m.r2, 3)}"),
             ("whiteness", p_value(m.whiteness_p)),
         ),

@@ -1,4 +1,4 @@
-"""A diagnosis: the verdict in its own words, the candidates with their errors, where the model fails, what to fly next."""
+"""A diagnosis: the verdict in words, the candidates with their errors, where the model fails, what to fly next."""
 
 from __future__ import annotations
 

@@ -147,11 +147,11 @@ def _orthonormal(columns: FloatArray, sizes: FloatArray) -> tuple[FloatArray, fl
     """
     upper = np.asarray(np.linalg.qr(columns, mode="r"))
     left = np.concatenate([np.abs(np.diag(upper)), np.zeros(columns.shape[1] - upper.shape[0])])
-    kept = np.flatnonzero(left > MIN_INFORMATION_SHARE * sizes)
-    if kept.size < columns.shape[1]:
-        upper = np.asarray(np.linalg.qr(columns[:, kept], mode="r"))
-    inverse = np.zeros((columns.shape[1], kept.size))
-    inverse[kept] = solve_triangular(upper, np.eye(kept.size))
+    independent = np.flatnonzero(left > MIN_INFORMATION_SHARE * sizes)
+    if independent.size < columns.shape[1]:
+        upper = np.asarray(np.linalg.qr(columns[:, independent], mode="r"))
+    inverse = np.zeros((columns.shape[1], independent.size))
+    inverse[independent] = solve_triangular(upper, np.eye(independent.size))
     return inverse, float(np.log(np.abs(np.diag(upper))).sum())
 
 

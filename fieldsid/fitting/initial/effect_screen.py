@@ -158,13 +158,13 @@ def _orthonormal(columns: FloatArray) -> FloatArray:
     For a dependent column the decomposition returns an arbitrary direction, which spoils the later ones: it is repeated without.
     """
     size = np.linalg.norm(columns, axis=0)
-    kept = columns[:, size > 0] / size[size > 0]
+    scaled = columns[:, size > 0] / size[size > 0]
     while True:
-        q, r = np.linalg.qr(kept)
+        q, r = np.linalg.qr(scaled)
         independent = np.abs(np.diag(r)) > MIN_INDEPENDENT_SHARE
         if independent.all():
             return np.asarray(q)
-        kept = kept[:, independent]
+        scaled = scaled[:, independent]
 
 
 def screen_effect(linearisation: Linearisation, effect: Effect) -> ScreenResult:

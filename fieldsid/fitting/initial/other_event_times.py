@@ -92,9 +92,9 @@ def _products(problem: Problem, x: FloatArray, run: int, noise: Noise, free: Seq
     if own is None:
         return None
     index = np.array([0, *(1 + c for c in result.columns)])
-    whole = np.zeros((1 + x.size, 1 + x.size))
-    whole[index[:, None], index] = own
-    return whole
+    embedded = np.zeros((1 + x.size, 1 + x.size))
+    embedded[index[:, None], index] = own
+    return embedded
 
 
 def _stepped(x: FloatArray, products: FloatArray, low: FloatArray, high: FloatArray) -> tuple[float, FloatArray]:

@@ -100,12 +100,12 @@ class Sensitivities:
         for path in paths:
             start, end = (new - old for new, old in zip(scaled_fin(path, a.terms), own, strict=True))
             drives.append({MOMENT[0]: (b, start), MOMENT[1]: (b, end), FIN: (1.0, path.mean - a.fin.mean)})
-        whole, d_c, sens = (
+        all_intervals, d_c, sens = (
             slice(0, len(self.record) - 1),
             np.zeros((count, len(CONSTANTS))),
             np.empty((count, 2, len(self.record))),
         )
-        out = self._integrate_with_sensitivities(whole, drives, d_c, self.start, np.zeros((count, 3)), sens)
+        out = self._integrate_with_sensitivities(all_intervals, drives, d_c, self.start, np.zeros((count, 3)), sens)
         self.through_sensors(Motion(out[:, 0], out[:, 1]), (), sens)
         return sens
 

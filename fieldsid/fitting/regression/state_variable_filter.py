@@ -1,7 +1,7 @@
 """State variable filter: signals filtered by 1/(s + lambda) and 1/(s + lambda)^2, exact for their shape between samples.
 
 Over an interval of length h, seen back from its end (tau = h - s), a signal is u(tau) = u_e - (u_e - u_s) tau / h
-- c tau (h - tau) / 2: straight from u_s to u_e with curvature c. A held command has u_s = u_e and c = 0; a
+- c tau (h - tau) / 2: linear from u_s to u_e with curvature c. A zero-order hold has u_s = u_e and c = 0; a
 measurement is straight, and parabolic where a model tells its curvature. Any step lengths. Source: the paper,
 "state variable filter"; Garnier and Wang 2008, Identification of Continuous-time Models, chapter 1.
 """

@@ -18,7 +18,7 @@ from fieldsid.records.check import (
     one_of,
     text,
     times,
-    whole,
+    whole_number,
 )
 from fieldsid.records.schedule import CONTROLLERS
 from fieldsid.schedule.controller import KINDS
@@ -54,8 +54,8 @@ def test_a_record_of_the_shape_is_taken_with_what_it_holds_besides():
         ({"a": 1e300}, each(number()), "`a` is 1e+300"),
         ([], each(number()), "not keys with values"),
         ([1.0], times(2, number()), "not a list of 2"),
-        (-1, whole, "not a whole number"),
-        (1.0, whole, "not a whole number"),
+        (-1, whole_number, "not a whole number"),
+        (1.0, whole_number, "not a whole number"),
         (b"", text, "not text"),
     ],
 )
