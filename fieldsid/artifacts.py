@@ -53,12 +53,12 @@ def replacing(path: Path, *, force: bool = False) -> Iterator[Path]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with ExitStack() as stack:
-            handle = _nameless(path.parent)
-            temporary = stack.enter_context(_named(path) if handle is None else _at_handle(handle))
+            handle = _open_unnamed(path.parent)
+            temporary = stack.enter_context(_hidden_file(path) if handle is None else _at_handle(handle))
             yield temporary
             temporary.chmod(0o666 & ~_umask())
             if handle is not None:
-                temporary = stack.enter_context(_given_a_name(handle, path))
+                temporary = stack.enter_context(_linked_to_hidden_name(handle, path))
             temporary.replace(path)
     except OSError as error:
         raise ArtifactError(
@@ -68,7 +68,7 @@ def replacing(path: Path, *, force: bool = False) -> Iterator[Path]:
         ) from error
 
 
-def _nameless(folder: Path) -> int | None:
+def _open_unnamed(folder: Path) -> int | None:
     """Return the descriptor of an open file without a name in a folder; None where system or disk do not support it."""
     if not hasattr(os, "O_TMPFILE") or not OWN_HANDLES.is_dir():
         return None
@@ -87,7 +87,7 @@ def _at_handle(handle: int) -> Iterator[Path]:
 
 
 @contextmanager
-def _named(path: Path) -> Iterator[Path]:
+def _hidden_file(path: Path) -> Iterator[Path]:
     """Yield a hidden file in the folder of a path, removed at the end unless it was moved."""
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent)
     os.close(handle)
@@ -98,7 +98,7 @@ def _named(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def _given_a_name(handle: int, path: Path) -> Iterator[Path]:
+def _linked_to_hidden_name(handle: int, path: Path) -> Iterator[Path]:
     """Yield a hidden name, in the folder of a path, for a file without one: a link cannot replace a file, a rename can."""
     name = path.parent / f".{path.name}.{secrets.token_hex(6)}{path.suffix}"
     folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)

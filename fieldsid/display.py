@@ -32,7 +32,7 @@ LONGEST = 399
 MOST_ITEMS, LONGEST_TEXT = 3, 60
 
 
-def _none(_record: Any) -> Figures:
+def _no_figures(_record: Any) -> Figures:
     return {}
 
 
@@ -40,7 +40,7 @@ def _no_system(_record: Any, _speed: float | None) -> Any:
     raise UsageError("only a model and a schedule are linear systems")
 
 
-def _unread(_table: DataFrame, _name: str) -> Any:
+def _cannot_read(_table: DataFrame, _name: str) -> Any:
     raise UsageError("only a run is read from a table")
 
 
@@ -58,8 +58,8 @@ class View(Generic[T]):
     page: Callable[..., Page]
     frames: Callable[[T], Frames]
     label: Callable[[T], str] = str
-    figures: Callable[[T], Figures] = _none
-    read: Callable[[DataFrame, str], T] = _unread
+    figures: Callable[[T], Figures] = _no_figures
+    read: Callable[[DataFrame, str], T] = _cannot_read
     system: Callable[[T, float | None], Any] = _no_system
 
 

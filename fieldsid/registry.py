@@ -84,12 +84,12 @@ def _installed(package: str, attribute: str) -> Mapping[str, Any]:
         if info.ispkg or info.name.startswith("_"):
             continue
         module = import_module(f"{package}.{info.name}")
-        found[info.name] = _named(getattr(module, attribute, None), attribute, info.name)
+        found[info.name] = _checked_name(getattr(module, attribute, None), attribute, info.name)
     kind = type(next(iter(found.values()))) if found else object
-    return MappingProxyType({**found, **_from_outside(package, attribute, kind, frozenset(found))})
+    return MappingProxyType({**found, **_entry_point_members(package, attribute, kind, frozenset(found))})
 
 
-def _from_outside(package: str, attribute: str, kind: type, taken: frozenset[str]) -> dict[str, Any]:
+def _entry_point_members(package: str, attribute: str, kind: type, taken: frozenset[str]) -> dict[str, Any]:
     """Return the members of entry points by name; record the errors of those that cannot be loaded."""
     unfit = _unfit[package] = {}
     found: dict[str, Any] = {}
@@ -99,7 +99,7 @@ def _from_outside(package: str, attribute: str, kind: type, taken: frozenset[str
         try:
             if point.name in taken or count[point.name] > 1:
                 raise _taken_name(package, point, points)
-            found[point.name] = _loaded(point, attribute, kind)
+            found[point.name] = _load_entry_point(point, attribute, kind)
         except FieldsidError as error:
             unfit.setdefault(point.name, error)
     return found
@@ -114,11 +114,11 @@ def _taken_name(package: str, point: EntryPoint, points: Sequence[EntryPoint]) -
     )
 
 
-def _loaded(point: EntryPoint, attribute: str, kind: type) -> Any:
+def _load_entry_point(point: EntryPoint, attribute: str, kind: type) -> Any:
     """Return the object of an entry point, with its origin recorded; raises FieldsidError for any error of its code."""
     place = f"the entry point `{point.name} = {point.value}`"
     try:
-        item = _named(point.load(), attribute, point.name)
+        item = _checked_name(point.load(), attribute, point.name)
     except FieldsidError as error:
         raise FieldsidError(f"{place}: {error.what}", found=error.found, hint=error.hint) from error
     except (Exception, SystemExit) as error:  # foreign code may raise anything
@@ -172,13 +172,13 @@ def define(package: str, text: str, file: str) -> Any:
 def near(word: str, known: Mapping[str, Any] | list[str] | tuple[str, ...]) -> str:
     """Return a sentence with the names that a mistyped word may have meant."""
     close = difflib.get_close_matches(word, list(known), n=SUGGESTED, cutoff=MIN_LIKENESS)
-    close = [name for name in close if _own_likeness(word, name) >= MIN_OWN_LIKENESS]
+    close = [name for name in close if _likeness_without_ending(word, name) >= MIN_OWN_LIKENESS]
     if not close:
         return f"choose one of: {', '.join(sorted(known))}"
     return "did you mean " + " or ".join(f"`{c}`" for c in close) + "?"
 
 
-def _own_likeness(word: str, other: str) -> float:
+def _likeness_without_ending(word: str, other: str) -> float:
     """Return the similarity (0 to 1) of two names without their common last words, such as a unit."""
     ours, theirs = (re.split(r"[^A-Za-z0-9]+", name) for name in (word, other))
     while min(len(ours), len(theirs)) > 1 and ours[-1] == theirs[-1]:
@@ -187,7 +187,7 @@ def _own_likeness(word: str, other: str) -> float:
     return difflib.SequenceMatcher(None, "_".join(ours), "_".join(theirs)).ratio()
 
 
-def _named(item: Any, attribute: str, name: str) -> Any:
+def _checked_name(item: Any, attribute: str, name: str) -> Any:
     if item is None or getattr(item, "name", None) != name:
         raise FieldsidError(
             f"registry file {name!r} does not hold `{attribute}` with that name",

@@ -28,19 +28,19 @@ Work = Callable[[Sequence[Task]], Iterator[tuple[Task, list[Row]]]]
 
 def known_rows(folder: Path, task: Task) -> list[Row] | None:
     """Return the rows of an earlier batch for a task; None where there are none or the task failed."""
-    path = _answer(folder, task)
+    path = _answer_path(folder, task)
     try:
         body = read_json(read_text(path))
         check(body, ANSWER)
     except (ArtifactError, ValueError):
         return None
     rows: list[Row] = body["rows"]
-    if body["schema"] != SCHEMA or any(r["status"] == "failed" or not all(map(_fits, r, r.values())) for r in rows):
+    if body["schema"] != SCHEMA or any(r["status"] == "failed" or not all(map(_has_type_of_column, r, r.values())) for r in rows):
         return None
     return rows
 
 
-def _fits(name: str, value: object) -> bool:
+def _has_type_of_column(name: str, value: object) -> bool:
     """Whether a cell of a row has the type of its column: text or number."""
     is_shown = any(name in columns(axis) for axis in Axis)
     return not is_shown or value is None or isinstance(value, str if name in _WORDS else (int, float))
@@ -54,7 +54,7 @@ def all_rows(folder: Path, tasks: Sequence[Task], work: Work, done: Callable[[],
         done()
     for task, rows in work([task for task in tasks if task not in found]):
         body = {"schema": SCHEMA, "tool": f"fieldsid {__version__}", "task": task.plain(), "rows": plain(rows)}
-        write_text(_answer(folder, task), json.dumps(body, allow_nan=False), force=True)
+        write_text(_answer_path(folder, task), json.dumps(body, allow_nan=False), force=True)
         found[task] = rows
         done()
     return [row for task in tasks for row in found[task]], known
@@ -71,13 +71,13 @@ def write_table(folder: Path, axis: Axis, rows: Iterable[Row]) -> tuple[Path, Pa
     parquet, table = folder / f"batch_{axis.value}.parquet", folder / f"batch_{axis.value}.csv"
     with replacing(parquet, force=True) as temporary:
         frame.to_parquet(temporary, index=False)
-    cells = {n: frame[n].map(_no_formula, na_action="ignore") for n in words}
+    cells = {n: frame[n].map(_escaped_formula, na_action="ignore") for n in words}
     with replacing(table, force=True) as temporary:
         frame.assign(**cells).to_csv(temporary, index=False)
     return parquet, table
 
 
-def _no_formula(text: str) -> str:
+def _escaped_formula(text: str) -> str:
     """Return a text as a cell that a spreadsheet does not take for a formula."""
     return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
 
@@ -88,5 +88,5 @@ _WORDS = frozenset(
 )  # fmt: skip
 
 
-def _answer(folder: Path, task: Task) -> Path:
+def _answer_path(folder: Path, task: Task) -> Path:
     return folder / ANSWERS / f"{task.key}.json"

@@ -79,7 +79,7 @@ def run_here(tasks: Sequence[Task], workers: int, *, timeout_s: float, memory_mb
             for one in crew.heard():
                 yield from crew.answers(one)
             for one in [o for o in crew.members if o.task]:
-                task, why = one.task, _too_much(one, timeout_s, memory_mb)
+                task, why = one.task, _exceeded_limit(one, timeout_s, memory_mb)
                 if why and task is not None:
                     yield task, [failed_row(task, "failed", *why)]
                     crew.dismiss(one)
@@ -100,7 +100,7 @@ class _Crew:
 
     def hire(self) -> None:
         """Start a process and give it a task."""
-        one = _started()
+        one = _start_process()
         self.members.append(one)
         self._selector.register(_output(one), selectors.EVENT_READ, one)
         self._give_next(one)
@@ -154,7 +154,7 @@ class _Crew:
             one.give(task)
 
 
-def _started() -> _Process:
+def _start_process() -> _Process:
     command = [sys.executable, "-P", "-m", "fieldsid.batch.worker"]  # -P: no module is looked for in the working folder
     environment = os.environ | ENVIRONMENT
     process = subprocess.Popen(
@@ -172,7 +172,7 @@ def _ended(task: Task, code: int) -> Row:
     return failed_row(task, "failed", f"the process that read it ended {TRIES} times", by, "try it alone: `sysid identify`")
 
 
-def _too_much(one: _Process, timeout_s: float, memory_mb: float) -> tuple[str, str, str] | None:
+def _exceeded_limit(one: _Process, timeout_s: float, memory_mb: float) -> tuple[str, str, str] | None:
     took = clock.monotonic() - one.since
     if took > timeout_s:
         return f"it took longer than {timeout_s:g} s", f"{took:.0f} s", "raise `--timeout`"

@@ -48,7 +48,7 @@ def rows_of(task: Task) -> list[Row]:
     begin = clock.perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        rows = _tried(task)
+        rows = _rows_of_readable(task)
     took = clock.perf_counter() - begin
     return [{"seconds": took / len(rows), "tool": f"fieldsid {__version__}", **row} for row in rows]
 
@@ -61,27 +61,27 @@ def failed_row(task: Task, status: str, what: str, found: str = "", hint: str = 
     }  # fmt: skip
 
 
-def _tried(task: Task) -> list[Row]:
+def _rows_of_readable(task: Task) -> list[Row]:
     try:
         runs, digest = _read(task)
     except FieldsidError as error:
         return [failed_row(task, "skipped", error.what, error.found, error.hint)]
     except Exception as error:  # noqa: BLE001 - the boundary of a log: a bug of ours in one must not stop the others
-        return [_bug(task, error)]
+        return [_bug_row(task, error)]
     rows = []
     for i, run in enumerate(runs):
         name = run.name if len(runs) == 1 else f"{run.name}_{i + 1}"
-        row = {**_about(task, run), "run": name, "sha256": digest}
+        row = {**_run_columns(task, run), "run": name, "sha256": digest}
         try:
-            rows.append(row | _identified(run, task.settings))
+            rows.append(row | _with_parameters(run, task.settings))
         except FieldsidError as error:
             rows.append(row | {"status": "skipped", "what": error.what, "found": error.found, "hint": error.hint})
         except Exception as error:  # noqa: BLE001 - the same
-            rows.append(row | _bug(task, error) | {"run": name})
+            rows.append(row | _bug_row(task, error) | {"run": name})
     return rows
 
 
-def _bug(task: Task, error: Exception) -> Row:
+def _bug_row(task: Task, error: Exception) -> Row:
     trace = "".join(traceback.format_exception(error))[-2000:]
     return failed_row(task, "failed", f"a bug of fieldsid: {type(error).__name__}: {error}", trace, "send us the log")
 
@@ -112,7 +112,7 @@ def _vehicle(path: str | None) -> Vehicle | None:
     return load_vehicle(Path(path))
 
 
-def _about(task: Task, run: Run) -> Row:
+def _run_columns(task: Task, run: Run) -> Row:
     """Return the columns of a run that do not need a fit."""
     start, source = _start(run, Path(task.log))
     return {
@@ -135,7 +135,7 @@ def _start(run: Run, log: Path) -> tuple[float, str]:
     return log.stat().st_mtime, "file"
 
 
-def _identified(run: Run, settings: Settings) -> Row:
+def _with_parameters(run: Run, settings: Settings) -> Row:
     from fieldsid.fitting.checks.warnings import is_warning
     from fieldsid.fitting.identify import identify
     from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
@@ -160,10 +160,10 @@ def _identified(run: Run, settings: Settings) -> Row:
         "rate_noise_rad_s": fit.floor.rate,
         "warnings": ",".join(sorted({n.code for n in fit.notes if is_warning(n, axis)})),
     }
-    return row | (_diagnosed(run, axis) if settings.diagnose else {})
+    return row | (_with_diagnosis(run, axis) if settings.diagnose else {})
 
 
-def _diagnosed(run: Run, axis: Axis) -> Row:
+def _with_diagnosis(run: Run, axis: Axis) -> Row:
     """Return the verdict on an identified run, or the reason where there is none; the row keeps its parameters."""
     from fieldsid.diagnosis import diagnose
 

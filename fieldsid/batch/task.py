@@ -61,12 +61,12 @@ def logs_in(paths: list[Path]) -> list[Path]:
 
     found: dict[str, Path] = {}
     for path in paths:
-        for log in _below(path) if path.is_dir() and not is_bag(path) else [path]:
+        for log in _logs_below(path) if path.is_dir() and not is_bag(path) else [path]:
             found.setdefault(str(log.resolve()), log)
     return list(found.values())
 
 
-def _below(folder: Path) -> list[Path]:
+def _logs_below(folder: Path) -> list[Path]:
     """Return the files and bags in and below a folder, without hidden ones."""
     from fieldsid.logs.readers.bags.stores import is_bag
 
@@ -75,7 +75,7 @@ def _below(folder: Path) -> list[Path]:
         if path.name.startswith("."):
             continue
         if path.is_dir() and not is_bag(path):
-            out += _below(path)
+            out += _logs_below(path)
         else:
             out.append(path)
     return out

@@ -49,16 +49,16 @@ def compare_models(
     if not speeds:
         raise UsageError(
             "the two sides were not flown at the same speed",
-            found=f"{_list(old)} m/s before, {_list(new)} m/s after",
+            found=f"{_speeds_in_words(old)} m/s before, {_speeds_in_words(new)} m/s after",
             hint=f"identify a run near {old.speeds[-1]:.2g} m/s after the change",
         )
     limit = fin_limit or fin_of(old.models) or fin_of(new.models) or FIN_IF_NOT_KNOWN
     added, removed = _effects(new, old), _effects(old, new)
     parameters = parameter_changes(old, new, speeds)
     notes: list[Note] = []
-    found_gains = _tried(lambda: gain_changes(old, new, speeds, limit, stated or FinLimits()), "gains", notes)
-    turns = _tried(lambda: radius_changes(old, new, speeds, limit), "radius", notes) if old.axis is Axis.YAW else ()
-    notes += _remarks(parameters, (*added, *removed))
+    found_gains = _value_or_note(lambda: gain_changes(old, new, speeds, limit, stated or FinLimits()), "gains", notes)
+    turns = _value_or_note(lambda: radius_changes(old, new, speeds, limit), "radius", notes) if old.axis is Axis.YAW else ()
+    notes += _notes_on_parameters(parameters, (*added, *removed))
     return Change(
         axis=old.axis,
         speeds=tuple(speeds),
@@ -87,11 +87,11 @@ def _effects(here: ParameterSource, there: ParameterSource) -> tuple[str, ...]:
     return tuple(dict.fromkeys(e for m in here.models for e in m.effects if e not in other))
 
 
-def _list(source: ParameterSource) -> str:
+def _speeds_in_words(source: ParameterSource) -> str:
     return ", ".join(f"{s:.2f}" for s in source.speeds)
 
 
-def _tried(make: Callable[[], tuple[T, ...]], what: str, notes: list[Note]) -> tuple[T, ...]:
+def _value_or_note(make: Callable[[], tuple[T, ...]], what: str, notes: list[Note]) -> tuple[T, ...]:
     try:
         return make()
     except FieldsidError as error:  # where one side has no turn or no gain, the parameters are compared without it
@@ -99,7 +99,7 @@ def _tried(make: Callable[[], tuple[T, ...]], what: str, notes: list[Note]) -> t
         return ()
 
 
-def _remarks(parameters: tuple[ParameterChange, ...], one_sided: tuple[str, ...]) -> list[Note]:
+def _notes_on_parameters(parameters: tuple[ParameterChange, ...], one_sided: tuple[str, ...]) -> list[Note]:
     notes: list[Note] = []
     if one_sided:
         message = (

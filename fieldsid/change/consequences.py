@@ -35,13 +35,13 @@ def gain_changes(
     """
     was, now = (design_schedule(s, fin_limit, speeds=speeds, wish=Wish(), limits=stated) for s in (old, new))
     level = LEVEL / len(speeds)  # Bonferroni: one family of intervals over the speeds
-    return tuple(_gain(old, new, was.at(s), now.at(s), stated, level) for s in speeds)
+    return tuple(_gain_change(old, new, was.at(s), now.at(s), stated, level) for s in speeds)
 
 
-def _gain(old: ParameterSource, new: ParameterSource, was: Row, now: Row, stated: FinLimits, level: float) -> GainChange:
+def _gain_change(old: ParameterSource, new: ParameterSource, was: Row, now: Row, stated: FinLimits, level: float) -> GainChange:
     speed = now.speed
     families = [family_at(source, speed, stated, DRAWS, SEED + 1000 * i) for i, source in enumerate((old, new))]
-    ratio = _formula(families[1]) / _formula(families[0])
+    ratio = _gain_by_formula(families[1]) / _gain_by_formula(families[0])
     change = now.gains.kp / was.gains.kp - 1.0
     # the draws give the relative width of the interval; its centre is the designed gain, which allows for lag and delay
     low, high = (float(np.quantile(ratio, q) / np.median(ratio)) for q in (0.5 * level, 1 - 0.5 * level))
@@ -52,7 +52,7 @@ def _gain(old: ParameterSource, new: ParameterSource, was: Row, now: Row, stated
     )  # fmt: skip
 
 
-def _formula(plant: LinearPlant) -> FloatArray:
+def _gain_by_formula(plant: LinearPlant) -> FloatArray:
     """Return the gain for a damping ratio of 0.7071 by the formula, for each draw, (d,)."""
     authority = plant.slow_authority
     size = np.broadcast_to(np.abs(0.5 * plant.slow_damping**2 - plant.stiffness), authority.shape)

@@ -36,7 +36,7 @@ def common_speeds(old: ParameterSource, new: ParameterSource) -> list[float]:
     """Return the speeds in m/s, ascending, at which both sides have a model; points within 8 % of each other count once."""
     found: list[float] = []
     for speed in sorted(float(s) for s in {*old.speeds, *new.speeds}):
-        if not (_members(old, speed) and _members(new, speed)):
+        if not (_models_at(old, speed) and _models_at(new, speed)):
             continue
         if found and speed <= found[-1] * (1 + GROUP_WIDTH):
             continue
@@ -47,16 +47,16 @@ def common_speeds(old: ParameterSource, new: ParameterSource) -> list[float]:
 def known_at(source: ParameterSource, speed: float) -> Known:
     """Return the pooled estimates of a side at a speed in m/s."""
     names = (*NAMES[source.axis].base, TRIM_ANGLE)
-    each = {place: _of_model(source.models[place], speed) for place in _members(source, speed)}
+    each = {place: _estimates_of_model(source.models[place], speed) for place in _models_at(source, speed)}
     values, errors, shares = {}, {}, {}
     for name in names:
-        values[name], errors[name], weights = _pooled({p: (v[name], e[name]) for p, (v, e) in each.items()})
+        values[name], errors[name], weights = _weighted_mean({p: (v[name], e[name]) for p, (v, e) in each.items()})
         if name == NAMES[source.axis].authority:
             shares = weights
     return Known(MappingProxyType(values), MappingProxyType(errors), MappingProxyType(shares))
 
 
-def _members(source: ParameterSource, speed: float) -> list[int]:
+def _models_at(source: ParameterSource, speed: float) -> list[int]:
     """Return the indices of the models whose range of flown speeds includes a speed."""
     return [i for i, model in enumerate(source.models) if _covers(model, speed)]
 
@@ -67,7 +67,7 @@ def _covers(model: Model, speed: float) -> bool:
     return min(speeds) / reach <= speed <= max(speeds) * reach
 
 
-def _of_model(model: Model, speed: float) -> tuple[dict[str, float], dict[str, float]]:
+def _estimates_of_model(model: Model, speed: float) -> tuple[dict[str, float], dict[str, float]]:
     """Return a model's base parameters and trim angle at a speed, with the relative standard errors of its nearest point."""
     names = NAMES[model.axis]
     _, (points,) = points_of([model], ["model"])
@@ -81,7 +81,7 @@ def _of_model(model: Model, speed: float) -> tuple[dict[str, float], dict[str, f
     return values, errors
 
 
-def _pooled(each: Mapping[int, tuple[float, float]]) -> tuple[float, float, dict[int, float]]:
+def _weighted_mean(each: Mapping[int, tuple[float, float]]) -> tuple[float, float, dict[int, float]]:
     """Return the weighted mean of independent values, its standard error, and the weights."""
     places = list(each)
     values = np.array([each[p][0] for p in places])
@@ -105,6 +105,6 @@ def shared_values(source: ParameterSource) -> Iterator[tuple[str, float, float]]
     base = {*NAMES[source.axis].base, "damping_exponent"}
     for name in dict.fromkeys(n for m in source.models for n in m.free if n not in base and "@" not in n):
         if all(name in m.free for m in source.models):
-            value, error, _ = _pooled({i: (m.values[name], m.std_error(name)) for i, m in enumerate(source.models)})
+            value, error, _ = _weighted_mean({i: (m.values[name], m.std_error(name)) for i, m in enumerate(source.models)})
             if np.isfinite(error) and error > 0:
                 yield name, value, error

@@ -50,7 +50,7 @@ def parameter_changes(old: ParameterSource, new: ParameterSource, speeds: Sequen
     found = [_quantity_over_speeds(n, units[n], speeds, befores, afters) for n in order]
     after = {n: (v, e) for n, v, e in shared_values(new)}
     found += [_coefficient(n, v, e, *after[n], old) for n, v, e in shared_values(old) if n in after]
-    return _tested(found)
+    return _with_p_values(found)
 
 
 def _quantity_over_speeds(
@@ -89,19 +89,19 @@ def _row(speed: float, old: float, old_error: float, new: float, new_error: floa
     return AtSpeed(speed, old, old_error, new, new_error, change, error, float("nan"))
 
 
-def _tested(found: Sequence[_Quantity]) -> tuple[ParameterChange, ...]:
-    means = [_mean(q) for q in found]
+def _with_p_values(found: Sequence[_Quantity]) -> tuple[ParameterChange, ...]:
+    means = [_mean_change(q) for q in found]
     tests = [_p(*mean) for mean in means] + [_p(r.change, r.std_error) for q in found if len(q.rows) > 1 for r in q.rows]
     p_values = adjusted(tests)
     of_rows = iter(p_values[len(found) :])
     out = []
     for quantity, (change, error), p in zip(found, means, p_values, strict=False):
         rows = tuple(replace(r, p_adjusted=next(of_rows) if len(quantity.rows) > 1 else p) for r in quantity.rows)
-        out.append(_judged(quantity, rows, change, error, p))
+        out.append(_parameter_change(quantity, rows, change, error, p))
     return tuple(out)
 
 
-def _mean(quantity: _Quantity) -> tuple[float, float]:
+def _mean_change(quantity: _Quantity) -> tuple[float, float]:
     """Return the weighted mean change over the speeds, and its standard error with the correlation of the speeds."""
     changes, errors = (np.array([getattr(r, n) for r in quantity.rows]) for n in ("change", "std_error"))
     weights = weights_of(errors)
@@ -113,7 +113,7 @@ def _p(change: float, error: float) -> float:
     return float(2.0 * ndtr(-abs(change) / error)) if error > 0 else float("nan")
 
 
-def _judged(quantity: _Quantity, rows: tuple[AtSpeed, ...], change: float, error: float, p: float) -> ParameterChange:
+def _parameter_change(quantity: _Quantity, rows: tuple[AtSpeed, ...], change: float, error: float, p: float) -> ParameterChange:
     reach = -float(ndtri(0.5 * LEVEL)) * error
     low, high = change - reach, change + reach
     least = min([v for v in (p, *(r.p_adjusted for r in rows)) if np.isfinite(v)], default=float("nan"))

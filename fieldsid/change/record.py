@@ -1,4 +1,4 @@
-"""What has changed between two states of a vehicle: the record, and the one line that says it."""
+"""The record of the change between two states of a vehicle, and its summary in one line."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from fieldsid.records.keys import Interval, Key, Number, Side
 from fieldsid.rounding import number, with_error
 
 TRIM_ANGLE = "trim_angle"
-"""The fin angle that the trim moment amounts to, rad: at one speed and another the same where the fin is bent."""
+"""The fin angle in rad that is equivalent to the trim moment: it does not depend on the speed where the fin is bent."""
 TRIM_MATTERS_RAD = 0.0087
-"""Half a degree of fin: what a fin is bent by on deck and nobody sees."""
+"""Half a degree of fin, by which a fin may be bent on deck without being noticed."""
 LEVEL = 0.05
-"""p-value below which a change is beyond its errors."""
+"""p-value below which a change is significant."""
 CHANGED, UNCHANGED, UNCLEAR = "changed", "unchanged", "unclear"
 VERDICTS: Mapping[str, str] = {
     "needed": "new gains needed",
@@ -45,7 +45,7 @@ class AtSpeed(Brief):
 
     @property
     def is_beyond_errors(self) -> bool:
-        """Whether the change is beyond its errors, all tests together wrong in one comparison of twenty."""
+        """Whether the change is significant, with a family-wise error rate of 5 % over all tests."""
         return self.p_adjusted < LEVEL
 
 

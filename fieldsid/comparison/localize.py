@@ -1,4 +1,4 @@
-"""Where a model fails: the share of the squared error under each condition, and the worst stretches of the run."""
+"""Places of a model's error: the share of the squared error under each condition, and the worst stretches of the run."""
 
 from __future__ import annotations
 

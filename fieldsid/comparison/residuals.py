@@ -47,7 +47,7 @@ def companions(shown: Prediction, damping: float) -> tuple[Companion, ...]:
     if moment.size == 0 or float(np.var(moment)) == 0.0:
         return ()
     width = block_width(shown.record.steps, BLOCK_S)
-    found = [Companion(name, _explained(moment, block_means(values, width))) for name, values in _signals(shown).items()]
+    found = [Companion(name, _share_explained(moment, block_means(values, width))) for name, values in _signals(shown).items()]
     return tuple(sorted(found, key=lambda c: -c.explained))
 
 
@@ -56,7 +56,7 @@ def _signals(shown: Prediction) -> Mapping[str, FloatArray]:
     return {"fin": shown.fin, "fin movement": change, "rate": shown.rate, "angle": shown.angle, **shown.record.signals}
 
 
-def _explained(moment: FloatArray, signal: FloatArray) -> float:
+def _share_explained(moment: FloatArray, signal: FloatArray) -> float:
     centred = signal - np.median(signal)
     if float(np.ptp(centred)) == 0.0:
         return 0.0

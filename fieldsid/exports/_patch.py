@@ -53,7 +53,7 @@ def patch_yaml(path: Path, key: str, columns: Mapping[str, Sequence[float]]) -> 
     _values(path, before)
     text = before.replace("\r\n", "\n")
     parent, name, value = _find(path, YAML(typ="safe", pure=True).compose(text), key)
-    after = _replaced(text, parent, name, value, columns)
+    after = _text_with_columns(text, parent, name, value, columns)
     if "\r\n" in before:
         after = after.replace("\n", "\r\n")
     patch = Patch(path, before, after)
@@ -78,7 +78,7 @@ def write_patch(patch: Patch) -> Path:
         )
     if _text(path) != patch.before:
         raise ArtifactError(f"`{path}` changed meanwhile", found="other text than was compared", hint="run the export again")
-    backup = _free(path)
+    backup = _free_backup_name(path)
     with replacing(backup) as temporary:  # a copy that is interrupted is no backup
         shutil.copy2(path, temporary)
     with replacing(path, force=True) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
@@ -126,10 +126,10 @@ def _parts(key: str) -> list[str]:
     return [p for p in key.split(".") if p]
 
 
-def _replaced(text: str, parent: Any, name: Node, value: Node, columns: Mapping[str, Sequence[float]]) -> str:
+def _text_with_columns(text: str, parent: Any, name: Node, value: Node, columns: Mapping[str, Sequence[float]]) -> str:
     """Return the text with the columns as a key's value; existing keys keep their place and comments."""
     rows = {n: f": [{', '.join(decimal(v) for v in vs)}]" for n, vs in columns.items()}
-    begin, end = name.end_mark.index, _end(text, name, value)
+    begin, end = name.end_mark.index, _end_of_value(text, name, value)
     if parent.flow_style:
         return f"{text[:begin]}: {{{', '.join(n + row for n, row in rows.items())}}}{text[end:]}"
     inside = isinstance(value, MappingNode) and not value.flow_style and value.start_mark.index > begin
@@ -141,23 +141,23 @@ def _replaced(text: str, parent: Any, name: Node, value: Node, columns: Mapping[
     line = text.find("\n", end)
     text = text[:line] + new + text[line:] if line >= 0 else text + new
     for own, row in reversed(present):
-        start, stop = own.end_mark.index, _end(text, own, row)
+        start, stop = own.end_mark.index, _end_of_value(text, own, row)
         if own.value not in rows:
             start, stop = text.rfind("\n", 0, start), (text + "\n").find("\n", stop)
         text = text[:start] + rows.get(own.value, "") + text[stop:]
     return text
 
 
-def _end(text: str, name: Node, value: Node) -> int:
+def _end_of_value(text: str, name: Node, value: Node) -> int:
     """Return the index at which a key's value ends; that of a block is the end of its last value, before any comments."""
     if value.start_mark.index == value.end_mark.index:  # nothing
         return text.index(":", name.end_mark.index) + 1
     if value.start_mark.index < name.end_mark.index:  # an alias, whose value is elsewhere
         return re.compile(r"\s*:\s*\*[^\s,\]}]+").match(text, name.end_mark.index).end()  # type: ignore[union-attr]
     if isinstance(value, MappingNode) and value.value and not value.flow_style:
-        return _end(text, *value.value[-1])
+        return _end_of_value(text, *value.value[-1])
     if isinstance(value, SequenceNode) and value.value and not value.flow_style:
-        return _end(text, name, value.value[-1])
+        return _end_of_value(text, name, value.value[-1])
     return int(value.end_mark.index)
 
 
@@ -176,7 +176,7 @@ def _check(patch: Patch, key: str, columns: Mapping[str, Sequence[float]]) -> No
         )
 
 
-def _free(path: Path) -> Path:
+def _free_backup_name(path: Path) -> Path:
     """Return the first backup name that is not taken: FILE.bak, FILE.bak2, ..."""
     backup = path.with_name(f"{path.name}.bak")
     number = 1

@@ -134,12 +134,12 @@ def extend_in_steps(
     parts = _with_signals((*(effect_held(n, parent.own) for n in parent.effects), *new), [*learned, *judged])
     notes = (*notes, *left_out([run for run, _ in (*fitted, *checked)], parent.axis))
     work = Search(learned, judged, parent.axis, parts, parent.effects, report, thorough=True, given=parent)
-    line = _grown(work, new)
-    steps = _steps(work, line, new, notes)
+    line = _refitted_line(work, new)
+    steps = _extensions_of_line(work, line, new, notes)
     if not judged or whole_of(steps).pays or not is_accepted(line[0], line[-1]):
         return steps
     work = Search((*learned, *judged), (), parent.axis, parts, parent.effects, report, thorough=True, given=parent)
-    return _steps(work, _grown(work, new), new, (*notes, FITTED_TO_ALL))
+    return _extensions_of_line(work, _refitted_line(work, new), new, (*notes, FITTED_TO_ALL))
 
 
 def whole_of(steps: Sequence[Extension]) -> Extension:
@@ -150,7 +150,7 @@ def whole_of(steps: Sequence[Extension]) -> Extension:
     return replace(steps[-1], gain=gain, evidence=sum(s.evidence for s in steps), notes=notes)
 
 
-def _grown(work: Search, new: Sequence[Effect]) -> list[ScoredModel]:
+def _refitted_line(work: Search, new: Sequence[Effect]) -> list[ScoredModel]:
     """Return the refitted parent and the refitted models after each addition of the new effects in their order.
 
     The full set is built up from the best few sets of each size and from the first effects in their order. Then the search of
@@ -166,7 +166,7 @@ def _grown(work: Search, new: Sequence[Effect]) -> list[ScoredModel]:
     return [work.tried[names] for names in line]
 
 
-def _steps(
+def _extensions_of_line(
     work: Search, line: Sequence[ScoredModel], new: Sequence[Effect], notes: tuple[Note, ...]
 ) -> tuple[Extension, ...]:  # fmt: skip
     """Return the extensions from each model of a line to the next; the residual of the last defines the noise of all."""

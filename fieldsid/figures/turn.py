@@ -57,7 +57,7 @@ def _tightest(prediction: TurnPrediction) -> str:
 
 
 def _band(prediction: TurnPrediction) -> str:
-    """Say what the bars or bands are of."""
+    """Return the meaning of the bars or bands in words."""
     drawn = "bars" if len({r.speed for r in prediction.rows}) <= FEW else "bands"
     trust = {r.trust for r in prediction.rows}
     wider = ", with the error of the model's form where nothing was measured" if trust != {"measured"} else ""

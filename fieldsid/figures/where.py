@@ -1,4 +1,4 @@
-"""Where a model fails: by condition, the share of the squared error beyond the share of the samples."""
+"""Places of a model's error: for each condition, the share of the squared error less the share of the samples."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ def information(
     the ds of a sample are 1 and the de are -e, which gives those of the first. The arrays `here.moved` are overwritten.
     Source: Harvey 1989, Forecasting, structural time series models and the Kalman filter, section 3.4.5.
     """
-    standardised, innovation_std = here.moved or _moved(record, a, k, noise, place, residual)
+    standardised, innovation_std = here.moved or _with_increased_parameters(record, a, k, noise, place, residual)
     d_innovations, d_log_std = standardised.reshape(place.size, -1), innovation_std.reshape(place.size, -1)
     score = score_of_innovations(
         record.ok.ravel(), here.standardised, 1.0 / here.innovation_std, IS_STANDARD_DEVIATION[place], d_innovations, d_log_std
@@ -84,7 +84,7 @@ def information(
     return score, 2.0 * d_log_std @ d_log_std.T + d_innovations @ d_innovations.T
 
 
-def _moved(
+def _with_increased_parameters(
     record: Record, a: float, k: float, noise: FloatArray, place: npt.NDArray[np.int64], residual: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return innovations and their standard deviations (P, 2, n) with each noise parameter but the first increased."""

@@ -26,10 +26,10 @@ def bounded_step(
     step = np.zeros_like(x)
     while free.any():
         if free.all():
-            step = _solved(scaled, gradient / scale) / scale
+            step = _solve(scaled, gradient / scale) / scale
         else:
             target = (gradient[free] - normal[free][:, ~free] @ step[~free]) / scale[free]
-            step[free] = _solved(scaled[free][:, free], target) / scale[free]
+            step[free] = _solve(scaled[free][:, free], target) / scale[free]
         end = x + step
         if not np.isfinite(end).all():
             raise DivergenceError(
@@ -45,7 +45,7 @@ def bounded_step(
     return step
 
 
-def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
+def _solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
     _, solution, failed = dposv(matrix, right)
     if not failed:
         return np.asarray(solution)

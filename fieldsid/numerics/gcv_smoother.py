@@ -53,7 +53,7 @@ def gcv_smooth(
     if seen.sum() < FEWEST_SAMPLES or not step > 0.0:
         return full
     straight = np.column_stack([np.ones(time.size), (time - time[0]) / float(np.ptp(time))])
-    line = _fitted(straight, full, seen)
+    line = _least_squares_fit(straight, full, seen)
     if float(np.max(np.abs(full - line)[seen])) <= ROUNDING_SHARE * float(np.max(np.abs(full[seen]))):
         return full
     weight, part = seen.astype(np.float64), slice(0, MAX_SELECTION_SAMPLES)
@@ -64,16 +64,16 @@ def gcv_smooth(
             regressors,
             key=lambda columns: _residual_squares(np.column_stack([straight[part], columns[part]]), full[part], seen[part]),
         )
-        trends.append((_fitted(np.column_stack([straight, best]), full, seen), best.shape[1]))
+        trends.append((_least_squares_fit(np.column_stack([straight, best]), full, seen), best.shape[1]))
     stiffnesses, found = _stiffnesses(step, fastest_s), []
     for trend, spent in trends:
         stiffness, error = _best_stiffness((full - trend)[part], weight[part], stiffnesses, spent)
         found.append((error * (1.0 if spent else 1.0 + CHANCE_GAIN_SAMPLES / float(weight[part].sum())), stiffness, trend))
     _, stiffness, trend = min(found, key=lambda of: of[0])
-    return np.asarray(trend + _solved(weight, stiffness, (weight * (full - trend))[:, None])[:, 0])
+    return np.asarray(trend + _solve_penalised(weight, stiffness, (weight * (full - trend))[:, None])[:, 0])
 
 
-def _fitted(columns: FloatArray, values: FloatArray, seen: npt.NDArray[np.bool_]) -> FloatArray:
+def _least_squares_fit(columns: FloatArray, values: FloatArray, seen: npt.NDArray[np.bool_]) -> FloatArray:
     """Return the least-squares fit (n,) of columns (n, k) to the values (n,) at samples `seen`."""
     size = np.linalg.norm(columns[seen], axis=0)
     scaled = columns / np.where(size > 0.0, size, 1.0)
@@ -82,7 +82,7 @@ def _fitted(columns: FloatArray, values: FloatArray, seen: npt.NDArray[np.bool_]
 
 def _residual_squares(columns: FloatArray, values: FloatArray, seen: npt.NDArray[np.bool_]) -> float:
     """Return the residual sum of squares of the least-squares fit of columns (n, k) to the values (n,) at samples `seen`."""
-    return float(np.sum((values - _fitted(columns, values, seen))[seen] ** 2))
+    return float(np.sum((values - _least_squares_fit(columns, values, seen))[seen] ** 2))
 
 
 def _is_new_value(values: FloatArray, ok: npt.NDArray[np.bool_], step: float) -> npt.NDArray[np.bool_]:
@@ -124,14 +124,14 @@ def _best_stiffness(
     sides = np.column_stack([weight * values, weight * probe])
     count, errors = float(weight.sum()), []
     for stiffness in stiffnesses:
-        z = _solved(weight, float(stiffness), sides)
+        z = _solve_penalised(weight, float(stiffness), sides)
         free = count - float(probe @ (weight * z[:, 1])) - spent
         errors.append(float(np.sum(weight * (values - z[:, 0]) ** 2)) / max(free, 1e-9 * count) ** 2)
     best = int(np.argmin(errors))
     return float(stiffnesses[best]), errors[best]
 
 
-def _solved(weight: FloatArray, stiffness: float, sides: FloatArray) -> FloatArray:
+def _solve_penalised(weight: FloatArray, stiffness: float, sides: FloatArray) -> FloatArray:
     """Return the solution (n, m) of (W + stiffness D'D) z = sides, D the second differences."""
     n = weight.size
     bands = np.zeros((3, n))

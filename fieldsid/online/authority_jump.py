@@ -137,7 +137,7 @@ class AuthorityJump:
         since = row_counts[-1] - np.append(0.0, row_counts)[places]
         inverse, determines_before = _inverses(before[:, keep][:, :, keep], MIN_EXCITATION_BEFORE)
         theta = (inverse @ before[:, keep, -1:])[..., 0]
-        noise = self._noises(sums, theta, places)
+        noise = self._score_variances(sums, theta, places)
         products = after[:, keep][:, :, keep]
         solved, _ = _inverses(products[:, free][:, :, free], 0.0)
         # the new coefficients depend on the target, and on drag and stiffness, which do not change
@@ -165,7 +165,7 @@ class AuthorityJump:
             return None
         return Jump(self._seconds[places[best]].begin, float(is_now[best] / was[best]), float(error[best] / abs(was[best])))
 
-    def _noises(self, sums: FloatArray, theta: FloatArray, places: IntArray) -> FloatArray:
+    def _score_variances(self, sums: FloatArray, theta: FloatArray, places: IntArray) -> FloatArray:
         """Return the variance of the scores before each candidate over that of the columns (P,).
 
         It is the variance of a row's residual with its correlation to the neighbouring rows. Where fewer than MIN_DRAWS seconds

@@ -182,28 +182,32 @@ def verdict_sentence(progress: Progress) -> str:
         case "contradicts":
             return f"0 % of the data can be used: {progress.contradiction}"
         case "enough":
-            known = ", ".join(_known(p) for p in wanted)
+            known = ", ".join(_accuracy_in_words(p) for p in wanted)
             return f"enough data, come up: {known}; settled for {LOOK_BACK_S:.0f} s"
         case "moving":
             still = ", ".join(p.name for p in wanted if not p.is_settled)
             return f"{share}, but {still} still moving: go on for {LOOK_BACK_S:.0f} s"
         case "not_excited":
-            return f"{share}, and the fin is still ({progress.fin_rms * 180.0 / pi:.1f} deg rms): move it; {_last(progress)}"
+            return f"{share}, and the fin is still ({progress.fin_rms * 180.0 / pi:.1f} deg rms): move it; {_limiting(progress)}"
     left = progress.left_s
     pace = f", about {left:.0f} s more as it is flown now" if isfinite(left) and left < LONGEST_GUESS_S else ""
-    return f"{share}{pace}: {_last(progress)}"
+    return f"{share}{pace}: {_limiting(progress)}"
 
 
-def _last(progress: Progress) -> str:
+def _limiting(progress: Progress) -> str:
     (p,) = (p for p in progress.parameters if p.name == progress.limited_by)
-    return f"{_known(p)}, wanted {_share(p.goal, p.value)}" if isfinite(p.std_error) else f"nothing is known of {p.name} yet"
+    return (
+        f"{_accuracy_in_words(p)}, wanted {_error_in_words(p.goal, p.value)}"
+        if isfinite(p.std_error)
+        else f"nothing is known of {p.name} yet"
+    )
 
 
-def _known(p: ParameterProgress) -> str:
-    return f"{p.name} to {_share(p.std_error, p.value)}"
+def _accuracy_in_words(p: ParameterProgress) -> str:
+    return f"{p.name} to {_error_in_words(p.std_error, p.value)}"
 
 
-def _share(error: float, value: float) -> str:
+def _error_in_words(error: float, value: float) -> str:
     """Return an error in per cent of a value, in the unit of the value where that may be zero."""
     if not isfinite(error):
         return "nothing yet"

@@ -34,7 +34,7 @@ def _row(item: Item, state: FolderState, now: Mapping[str, str]) -> tuple[str, .
         item.path,
         now[item.path][:HASH],
         item.kind,
-        "; ".join([*_together(unchanged, now), *with_hash]),
+        "; ".join([*_grouped_names(unchanged, now), *with_hash]),
         "" if maker is None else maker.name,
         item.standing,
     )
@@ -44,7 +44,7 @@ def _name(source: Source, state: FolderState) -> str:
     return source.named if source.path is None else relative_to(source.path, state.folder)
 
 
-def _together(names: Iterable[str], rows: Collection[str]) -> list[str]:
+def _grouped_names(names: Iterable[str], rows: Collection[str]) -> list[str]:
     """Return names; more than a few of one folder and suffix are combined, by their pattern or as all of the table's."""
     kinds: dict[tuple[str, str], list[str]] = {}
     for name in dict.fromkeys(names):

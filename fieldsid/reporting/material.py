@@ -95,14 +95,14 @@ def _runs(state: FolderState, vehicle: Vehicle | None, skipped: list[str]) -> li
     if len(places) > MOST_RUNS:
         order = "those that the model was not fitted to come first, then others evenly by name"
         skipped.append(f"{len(places) - MOST_RUNS} of {len(places)} runs are not drawn: {order}")
-        places = _chosen(places, _fitted_to(state))
+        places = _selected_runs(places, _runs_of_best_models(state))
     limits = {} if vehicle is None else vehicle.signal_limits
     read = {p: partial(load_run, p, state.mapping_of(p), fin_max_rad=limits, recognise=True) for p in places}
-    tried = (_tried(how, p.name, skipped) for p, how in read.items())
+    tried = (_read_or_skip(how, p.name, skipped) for p, how in read.items())
     return [run for run in tried if run is not None]
 
 
-def _tried(read: Callable[[], T], what: str, skipped: list[str]) -> T | None:
+def _read_or_skip(read: Callable[[], T], what: str, skipped: list[str]) -> T | None:
     """Return the value of `read`; None where it fails, with the reason added to `skipped`."""
     try:
         return read()
@@ -111,13 +111,13 @@ def _tried(read: Callable[[], T], what: str, skipped: list[str]) -> T | None:
         return None
 
 
-def _fitted_to(state: FolderState) -> set[str]:
+def _runs_of_best_models(state: FolderState) -> set[str]:
     """Return the names of the runs to which the best models were fitted."""
     best = {path for axis in ("yaw", "pitch") for path in chosen_models(state, axis)}
     return {r for i in state.of_kind(MODEL) if i.path in best for r in i.runs}
 
 
-def _chosen(places: Sequence[Path], fitted: set[str]) -> list[Path]:
+def _selected_runs(places: Sequence[Path], fitted: set[str]) -> list[Path]:
     """Return the runs to be drawn: those to which no model was fitted first, then others spread evenly over the list."""
     unseen = [p for p in places if p.stem not in fitted][:MOST_RUNS]
     others = [p for p in places if p not in unseen]
@@ -131,7 +131,11 @@ def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]
     if not best:
         return None
     best_model = state.folder / best[0]
-    line = (_tried(lambda: history_of(best_model), f"no history of {best_model.name}", skipped) or ()) if len(best) == 1 else ()
+    line = (
+        (_read_or_skip(lambda: history_of(best_model), f"no history of {best_model.name}", skipped) or ())
+        if len(best) == 1
+        else ()
+    )
     ancestors = [g.path for g in reversed(line[:-1]) if g.state != "missing"]
     between = MOST_MODELS - 2
     ancestors = [*ancestors[:between], *ancestors[between:][-1:]]
@@ -143,14 +147,16 @@ def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]
     shown = tuple(s for p in paths if (s := _shown(state, p, runs, skipped)) is not None)
     if not shown:
         return None
-    diagnosis, turning, schedule = (_last(state, kind, axis, skipped) for kind in ("diagnosis", "turn-radius", "schedule"))
-    gains = None if schedule is None else _tried(partial(load_schedule, state.place(schedule)), schedule.path, skipped)
+    diagnosis, turning, schedule = (
+        _newest_complete(state, kind, axis, skipped) for kind in ("diagnosis", "turn-radius", "schedule")
+    )
+    gains = None if schedule is None else _read_or_skip(partial(load_schedule, state.place(schedule)), schedule.path, skipped)
     return AxisMaterial(
         axis,
         shown,
         line,
         loop_of(line, shown[-1].found, shown[0].found) if ancestors and len(shown) == len(paths) else None,
-        _tried(lambda: load_parameter_source(points), "no laws over speed", skipped),
+        _read_or_skip(lambda: load_parameter_source(points), "no laws over speed", skipped),
         diagnosis,
         turning,
         schedule,
@@ -165,14 +171,14 @@ def _shown(state: FolderState, path: Path, runs: Sequence[Run], skipped: list[st
         skipped.append(f"{path.name}: {error.what}; {error.found}")
         return None
     mine = [run for run in runs if may_show(run, model.axis)]
-    tried = (_tried(partial(compare_one, model, run), f"{path.name} on {run.name}", skipped) for run in mine)
+    tried = (_read_or_skip(partial(compare_one, model, run), f"{path.name} on {run.name}", skipped) for run in mine)
     found = [one for one in tried if one is not None]
     inside = path.resolve().is_relative_to(state.folder.resolve())
     name = path.resolve().relative_to(state.folder.resolve()) if inside else path
     return Shown(str(name), model, tuple(found))
 
 
-def _last(state: FolderState, kind: str, axis: str, skipped: list[str]) -> Item | None:
+def _newest_complete(state: FolderState, kind: str, axis: str, skipped: list[str]) -> Item | None:
     """Return the newest complete file of a kind for an axis; a turning radius belongs to the yaw axis."""
     return state.newest(i for i in state.of_kind(kind) if (i.axis or "yaw") == axis and _is_complete(i, skipped))
 

@@ -114,11 +114,11 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
     models = axis.shown[:1] if axis.line else axis.shown
     return {
         "name": axis.axis,
-        "pairs": [_pair(shown, c, axis) for shown in axis.shown for c in shown.found],
+        "pairs": [_run_section(shown, c, axis) for shown in axis.shown for c in shown.found],
         "merits": [_errors(s) for s in axis.shown],
         "failures": [
             {
-                "title": f"{run}: the {_followed(channel)}",
+                "title": f"{run}: the {_channel_error(channel)}",
                 "chart": figures.failures(channel.where, f"where the {channel.name} of {run} fails"),
                 "moves": ", ".join(f"{m.signal} ({100 * m.explained:.0f} %)" for m in c.moves_with[:3]),
             }
@@ -147,20 +147,20 @@ def _loop(loop: Loop) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _followed(channel: Channel) -> str:
+def _channel_error(channel: Channel) -> str:
     """Return the name of a channel with the error of the model in it."""
     return f"{channel.name} {left_in_words(channel.over_floor, channel.fit, 2)}"
 
 
 def _without_noise(judged: Sequence[Comparison], on: str) -> str:
     worst = max(judged, key=lambda c: c.badness)
-    return f"{_followed(worst.worst_channel)} on {on}{', the worst' * (len(judged) > 1)}; the log has next to no noise"
+    return f"{_channel_error(worst.worst_channel)} on {on}{', the worst' * (len(judged) > 1)}; the log has next to no noise"
 
 
-def _pair(shown: Shown, found: Any, axis: AxisMaterial) -> dict[str, Any]:
+def _run_section(shown: Shown, found: Any, axis: AxisMaterial) -> dict[str, Any]:
     title = f"{shown.path} on {found.run}"
     drawn, key = figures.free_run(found, f"{title}: free run and measurement")
-    over = ", ".join(_followed(c) for c in found.channels)
+    over = ", ".join(_channel_error(c) for c in found.channels)
     return {
         "model": shown.path, "run": found.run, "chart": drawn, "legend": key, "over": over,
         "fitted": shown.was_fitted_to(found.run), "first": shown is axis.shown[0],

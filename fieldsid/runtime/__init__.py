@@ -1,1 +1,1 @@
-"""How work is run: forked workers, background tasks, and the count of evaluations."""
+"""Execution of work: forked workers, background tasks, and the count of evaluations."""

@@ -17,13 +17,13 @@ AGAIN_S = 0.05
 """Time after which an interrupt that may have been discarded is raised again."""
 
 
-class _Asked:
+class _Pending:
     """Whether there was an interrupt that may have been discarded, and that the program has not handled yet."""
 
     is_open = False
 
 
-_ASKED = _Asked()
+_ASKED = _Pending()
 
 
 def heed_interrupts() -> None:
@@ -41,23 +41,23 @@ def meet_interrupt() -> bool:
 
 def _interrupted(_number: int, frame: FrameType | None) -> Never:
     if _is_import(frame):
-        _ask_later()
+        _raise_later()
     raise KeyboardInterrupt
 
 
 def _unraisable(what: sys.UnraisableHookArgs) -> None:
     if isinstance(what.exc_value, KeyboardInterrupt):
-        _ask_later()
+        _raise_later()
     else:
         sys.__unraisablehook__(what)
 
 
-def _ask_later() -> None:
+def _raise_later() -> None:
     _ASKED.is_open = True
-    _thread.start_new_thread(_ask_again, ())
+    _thread.start_new_thread(_raise_again, ())
 
 
-def _ask_again() -> None:
+def _raise_again() -> None:
     sleep(AGAIN_S)
     if _ASKED.is_open:
         _thread.interrupt_main()

@@ -26,29 +26,29 @@ def parallel_map(
     `write` and `read` convert the values, by the index of the items, to bytes and back. Where the worker ends without an answer,
     its items are evaluated here; an error of the function is raised here.
     """
-    done = _shared(function, items, write, read) if 1 < len(items) <= MAX_ITEMS else {}
+    done = _shared_values(function, items, write, read) if 1 < len(items) <= MAX_ITEMS else {}
     return [done[i] if i in done else function(item) for i, item in enumerate(items)]
 
 
-def _shared(
+def _shared_values(
     function: Callable[[T], R], items: Sequence[T],
     write: Callable[[dict[int, Any]], bytes], read: Callable[[bytes], dict[int, Any]],
 ) -> dict[int, R]:  # fmt: skip
     """Return the values computed by this process and a worker, by the index of the items; empty where there is no worker."""
     remaining = job_queue(len(items))
     try:
-        worker = fork_worker(lambda: write(dict(_taken(function, items, remaining))))
+        worker = fork_worker(lambda: write(dict(_evaluate_next(function, items, remaining))))
         if worker is None:
             return {}
         with worker:
-            own = dict(_taken(function, items, remaining))
+            own = dict(_evaluate_next(function, items, remaining))
             answer = worker.answer()
     finally:
         os.close(remaining)
     return own if answer is None else own | read(answer)
 
 
-def _taken(function: Callable[[T], R], items: Sequence[T], remaining: int) -> Iterator[tuple[int, R]]:
+def _evaluate_next(function: Callable[[T], R], items: Sequence[T], remaining: int) -> Iterator[tuple[int, R]]:
     """Yield the indices and values of the items that this process takes."""
     while number := os.read(remaining, 1):
         yield number[0], function(items[number[0]])

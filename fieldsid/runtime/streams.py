@@ -8,7 +8,7 @@ import sys
 from typing import Any
 
 
-class _Unheard(io.FileIO):
+class _DiscardingFile(io.FileIO):
     """A file that accepts all output: messages that cannot be delivered must not change how the program ends."""
 
     def write(self, data: Any) -> int:
@@ -30,7 +30,7 @@ def have_streams() -> bool:
     if "stdout" in closed:
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123, SIM115 - the same
     number, encoding = (os.open(os.devnull, os.O_WRONLY), "utf-8") if "stderr" in closed else (2, sys.stderr.encoding)
-    messages = io.BufferedWriter(_Unheard(number, "w", closefd=False))
+    messages = io.BufferedWriter(_DiscardingFile(number, "w", closefd=False))
     sys.stderr = io.TextIOWrapper(messages, encoding, errors="backslashreplace", line_buffering=True)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")

@@ -35,7 +35,7 @@ TAKES_ALL_RUNS = ("identify", "diagnose")
 
 def next_step(state: FolderState) -> tuple[str, str]:
     """Return the reason and the command to run next, ready to paste; the command is empty where nothing remains to be done."""
-    return (_again(state) or _sides(state) or _data(state) or _model(state) or _use(state)) or DONE_ALL
+    return (_remake_stale(state) or _compare_trials(state) or _data(state) or _model(state) or _use(state)) or DONE_ALL
 
 
 def step_before(command: str, state: FolderState) -> tuple[str, str]:
@@ -43,14 +43,14 @@ def step_before(command: str, state: FolderState) -> tuple[str, str]:
     if command in ("schedule verify", "schedule export") and not state.of_kind("schedule") and (step := _use(state)) is not None:
         return step
     if command == "turn-radius" and state.models and not chosen_models(state, Axis.YAW.value):
-        runs = [i for i in state.of_kind(RUN) if any(may_show(run, Axis.YAW) for run in _loaded(state, i))]
+        runs = [i for i in state.of_kind(RUN) if any(may_show(run, Axis.YAW) for run in _read_if_possible(state, i))]
         if not runs:
             return "there is no model of the yaw, and no run with a rudder", ""
         return "there is no model of the yaw yet", _line("identify", "--axis", "yaw", *_joint(runs))
     return next_step(state)
 
 
-def _again(state: FolderState) -> tuple[str, str] | None:
+def _remake_stale(state: FolderState) -> tuple[str, str] | None:
     """Return how to make the first stale file again; files that depend on a stale one come after it."""
     stale = [i for i in state.items if i.stale]
     if not stale:
@@ -58,7 +58,7 @@ def _again(state: FolderState) -> tuple[str, str] | None:
     order = (RUN, MODEL)  # all others are made from these
     first = min(stale, key=lambda i: (i.stale.endswith(" is stale"), order.index(i.kind) if i.kind in order else len(order)))
     maker = made_by(state.entries, first.path)
-    return f"{first.path}: {first.stale}", _remake(state, first) if maker is None else _forced(_words(state, maker))
+    return f"{first.path}: {first.stale}", _remake(state, first) if maker is None else _line_with_force(_words(state, maker))
 
 
 def _line(*words: str) -> str:
@@ -66,7 +66,7 @@ def _line(*words: str) -> str:
     return shlex.join(["sysid", *words])
 
 
-def _forced(words: Sequence[str]) -> str:
+def _line_with_force(words: Sequence[str]) -> str:
     """Return the line of an earlier command with `--force`, so that it replaces its outputs."""
     return shlex.join([*words, *([] if "--force" in words else ["--force"])])
 
@@ -86,7 +86,7 @@ def _remake(state: FolderState, item: Item) -> str:
     mappings = [name for name in named if name.endswith((".yaml", ".yml"))]
     logs = [name for name in named if name not in mappings]
     if item.kind == RUN and logs:  # a run that was piped in does not name its log
-        return _line("import", *logs, *_repeated("--mapping", mappings), "-o", folder, "--force")
+        return _line("import", *logs, *_repeat_option("--mapping", mappings), "-o", folder, "--force")
     if item.kind == MODEL:
         mapping = item.body.get("mapping")
         read = [*run_words(state), *([] if mapping is None else ["--mapping", str(mapping["path"])])]
@@ -96,12 +96,12 @@ def _remake(state: FolderState, item: Item) -> str:
     return _line("history", item.path)
 
 
-def _repeated(option: str, values: Iterable[str]) -> list[str]:
+def _repeat_option(option: str, values: Iterable[str]) -> list[str]:
     """Return an option of one value, repeated for each value."""
     return [word for value in values for word in (option, value)]
 
 
-def _sides(state: FolderState) -> tuple[str, str] | None:
+def _compare_trials(state: FolderState) -> tuple[str, str] | None:
     """Return the next step in a folder that contains trials but no data: a model in each trial, then their comparison."""
     if not state.sides or any(i.kind in (LOG, RUN, MODEL) for i in state.items):
         return None
@@ -127,11 +127,11 @@ def _data(state: FolderState) -> tuple[str, str] | None:
             with chdir(state.folder):
                 return f"{foreign} needs a mapping: its own names do not say what its numbers are", to_map(Path(foreign))
         reading = ["--mapping", mappings[-1]] if mappings and MAPPING not in mappings else []
-        words = ["sysid", "import", *_left_out(state, *new, "-o", RUNS), *reading]
+        words = ["sysid", "import", *_unless_default(state, *new, "-o", RUNS), *reading]
         return "there is no run of the logs yet", shortened(words, state.folder)
     if plans := state.of_kind("plan"):
         axis, path = plans[-1].axis or Axis.YAW.value, plans[-1].path
-        live = _line("live", "--axis", axis, "--udp", str(PORT), *_left_out(state, "--plan", path))
+        live = _line("live", "--axis", axis, "--udp", str(PORT), *_unless_default(state, "--plan", path))
         return f"there is no log yet: fly {path} and put the logs in {LOGS}/", live
     return "there is no log yet", f"sysid plan --axis yaw --speeds {_speeds(state.folder)}"
 
@@ -147,15 +147,15 @@ def _speeds(folder: Path) -> str:
 def _model(state: FolderState) -> tuple[str, str] | None:
     axis = _axis(state)
     if not state.of_kind(MODEL):
-        runs = _left_out(state, *run_words(state))
+        runs = _unless_default(state, *run_words(state))
         return "there is no model of the runs yet", _line("identify", *runs, "--axis", axis, *_joint(state.of_kind(RUN)))
     diagnosis = next(reversed(state.done("diagnose")), None)
     saved = state.newest(state.of_kind("diagnosis"))
     if diagnosis is None and saved is None:
         if not (words := run_words(state)):
             return None
-        return "no diagnosis yet", _line("diagnose", *_left_out(state, *words), "--axis", axis)
-    if (unsettled := _unsettled(state, diagnosis)) is not None:
+        return "no diagnosis yet", _line("diagnose", *_unless_default(state, *words), "--axis", axis)
+    if (unsettled := _follow_up(state, diagnosis)) is not None:
         return unsettled
     best = state.models[0]
     named = diagnosis.named if diagnosis is not None else saved.effects if saved is not None else ()
@@ -163,12 +163,12 @@ def _model(state: FolderState) -> tuple[str, str] | None:
     since = "" if diagnosis is None else diagnosis.time
     if lacking and not any(e.time >= since for e in state.done("extend")):
         fitted, judged = diagnosed_runs(state, best)
-        typed = _left_out(state, best.path, *fitted, *_repeated("--validate", judged))
-        return f"the diagnosis names {', '.join(lacking)}", _line("extend", *typed, *_repeated("--add", lacking))
-    return _searched_on(state, best)
+        typed = _unless_default(state, best.path, *fitted, *_repeat_option("--validate", judged))
+        return f"the diagnosis names {', '.join(lacking)}", _line("extend", *typed, *_repeat_option("--add", lacking))
+    return _diagnose_extended(state, best)
 
 
-def _searched_on(state: FolderState, best: Item) -> tuple[str, str] | None:
+def _diagnose_extended(state: FolderState, best: Item) -> tuple[str, str] | None:
     """Return the diagnosis of an extended model with a remaining error, where none has been run since it was made."""
     error = left_by_addition(best.body.get("info") or {})
     if is_noise(error):
@@ -180,11 +180,11 @@ def _searched_on(state: FolderState, best: Item) -> tuple[str, str] | None:
     if any(was_diagnosed) or any(asking):
         return None
     says = f"{error:.2f} x the noise" if error < MANY else "more than the noise"
-    line = _line("diagnose", *_left_out(state, *run_words(state)), "--axis", _axis(state), "--model", best.path)
+    line = _line("diagnose", *_unless_default(state, *run_words(state)), "--axis", _axis(state), "--model", best.path)
     return f"{best.path} leaves {says}", line
 
 
-def _unsettled(state: FolderState, diagnosis: Entry | None) -> tuple[str, str] | None:
+def _follow_up(state: FolderState, diagnosis: Entry | None) -> tuple[str, str] | None:
     """Return the next step after a diagnosis without a certain result; None where it was certain or the step has been done.
 
     A longer search, or the flight that distinguishes between the candidates, comes before gains for a model known to be wrong.
@@ -206,7 +206,7 @@ def _unsettled(state: FolderState, diagnosis: Entry | None) -> tuple[str, str] |
 def _use(state: FolderState) -> tuple[str, str] | None:
     schedules = state.of_kind("schedule")
     models = chosen_models(state)
-    design = ["schedule", "design", *_left_out(state, *models), "-o"]
+    design = ["schedule", "design", *_unless_default(state, *models), "-o"]
     if not schedules:
         return ("no gains yet", _line(*design, "gains.yaml")) if models else None
     gains = schedules[-1]
@@ -216,7 +216,7 @@ def _use(state: FolderState) -> tuple[str, str] | None:
         return f"{gains.path} is there; no journal says whether it is verified", ""
     if verification_of(state, gains) is None:
         return "the gains are not verified", "sysid schedule verify"
-    return _reported(state)
+    return _write_report(state)
 
 
 def _extended_since(state: FolderState, gains: Item) -> str:
@@ -233,7 +233,7 @@ def verification_of(state: FolderState, gains: Item) -> Entry | None:
     return next((e for e in reversed(done) if not e.inputs or now in {s.sha256 for s in e.inputs}), None)
 
 
-def _reported(state: FolderState) -> tuple[str, str] | None:
+def _write_report(state: FolderState) -> tuple[str, str] | None:
     """Return the command for the report, where there is none or a later command has made something."""
     reports = state.done("report")
     if not reports:
@@ -242,7 +242,7 @@ def _reported(state: FolderState) -> tuple[str, str] | None:
     made = [e for e in after if any(s.path.endswith((".yaml", ".yml", ".parquet")) for s in e.outputs)]
     if not made:
         return None
-    return f"the report is older than what `sysid {made[0].name}` made", _forced(_words(state, reports[-1]))
+    return f"the report is older than what `sysid {made[0].name}` made", _line_with_force(_words(state, reports[-1]))
 
 
 def chosen_models(state: FolderState, axis: str = "") -> list[str]:
@@ -315,7 +315,7 @@ def logs_to_import(state: FolderState, *, again: bool = False) -> list[str]:
     return new or [i.path for i in logs]
 
 
-def _left_out(state: FolderState, *words: str) -> tuple[str, ...]:
+def _unless_default(state: FolderState, *words: str) -> tuple[str, ...]:
     """Return no words in a trial folder, where a command finds these files itself, else the words."""
     return () if is_trial(state.folder) else words
 
@@ -333,10 +333,10 @@ def _axis(state: FolderState) -> str:
     """Return the plane of the models, else the plane that most runs excite."""
     if state.models:
         return state.models[0].axis or "yaw"
-    return plane_of([run for i in state.of_kind(RUN) for run in _loaded(state, i)])
+    return plane_of([run for i in state.of_kind(RUN) for run in _read_if_possible(state, i)])
 
 
-def _loaded(state: FolderState, item: Item) -> list[Run]:
+def _read_if_possible(state: FolderState, item: Item) -> list[Run]:
     """Return a list with the run; empty where it cannot be read, which the command that uses it will report."""
     try:
         return [load_run(state.place(item), state.mapping_of(state.place(item)), recognise=True)]

@@ -71,7 +71,7 @@ class Item(Brief):
 
     @property
     def standing(self) -> str:
-        """Why the file is stale, or which inputs are missing; empty where neither."""
+        """The reason why the file is stale, or its missing inputs; empty where neither."""
         return f"stale: {self.stale}" if self.stale else f"not there: {', '.join(self.missing)}" if self.missing else ""
 
 
@@ -108,12 +108,12 @@ class FolderState(Brief):
 
     def parents(self, item: Item) -> tuple[Source, ...]:
         """Return the parent of an extended model; empty for other files."""
-        return _sources(_named(item.body, "parent"), self.folder)
+        return _sources(_named_files(item.body, "parent"), self.folder)
 
     def mapping_of(self, log: Path) -> Path | None:
         """Return the mapping with which a model of a log was made; None where it names none."""
         for item in self.of_kind(MODEL):
-            sources = _sources(_named(item.body, "mapping"), self.folder)
+            sources = _sources(_named_files(item.body, "mapping"), self.folder)
             if sources and any(s.path == log.resolve() for s in item.sources):
                 return sources[0].path
         return None
@@ -132,16 +132,16 @@ def state_of(folder: Path, files: Sequence[Path] | None = None) -> FolderState:
     hashes = Hashes(folder, entries)
     wanted = None if files is None else {p.resolve() for p in files}
     unreadable: list[str] = []
-    sides = _sides(folder)
+    sides = _trials_inside(folder)
     found = (i for i in _items(folder, sides, unreadable) if wanted is None or (folder / i.path).resolve() in wanted)
     items = {i.path: replace(i, kind=SIMULATED) if _is_simulated(i, entries) else i for i in found}
     done: dict[str, Item] = {}
     for path in items:
-        _judge(path, items, done, hashes, folder)
+        _with_staleness(path, items, done, hashes, folder)
     return FolderState(folder, tuple(done[p] for p in items), entries, broken, tuple(unreadable), sides)
 
 
-def _sides(folder: Path) -> tuple[str, ...]:
+def _trials_inside(folder: Path) -> tuple[str, ...]:
     """Return the subfolders that are trials themselves, the one with the oldest files first."""
     names = (JOURNAL, LOGS, RUNS, MODELS)
     # os.path returns False for a folder that may not be read, and does not raise
@@ -191,11 +191,11 @@ def _own(path: Path, name: str, kind: str, folder: Path) -> Item:
         return Item(name, kind)
     body = read_yaml(path)
     check_kind(body, f"fieldsid/{kind}", path)
-    named = [*(body.get("inputs") or ()), *_named(body, "mapping"), *_named(body, "parent")]
+    named = [*(body.get("inputs") or ()), *_named_files(body, "mapping"), *_named_files(body, "parent")]
     return Item(name, kind, _sources(named, folder), body=body)
 
 
-def _named(body: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
+def _named_files(body: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
     return [] if body.get(key) is None else [body[key]]
 
 
@@ -230,28 +230,28 @@ def _is_planned(path: Path, folder: Path) -> bool:
 
 
 def _sources(named: Sequence[Mapping[str, Any]], folder: Path) -> tuple[Source, ...]:
-    return tuple(Source(e["path"], _found(e["path"], folder), e["sha256"]) for e in named)
+    return tuple(Source(e["path"], _path_of_named(e["path"], folder), e["sha256"]) for e in named)
 
 
-def _found(named: str, folder: Path) -> Path | None:
+def _path_of_named(named: str, folder: Path) -> Path | None:
     """Return the path of a file that was named relative to the folder, to its parent folder, or to the working folder."""
     # resolved first, as the parent of "." is not its path's parent
     there = first_allowed((folder / named, folder.resolve().parent / named, Path(named)), folder.resolve())
     return None if there is None else there.resolve()
 
 
-def _unknown(source: Source) -> str:
+def _name_of_missing(source: Source) -> str:
     """Return the name of an input that was not found."""
     return source.named if source.path is None else f"{source.named} (too large to be hashed)"
 
 
-def _judge(path: str, items: Mapping[str, Item], done: dict[str, Item], hashes: Hashes, folder: Path) -> Item:
+def _with_staleness(path: str, items: Mapping[str, Item], done: dict[str, Item], hashes: Hashes, folder: Path) -> Item:
     """Return the item with the reason why it is stale: an input has changed since, or is stale itself."""
     if path in done:
         return done[path]
     item = done[path] = items[path]  # set before the recursion, which thus ends at a file that names itself
     now = {s: hashes.of_named(s.path) for s in item.sources if s.path is not None and s.sha256}
-    missing = tuple(_unknown(s) for s in item.sources if s.path is None or (s in now and now[s] is None))
+    missing = tuple(_name_of_missing(s) for s in item.sources if s.path is None or (s in now and now[s] is None))
     because = ""
     for source in item.sources:
         if source.path is None or because:
@@ -259,7 +259,7 @@ def _judge(path: str, items: Mapping[str, Item], done: dict[str, Item], hashes: 
         name = relative_to(source.path, folder)
         if now.get(source) not in (None, source.sha256):
             because = f"{name} has changed"
-        elif name in items and _judge(name, items, done, hashes, folder).stale:
+        elif name in items and _with_staleness(name, items, done, hashes, folder).stale:
             because = f"{name} is stale"
     done[path] = replace(item, stale=because, missing=missing)
     return done[path]

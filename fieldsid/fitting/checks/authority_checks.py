@@ -1,4 +1,4 @@
-"""Why an authority is not significant: feedback, little excitation, correlation with other parameters, or a misfit.
+"""The cause of an authority that is not significant: feedback, little excitation, correlation with other parameters, or a misfit.
 
 The standard error of the authority is compared with what it would be without each cause:
     a controller moves the fin in response to the motion                         -> feedback

@@ -58,9 +58,9 @@ def closed_loop_note(record: Record) -> Iterator[Note]:
 def controller(record: Record) -> tuple[float, float, float, float] | None:
     """Return the share explained, gains on angle and rate (s), and delay (s) of the best controller; None where none fits."""
     best = (
-        _best(record, record.angle, TRIMMED_SHARE, MIN_MOVING_SHARE)
+        _best_controller(record, record.angle, TRIMMED_SHARE, MIN_MOVING_SHARE)
         if record.goal is None
-        else _best(record, _deviation_from_goal(record), 0.0, 0.0)
+        else _best_controller(record, _deviation_from_goal(record), 0.0, 0.0)
     )
     return None if best is None else (best[0].share, *best[0].gains, best[1])
 
@@ -80,7 +80,7 @@ def refuse_feedback_alone(records: Sequence[Record]) -> None:
 
 
 def _feedback_alone(record: Record) -> DataError | None:
-    best = _best(record, record.angle, 0.0, MIN_MOVING_SHARE)
+    best = _best_controller(record, record.angle, 0.0, MIN_MOVING_SHARE)
     if best is None or best[0].share < MIN_EXPLAINED_SHARE or not best[0].residual < MAX_NOISE_SHARE * best[0].noise:
         return None
     found, delay = best
@@ -108,7 +108,7 @@ def _deviation_from_goal(record: Record) -> FloatArray:
     return np.unwrap(np.asarray(off - 2.0 * np.pi * np.round(off / (2.0 * np.pi))))
 
 
-def _best(record: Record, angle: FloatArray, trimmed: float, moving: float) -> tuple[_Explained, float] | None:
+def _best_controller(record: Record, angle: FloatArray, trimmed: float, moving: float) -> tuple[_Regression, float] | None:
     """Return the best controller of an angle (n,) in rad with its delay in s; None where the regression is not possible."""
     if not record.angle_ok.all() or (record.rate_ok.any() and not record.rate_ok.all()):
         return None
@@ -120,12 +120,12 @@ def _best(record: Record, angle: FloatArray, trimmed: float, moving: float) -> t
         return None
     if np.mean(np.abs(moved) > 1e-3 * max(float(np.ptp(record.fin)), 1e-9)) < moving:
         return None
-    tried = [(_explained(record, angle, moved, width, lag, longest, trimmed), lag * step) for lag in range(longest + 1)]
+    tried = [(_regression(record, angle, moved, width, lag, longest, trimmed), lag * step) for lag in range(longest + 1)]
     return max(tried, key=lambda one: one[0].share)
 
 
 @dataclass(frozen=True, slots=True)
-class _Explained:
+class _Regression:
     """Share of the fin's changes explained, gains on angle and rate (s), residual variance, and least one under sensor noise."""
 
     share: float
@@ -134,9 +134,9 @@ class _Explained:
     noise: float
 
 
-def _explained(
+def _regression(
     record: Record, angle: FloatArray, moved: FloatArray, width: int, lag: int, longest: int, trimmed: float
-) -> _Explained:
+) -> _Regression:
     """Return the regression of the fin's changes on the motion `lag` samples earlier, without the share `trimmed` of largest."""
     target = moved[longest:]
     step = float(np.median(record.steps))
@@ -147,7 +147,7 @@ def _explained(
     free = (record.fin > record.fin.min()) & (record.fin < record.fin.max())
     free = (free[width:] & free[:-width])[longest:]
     if free.sum() < MIN_MOVING_SHARE * free.size or not (np.isfinite(columns).all() and np.isfinite(target).all()):
-        return _Explained(0.0, (0.0, 0.0), 0.0, 0.0)
+        return _Regression(0.0, (0.0, 0.0), 0.0, 0.0)
     keep = free & (np.abs(target) <= np.quantile(np.abs(target[free]), 1.0 - trimmed))
     gains = np.linalg.lstsq(columns[keep], target[keep], rcond=1e-9)[0]
     residual = target[keep] - columns[keep] @ gains
@@ -158,7 +158,7 @@ def _explained(
         noise = on_angle**2 * angle_variance + on_rate**2 * white_noise_std(record.rate, record.rate_ok) ** 2
     else:
         noise = ((on_angle + on_rate / step) ** 2 + (on_rate / step) ** 2) * angle_variance
-    return _Explained(
+    return _Regression(
         1.0 - float(residual @ residual) / power if power > 0.0 else 0.0,
         (on_angle, on_rate),
         max(float(np.mean(residual**2)) - last_digit(record.fin) ** 2 / 6.0, 0.0),

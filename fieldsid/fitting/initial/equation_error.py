@@ -77,7 +77,7 @@ def _windows_of(records: Sequence[Record], layout: ParameterLayout, values: Mapp
         path = fin_path(record, layout.effects, {layout.every[i]: float(x[i]) for i in own})
         block, target = integrated_windows(record, path, stiff=names.stiffness is not None)
         full = np.zeros((len(target), len(base)))
-        share = _share(groups.run_speeds[run], groups.speeds[groups.reference])
+        share = _speed_ratio(groups.run_speeds[run], groups.speeds[groups.reference])
         full[:, 0] = block[:, 0] * share
         if names.stiffness is not None:
             full[:, 1] = block[:, 1]
@@ -124,7 +124,7 @@ def _with_cross_state(records: Sequence[Record], layout: ParameterLayout, window
     for damping in np.geomspace(slot.low, slot.high, CROSS_DAMPINGS):
         column = [_cross_windows(r, layout, run, float(damping)) for run, r in enumerate(records)]
         full = np.column_stack([windows.matrix, np.concatenate(column)])
-        solution = _solved(full, windows.target)
+        solution = _scaled_least_squares(full, windows.target)
         cost = nine_digits(float(np.sum((windows.target - full @ solution) ** 2)))
         if cost < least:
             least = cost
@@ -135,12 +135,12 @@ def _with_cross_state(records: Sequence[Record], layout: ParameterLayout, window
 def _cross_windows(record: Record, layout: ParameterLayout, run: int, damping: float) -> FloatArray:
     """Return the column (m,) of a unit cross rate over the windows of a run."""
     groups = layout.groups
-    share = _share(groups.run_speeds[run], groups.speeds[groups.reference])
+    share = _speed_ratio(groups.run_speeds[run], groups.speeds[groups.reference])
     rate, ok = _rate(record)
     h, pace = record.steps, damping * share
     lagged = filtered(h, rate[:-1], rate[1:], pace)[:, 0] + rate[0] / pace * np.exp(-pace * (record.time - record.time[0]))
     sums = _integral(0.5 * (lagged[:-1] + lagged[1:]) * h)
-    count = _window(record)
+    count = _window_length(record)
     if len(record) <= count + 2:
         return np.zeros(0)
     return np.asarray(-(share**2) * (sums[count:] - sums[:-count])[_mostly_measured(ok, count)])
@@ -156,7 +156,7 @@ def _stable(matrix: FloatArray, target: FloatArray, length: float, *, stiff: boo
         rest = [i for i in range(matrix.shape[1]) if i not in fixed]
         solution = np.zeros(matrix.shape[1])
         solution[list(fixed)] = list(fixed.values())
-        solution[rest] = _solved(matrix[:, rest], target - matrix @ solution)
+        solution[rest] = _scaled_least_squares(matrix[:, rest], target - matrix @ solution)
         if 0 not in fixed and solution[0] <= 0.0:
             fixed[0] = FALLBACK_DAMPING
         elif stiff and 1 not in fixed and _growth_rate(solution[0], solution[1]) * length > np.log(MAX_GROWTH):
@@ -170,12 +170,12 @@ def _growth_rate(damping: float, stiffness: float) -> float:
     return 0.5 * (float(np.sqrt(max(damping**2 - 4.0 * stiffness, 0.0))) - damping)
 
 
-def _solved(matrix: FloatArray, target: FloatArray) -> FloatArray:
+def _scaled_least_squares(matrix: FloatArray, target: FloatArray) -> FloatArray:
     scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-12)
     return np.asarray(np.linalg.lstsq(matrix / scale, target, rcond=1e-10)[0] / scale)
 
 
-def _share(speed: float, reference: float) -> float:
+def _speed_ratio(speed: float, reference: float) -> float:
     ok = np.isfinite(speed) and np.isfinite(reference)
     return float(speed / reference) if ok else 1.0
 
@@ -187,7 +187,7 @@ def integrated_windows(record: Record, path: FinPath, *, stiff: bool) -> tuple[F
     angle = (
         np.interp(record.time, record.time[record.angle_ok], record.angle[record.angle_ok]) if record.angle_ok.any() else 0 * rate
     )
-    count = _window(record)
+    count = _window_length(record)
     if len(record) <= count + 2:
         return np.zeros((0, 4)), np.zeros(0)
     sums = [_integral(0.5 * (v[:-1] + v[1:]) * h) for v in (rate, angle)]
@@ -202,7 +202,7 @@ def integrated_windows(record: Record, path: FinPath, *, stiff: bool) -> tuple[F
     return block[good], target[good]
 
 
-def _window(record: Record) -> int:
+def _window_length(record: Record) -> int:
     """Return the samples of a window."""
     return max(2, round(INTEGRATION_WINDOW_S / float(np.median(record.steps))))
 

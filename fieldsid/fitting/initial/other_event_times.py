@@ -51,7 +51,7 @@ def starts_at_other_times(
             trial[event], low[event], high[event] = time, before, after
             own = _products(problem, trial, slot.run, noise, index)
             if own is not None:
-                cost, end = _stepped(trial, total - products[slot.run] + own, low, high)
+                cost, end = _bounded_trial(trial, total - products[slot.run] + own, low, high)
                 side = int(end[event] >= after and after < slot.high) - int(end[event] <= before and before > slot.low)
                 steps.append(_Step(nine_digits(cost), trial, end, side))
         low[event], high[event] = slot.low, slot.high
@@ -97,7 +97,7 @@ def _products(problem: Problem, x: FloatArray, run: int, noise: Noise, free: Seq
     return embedded
 
 
-def _stepped(x: FloatArray, products: FloatArray, low: FloatArray, high: FloatArray) -> tuple[float, FloatArray]:
+def _bounded_trial(x: FloatArray, products: FloatArray, low: FloatArray, high: FloatArray) -> tuple[float, FloatArray]:
     """Return the predicted cost after a Gauss-Newton step within bounds (N,), and the end of the step."""
     normal, gradient = products[1:, 1:], products[1:, 0]
     step = bounded_step(normal, gradient, SINGULAR_EIGENVALUE_SHARE, x, low, high)

@@ -1,4 +1,4 @@
-"""Normal equations of a long record piece by piece, so that its sensitivities never stand in memory at once."""
+"""Normal equations of a long record in chunks, so that its sensitivities are never in memory all at once."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CHUNK_SAMPLES = 20_000
 
 
 def is_chunked(problem: Problem, noise: Noise) -> bool:
-    """Whether a problem is long, and simple enough to be taken piece by piece: no sensor effect, extra state or own moment."""
+    """Whether a problem is long, and can be processed in chunks: without sensor effects, extra states and run moments."""
     simple = all(e.measure is None and e.moment is None and not e.extra_states for e in problem.layout.effects)
     return simple and is_white(noise) and max(len(r) for r in problem.records) > 2 * CHUNK_SAMPLES
 

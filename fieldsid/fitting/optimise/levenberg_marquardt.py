@@ -144,10 +144,10 @@ def levenberg_marquardt(
         count += 1
         stepped = ~events if hold else every
         within = np.where(stepped, low, x[index]), np.where(stepped, high, x[index])
-        trial, expected = _stepped(x, index, normal, gradient, dampings, within)
+        trial, expected = _bounded_trial(x, index, normal, gradient, dampings, within)
         if hold and not expected > tolerance * cost:
             hold, stepped = False, every
-            trial, expected = _stepped(x, index, normal, gradient, dampings, (low, high))
+            trial, expected = _bounded_trial(x, index, normal, gradient, dampings, (low, high))
         moved = trial[index] - x[index]
         if (
             0.0 <= expected <= tolerance * cost
@@ -178,7 +178,7 @@ def levenberg_marquardt(
     return Minimum(x, cost, normal, gradient, slots, count, done)
 
 
-def _stepped(
+def _bounded_trial(
     x: FloatArray,
     index: Sequence[int],
     normal: FloatArray,

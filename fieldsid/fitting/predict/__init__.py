@@ -1,1 +1,1 @@
-"""The free run of a model on a record, and how well it follows."""
+"""The free run of a model on a record, and its goodness of fit."""

@@ -1,4 +1,4 @@
-"""How well a free run follows its measurement: rms and fit of angle and rate, over one run or several."""
+"""Goodness of fit of a free run: rms residual and fit of angle and rate, over one run or several."""
 
 from __future__ import annotations
 

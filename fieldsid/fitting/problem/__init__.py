@@ -1,1 +1,1 @@
-"""What is estimated: the parameter vector, the free run and its sensitivities, the estimator's contract."""
+"""The estimation problem: the parameter vector, the free run and its sensitivities, the contract of an estimator."""

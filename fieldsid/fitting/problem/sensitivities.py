@@ -338,7 +338,7 @@ class Sensitivities:
             size = float(np.max(np.abs(direction)))
             step = 1e-6 / size if size > 0 else 1.0
             out[j] = _difference_quotient(
-                measured(_moved(motion, direction, step), self.record, [effect], self.values), shown, step
+                measured(_perturbed(motion, direction, step), self.record, [effect], self.values), shown, step
             )
         return out
 
@@ -378,5 +378,5 @@ def _difference_quotient(plus: Motion, minus: Motion, step: float) -> FloatArray
     return np.stack([plus.angle - minus.angle, plus.rate - minus.rate]) / step
 
 
-def _moved(motion: Motion, direction: FloatArray, step: float) -> Motion:
+def _perturbed(motion: Motion, direction: FloatArray, step: float) -> Motion:
     return Motion(motion.angle + step * direction[0], motion.rate + step * direction[1])

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fieldsid.reporting.material import MOST_RUNS, _chosen
+from fieldsid.reporting.material import MOST_RUNS, _selected_runs
 
 PLACES = [Path(f"runs/{kind}_{i}.parquet") for kind in ("circle", "pulses", "zigzag") for i in range(7)]
 
 
 def test_runs_that_judge_come_first_and_every_kind_is_there():
     fitted = {p.stem for p in PLACES} - {"pulses_3", "zigzag_5"}
-    chosen = _chosen(PLACES, fitted)
+    chosen = _selected_runs(PLACES, fitted)
     assert len(chosen) == len(set(chosen)) == MOST_RUNS
     assert [p.stem for p in chosen[:2]] == ["pulses_3", "zigzag_5"]
     assert chosen[2:] == sorted(chosen[2:])
@@ -20,5 +20,5 @@ def test_runs_that_judge_come_first_and_every_kind_is_there():
 
 
 def test_where_more_judge_than_are_drawn_the_first_of_them_are():
-    assert _chosen(PLACES, set()) == PLACES[:MOST_RUNS]
-    assert len(_chosen(PLACES, {p.stem for p in PLACES[11:]})) == MOST_RUNS
+    assert _selected_runs(PLACES, set()) == PLACES[:MOST_RUNS]
+    assert len(_selected_runs(PLACES, {p.stem for p in PLACES[11:]})) == MOST_RUNS

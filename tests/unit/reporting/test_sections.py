@@ -8,7 +8,7 @@ import pytest
 
 from fieldsid.comparison.compare import Channel, Comparison
 from fieldsid.comparison.metrics import Metrics
-from fieldsid.reporting.sections import _followed, _vehicle, _without_noise
+from fieldsid.reporting.sections import _channel_error, _vehicle, _without_noise
 from fieldsid.vehicle import vehicle_of
 
 
@@ -27,7 +27,7 @@ def run(name, over, fit):
 )
 def test_an_error_is_told_over_the_noise_where_there_is_some_and_else_as_the_fit(name, over, fit, says):
     found = run(name, over, fit)
-    assert _followed(found.worst_channel) == says
+    assert _channel_error(found.worst_channel) == says
     if over > 100.0:
         assert _without_noise([found], "1 run") == f"{says} on 1 run; the log has next to no noise"
 
