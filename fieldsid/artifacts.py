@@ -26,7 +26,7 @@ OWN_HANDLES = Path("/proc/self/fd")
 
 
 def check_output(path: Path, *, force: bool = False) -> None:
-    """Raise ArtifactError where a file cannot be written: it exists and `force` is false, or its folder is not writable."""
+    """Raise ArtifactError where a file cannot be written: it exists and `force` is false, or no folder is writable there."""
     if os.path.isdir(path):  # noqa: PTH112 - says no where a folder is closed, and does not raise
         raise ArtifactError(f"`{path}` is a folder, not a file", found="a folder", hint=f"name a file in it: `{path}/NAME`")
     if os.path.exists(path) and not force:  # noqa: PTH110 - says no where a folder is closed, and does not raise

@@ -56,10 +56,7 @@ def is_there(path: Path) -> bool:
 
 
 def first_allowed(places: Iterable[Path], trial: Path) -> Path | None:
-    """Return the first of the paths that exists in the folder that contains the trial, or in that of the working folder.
-
-    None where there is none. These folders include the trial and the working folder.
-    """
+    """Return the first path that exists within the parent folder of the trial or of the working folder; None without one."""
     allowed = [Path(os.path.abspath(p)).parent for p in (trial, Path())]  # noqa: PTH100 - a link counts where it lies
     for place in places:
         absolute = Path(os.path.abspath(place))  # noqa: PTH100

@@ -35,12 +35,22 @@ TAKES_ALL_RUNS = ("identify", "diagnose")
 
 def next_step(state: FolderState) -> tuple[str, str]:
     """Return the reason and the command to run next, ready to paste; the command is empty where nothing remains to be done."""
-    return (_remake_stale(state) or _compare_trials(state) or _data(state) or _model(state) or _use(state)) or DONE_ALL
+    return (
+        _remake_stale(state)
+        or _compare_trials(state)
+        or _import_logs(state)
+        or _identify_or_extend(state)
+        or _design_and_verify(state)
+    ) or DONE_ALL
 
 
 def step_before(command: str, state: FolderState) -> tuple[str, str]:
     """Return why a command has no input in this folder, and what to run first; empty where nothing would help."""
-    if command in ("schedule verify", "schedule export") and not state.of_kind("schedule") and (step := _use(state)) is not None:
+    if (
+        command in ("schedule verify", "schedule export")
+        and not state.of_kind("schedule")
+        and (step := _design_and_verify(state)) is not None
+    ):
         return step
     if command == "turn-radius" and state.models and not chosen_models(state, Axis.YAW.value):
         runs = [i for i in state.of_kind(RUN) if any(may_show(run, Axis.YAW) for run in _read_if_possible(state, i))]
@@ -112,10 +122,10 @@ def _compare_trials(state: FolderState) -> tuple[str, str] | None:
             return f"{side}: {why}", f"cd {shlex.quote(side)} && {line}"
     if len(state.sides) == 2 and not any(e.name == "compare" and set(state.sides) <= set(e.command) for e in state.entries):
         return f"{' and '.join(state.sides)} have models", _line("compare", *state.sides)
-    return _use(state) or DONE_ALL
+    return _design_and_verify(state) or DONE_ALL
 
 
-def _data(state: FolderState) -> tuple[str, str] | None:
+def _import_logs(state: FolderState) -> tuple[str, str] | None:
     runs, logs = state.of_kind(RUN), state.of_kind(LOG)
     if runs or state.of_kind(MODEL):
         return None
@@ -144,7 +154,7 @@ def _speeds(folder: Path) -> str:
     return ",".join(f"{s:g}" for s in (round(low, 2), round(0.5 * (low + high), 2), round(high, 2)) if s > 0)
 
 
-def _model(state: FolderState) -> tuple[str, str] | None:
+def _identify_or_extend(state: FolderState) -> tuple[str, str] | None:
     axis = _axis(state)
     if not state.of_kind(MODEL):
         runs = _unless_default(state, *run_words(state))
@@ -203,7 +213,7 @@ def _follow_up(state: FolderState, diagnosis: Entry | None) -> tuple[str, str] |
     return None
 
 
-def _use(state: FolderState) -> tuple[str, str] | None:
+def _design_and_verify(state: FolderState) -> tuple[str, str] | None:
     schedules = state.of_kind("schedule")
     models = chosen_models(state)
     design = ["schedule", "design", *_unless_default(state, *models), "-o"]
@@ -292,8 +302,8 @@ def trained_runs(state: FolderState, model: Item) -> list[str]:
 def diagnosed_runs(state: FolderState, model: Item) -> tuple[list[str], list[str]]:
     """Return the training and the validation runs for an addition to a model, as in the diagnosis that named it.
 
-    Without a diagnosis of the model's plane, or where one of its runs is missing, they are the runs to which the model was
-    fitted, so that runs an earlier addition used for validation stay in use.
+    Without a diagnosis of the model's plane, or where one of its runs is missing, the training runs are those to which the model
+    was fitted, and there are no validation runs.
     """
     made = state.newest(i for i in state.of_kind("diagnosis") if i.axis == model.axis)
     if made is not None:
