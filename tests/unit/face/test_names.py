@@ -96,7 +96,7 @@ def test_the_names_mypy_sees_are_the_names_that_are_loaded():
     (block,) = (n for n in tree.body if isinstance(n, ast.If))
     rooms = [n for n in block.body if isinstance(n, ast.ImportFrom) and n.module != "typing"]
     typed = {node.module: tuple(a.name for a in node.names) for node in rooms}
-    assert typed == fieldsid._ROOMS
+    assert typed == fieldsid._MODULES
     named = {name for names in typed.values() for name in names}
     assert {*named, "__version__"} == set(fieldsid.__all__)
     assert set(fieldsid.__all__) <= set(dir(fieldsid))
