@@ -35,7 +35,10 @@ def _possible(speeds: list[float]) -> list[float]:
 def _read(text: str) -> list[float]:
     try:
         if ":" in text:
-            low, high, step = (float(part) for part in text.split(":"))
+            parts = text.split(":")
+            if len(parts) != 3:
+                raise _wrong(text, f"{len(parts)} numbers, where low, high and step are needed")
+            low, high, step = map(float, parts)
             if not (0 < low <= high and step > 0):
                 raise _wrong(text, "low, high and step must be above zero, low below high")
             count = math.floor((high - low) / step + 1e-9) + 1

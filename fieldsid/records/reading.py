@@ -15,6 +15,7 @@ from copy import deepcopy
 from functools import lru_cache
 from pathlib import Path
 from shlex import quote
+from types import MappingProxyType
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -99,6 +100,17 @@ def yaml_mapping(text: str, path: Path) -> dict[str, Any]:
     return body
 
 
+MADE_BY: Mapping[str, str] = MappingProxyType(
+    {
+        "fieldsid/model": "`sysid identify RUN... -o models/`",
+        "fieldsid/fit": "`sysid fit MODEL... -o laws.yaml`",
+        "fieldsid/schedule": "`sysid schedule design MODEL... -o gains.yaml`",
+        "fieldsid/plan": "`sysid plan --axis yaw -o plan.yaml`",
+    }
+)
+"""The command that makes a kind of record."""
+
+
 def load_record(path: Path, kind: str) -> dict[str, Any]:
     """Read a record back and check that it is one of `kind` (`fieldsid/model` for `fieldsid/model/1`).
 
@@ -110,7 +122,7 @@ def load_record(path: Path, kind: str) -> dict[str, Any]:
         raise ArtifactError(
             f"`{path}` is not a {kind} file",
             found=f"schema: {shortened(schema)}",
-            hint=f"give a file with a line `schema: {kind}/1`",
+            hint=f"{MADE_BY[kind]} makes one" if kind in MADE_BY else f"give a file with a line `schema: {kind}/1`",
         )
     if schema != f"{kind}/1":
         number = schema.rpartition("/")[2]

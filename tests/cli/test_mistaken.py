@@ -71,3 +71,15 @@ def test_another_file_of_ours_for_a_mapping_or_a_vehicle_is_named(run_cli, here,
     answer = run_cli("identify", "run7.csv", "--axis", "yaw", option, "truth.yaml")
     assert answer.code == 2
     assert "`truth.yaml` is another kind of file\n  found: schema: fieldsid/model/1" in answer.err
+
+
+def test_a_model_given_for_a_schedule_is_led_to_what_makes_one(run_cli, here):
+    answer = run_cli("schedule", "verify", "truth.yaml")
+    assert answer.code == 2
+    assert answer.err.endswith("\nhint: `sysid schedule design MODEL... -o gains.yaml` makes one\n")
+
+
+def test_speeds_of_two_numbers_are_told_what_a_range_takes(run_cli, here):
+    answer = run_cli("turn-radius", "truth.yaml", "--speeds", "1:2")
+    assert answer.code == 2
+    assert "found: 2 numbers, where low, high and step are needed" in answer.err

@@ -16,7 +16,7 @@ from fieldsid.logs.channels import ATTITUDE, COMBINED, ChannelMap, Source
 from fieldsid.logs.convert.number_cells import as_numbers
 from fieldsid.logs.convert.times.time_column import seconds_of, seconds_of_parts
 from fieldsid.logs.few_of import few_of
-from fieldsid.logs.mapping.canonical_names import Canonical, canonical, unit_in_name, words_of
+from fieldsid.logs.mapping.canonical_names import Canonical, canonical, stated_unit, unit_in_name, words_of
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import RawLog, ReadOptions, Samples, Series
@@ -153,9 +153,19 @@ def series_of(path: Path, columns: Columns, mapping: ChannelMap, notes: tuple[No
         values = numbers[0] if len(numbers) == 1 else np.stack(numbers, axis=1)
         label = ", ".join(columns.name(i) for i in picked)
         unit = None if signal in COMBINED else columns.unit(picked[0], signal)
+        bad += _contradicted(columns, picked[0], signal, source.unit or unit) if mapping.origin is None else []
         series[signal] = Series(time, values, label, unit, label.strip().lower() == "z")
     ignored = _ignored(columns, mapping)
     return RawLog(stem_of(path), series, (*notes, *time_notes, *bad, *ignored))
+
+
+def _contradicted(columns: Columns, index: int, signal: str, unit: str | None) -> list[Note]:
+    """Return the note that the row of units below a column's name states another unit than the one it is taken in."""
+    below = stated_unit(columns.units[index], signal) if columns.units else None
+    if below is None or unit is None or below == unit:
+        return []
+    message = f"{signal} is taken in {unit}, and the row of units says {below}: set its unit, `unit: {below}` where that is right"
+    return [Note("unit", message, {"signal": signal, "unit": below})]
 
 
 def _check_source(path: Path, signal: str, source: Source) -> None:

@@ -267,3 +267,13 @@ def test_any_text_has_a_form_or_none(tmp_path_factory, text):
 def test_cells_lose_blanks_and_quotes():
     assert cells(' "a" , b ,', ",") == ["a", "b", ""]
     assert cells("  1   2\t3 ", "whitespace") == ["1", "2", "3"]
+
+
+def test_a_row_of_units_that_says_another_unit_than_the_name_is_told(tmp_path):
+    rows = [f"{0.1 * i},{0.01 * i},{0.1 * (-1) ** i}" for i in range(100)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["time_s,yaw_rad,rudder_rad", "s,deg,rad", *rows]) + "\n")
+    (note,) = [n for n in load_run(path).notes if n.code == "unit"]
+    assert note.message.startswith("yaw_rad is taken in rad, and the row of units says deg")
+    path.write_text(path.read_text().replace("s,deg,rad", "s,rad,rad"))
+    assert "unit" not in {n.code for n in load_run(path).notes}
