@@ -17,7 +17,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.scalarstring import LiteralScalarString
 
 from fieldsid._version import __version__
-from fieldsid.errors import ArtifactError
+from fieldsid.errors import FULL, MAKE_ROOM, ArtifactError
 from fieldsid.records.keys import body_of, has_keys
 from fieldsid.records.named_inputs import sha256_of
 
@@ -64,7 +64,7 @@ def replacing(path: Path, *, force: bool = False) -> Iterator[Path]:
         raise ArtifactError(
             f"`{path}` cannot be written: {error.strerror or error}",
             found=f"folder `{path.parent}`",
-            hint="name a place that can be written",
+            hint=MAKE_ROOM if error.errno in FULL else "name a place that can be written",
         ) from error
 
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 from reprlib import Repr
 
 from fieldsid.text.one_line import one_line
 
 FOUND = "  found: "
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Error numbers of the system where a disk, or a user's quota, is full."""
+MAKE_ROOM = "make room, and run it again"
 _SHORT = Repr()
 _SHORT.maxlevel, _SHORT.maxlist, _SHORT.maxdict = 2, 3, 3
 _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 80

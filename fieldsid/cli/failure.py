@@ -17,10 +17,7 @@ import typer
 from fieldsid._version import __version__
 from fieldsid.cli.exit_codes import BAD_INPUT, INTERRUPTED, OUR_BUG
 from fieldsid.cli.help.command_page import EXAMPLE
-from fieldsid.errors import FieldsidError, UsageError
-
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Error numbers of the system where a disk, or a user's quota, is full."""
+from fieldsid.errors import FULL, MAKE_ROOM, FieldsidError, UsageError
 
 CLOSED = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EISDIR, errno.EIO)
 """Error numbers of the system where a path cannot be read or written."""
@@ -120,7 +117,7 @@ def _not_given(words: str, arguments: Sequence[str], command: str) -> UsageError
 def _as_full(error: OSError) -> UsageError:
     """Say where nothing more could be written; a file of ours that was being written there is not left behind."""
     where = f"`{error.filename}`" if error.filename else "standard output, or the folder for temporary files"
-    return UsageError("there is no room left to write", found=f"{where}: {error.strerror}", hint="make room, and run it again")
+    return UsageError("there is no room left to write", found=f"{where}: {error.strerror}", hint=MAKE_ROOM)
 
 
 def _save_trace(error: Exception, arguments: Sequence[str]) -> Path:
