@@ -1,4 +1,4 @@
-"""The program: finds the command, runs it, and is the one place where errors are caught and become exit codes."""
+"""The program: it finds the command and runs it. Errors are caught here alone, and become exit codes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 os.environ.setdefault("MATPLOTLIBRC", os.devnull)
 
 JOURNAL = "journal.jsonl"
-"""The file that marks a trial folder, as `fieldsid/trial_folder/journal.py` has it: known here without its imports."""
+"""The file that marks a trial folder, named as in `fieldsid/trial_folder/journal.py`, whose imports would cost time here."""
 GC_THRESHOLD = 50_000
 """Objects allocated between two runs of the garbage collector. Imports and compilation allocate millions that stay: at
 Python's own threshold the collector takes a fifth of the time of compiling, a twentieth of a tour."""
@@ -34,12 +34,13 @@ Python's own threshold the collector takes a fifth of the time of compiling, a t
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command line and return its exit code; data go to stdout, all else to stderr."""
     try:
-        return _answered(list(sys.argv[1:] if argv is None else argv))
+        return _run_guarded(list(sys.argv[1:] if argv is None else argv))
     finally:
-        _forget_voice()
+        _reset_voice()
 
 
-def _answered(arguments: list[str]) -> int:
+def _run_guarded(arguments: list[str]) -> int:
+    """Run one command line and return its exit code; every error is printed."""
     raised: Exception | None = None
     try:
         code = _dispatch(arguments)
@@ -51,12 +52,12 @@ def _answered(arguments: list[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         code = DONE
     except Exception as error:  # noqa: BLE001 - the one boundary: every error becomes a message and an exit code
-        if meet_interrupt():  # and what it hit was left half done
+        if meet_interrupt():  # the error is a consequence of the interrupt
             return _interrupted()
         from fieldsid.cli.failure import explain
 
         code, raised = explain(error, arguments), error
-    _tell_refused(raised)
+    _warn_of_refused(raised)
     return code
 
 
@@ -72,12 +73,12 @@ def entry() -> Never:
     heed_interrupts()
     can_answer = have_streams()
     codes: list[int] = []
-    atexit.register(_end, codes)  # what is registered first is called last
-    codes.append(main() if can_answer else _refused_output())
+    atexit.register(_end, codes)  # the first one registered is called last
+    codes.append(main() if can_answer else _refuse_closed_output())
     sys.exit(codes[0])
 
 
-def _refused_output() -> int:
+def _refuse_closed_output() -> int:
     from fieldsid.cli.failure import explain
     from fieldsid.errors import UsageError
 
@@ -90,41 +91,42 @@ def _end(codes: list[int]) -> None:
     try:
         sys.stdout.flush()
         sys.stderr.flush()
-    except OSError:  # Python says what could not be written
+    except OSError:  # Python reports what could not be written
         return
     for code in codes:
         os._exit(code)
 
 
 def run(arguments: Sequence[str], session: Session | None = None) -> Any:
-    """Run one command in this process and return what it returns; session: what it shares with other commands.
+    """Run one command in this process and return its result; session: what it shares with the other commands of a tour.
 
-    Raises UsageError for an unknown command, KeyboardInterrupt, BrokenPipeError where who reads the output has gone away, and
-    whatever the command raises.
+    Raises UsageError for an unknown command, KeyboardInterrupt, BrokenPipeError where the reader of the output has gone away,
+    and whatever the command raises.
     """
     from fieldsid.cli.programs import program_of
 
     program, words, name = program_of(arguments)
     from fieldsid.cli.headlines.typed import remember
-    from fieldsid.cli.session import part_of
+    from fieldsid.cli.session import in_session
     from fieldsid.cli.user_effects import load_own_effects
 
     remember(arguments)
     if "--help" not in arguments:
         load_own_effects()
     try:
-        with part_of(session):
+        with in_session(session):
             result = program(words, prog_name=name, standalone_mode=False)
     except SystemExit as end:
-        if isinstance(end.__context__, BrokenPipeError):  # typer makes an exit of it
+        if isinstance(end.__context__, BrokenPipeError):  # typer has turned it into an exit
             raise end.__context__ from None
         raise
-    if result == INTERRUPTED:  # typer makes a number of it
+    if result == INTERRUPTED:  # typer has turned it into a number
         raise KeyboardInterrupt
     return result
 
 
 def _dispatch(arguments: list[str]) -> int:
+    """Answer `--help`, `--version` and `--install-completion`, or run the command, in a trial folder with its journal."""
     if not arguments or arguments[0] in {"--help", "-h", "help"}:
         from fieldsid.cli.help.catalogue import entries
         from fieldsid.cli.help.help_page import front_page
@@ -163,7 +165,7 @@ def _dispatch(arguments: list[str]) -> int:
 
 
 def _enter_folder() -> None:
-    """Check that the working folder is there, and load what would take settings from a file in it; raises UsageError."""
+    """Raise UsageError where the working folder is gone; load matplotlib from elsewhere where it would read a file of it."""
     try:
         os.getcwd()  # noqa: PTH109 - no import
     except OSError as error:
@@ -171,7 +173,7 @@ def _enter_folder() -> None:
 
         found = os.environ.get("PWD", "no folder")
         raise UsageError("the working folder is no longer there", found=found, hint="`cd` to one that is") from error
-    if os.path.lexists("matplotlibrc"):  # no way to tell matplotlib not to look for it
+    if os.path.lexists("matplotlibrc"):  # matplotlib cannot be told to ignore it
         from contextlib import chdir
         from importlib import import_module
 
@@ -179,16 +181,16 @@ def _enter_folder() -> None:
             import_module("fieldsid.figures.canvas")
 
 
-def _forget_voice() -> None:
-    """Let `--quiet` and `--deg` of this command line say nothing of what the process prints next."""
+def _reset_voice() -> None:
+    """Reset the voice, so that `--quiet` and `--deg` of this command line do not apply to the next one of the process."""
     if "fieldsid.cli.voice" in sys.modules:
         from fieldsid.cli.voice import take
 
         take(())
 
 
-def _tell_refused(raised: Exception | None) -> None:
-    """Say once, at the end of a command, which effects and plug-ins took no part and why; not what was raised already."""
+def _warn_of_refused(raised: Exception | None) -> None:
+    """Print at the end of a command which effects and plug-ins were not used and why, without the error raised already."""
     if "fieldsid.registry" not in sys.modules:
         return
     from fieldsid.registry import refused

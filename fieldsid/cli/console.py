@@ -1,7 +1,7 @@
 """What commands print: data to stdout, messages to stderr, one JSON object on demand, tables that fit 80 columns.
 
-The one way to a terminal: what is printed, and the cell of a table, is a line of plain text and no markup, and control codes are
-shown, whatever names of others it holds.
+Everything that goes to a terminal passes through here. Text, and the cell of a table, is plain text without markup, and control
+codes in it are made visible: names in a log may contain anything.
 """
 
 from __future__ import annotations
@@ -32,24 +32,24 @@ from fieldsid.text.one_line import one_line
 
 T = TypeVar("T")
 WIDTH = 80
-_SAID: ContextVar[str] = ContextVar("said", default="")
+_VERDICT: ContextVar[str] = ContextVar("verdict", default="")
 NARROW, FAR, LEAST_WORDS = 60, 1000, 12
-"""Columns of a terminal below which a table that does not fit is shown row by row, those in which any table fits, and those
-that a column of words is folded down to."""
+"""Widths in characters: below NARROW a table that does not fit is shown row by row; in FAR any table fits; a column of words is
+folded down to LEAST_WORDS."""
 
 
 class Terminal(Console):
-    """A console that takes text for what it is: no markup, no emoji by name, no highlights, no control codes but its own."""
+    """A console that prints text literally: no markup, no emoji by name, no highlights, no control codes but its own."""
 
     def render_str(self, text: str, **given: Any) -> Text:
-        """Return a text that is printed, or a table's cell, as one line of printable characters."""
+        """Return a printed text, or the cell of a table, as one line of printable characters."""
         return super().render_str(one_line(text), **given)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Yield the pieces of whatever is shown, with the control codes in its words made printable."""
+        """Yield the segments of a renderable, with the control codes in its text made printable."""
         for piece in super().render(renderable, options):
-            whole = piece.control or piece.text.isprintable() or piece.text == "\n"
-            yield piece if whole else Segment("\n".join(map(one_line, piece.text.split("\n"))), piece.style)
+            is_safe = piece.control or piece.text.isprintable() or piece.text == "\n"
+            yield piece if is_safe else Segment("\n".join(map(one_line, piece.text.split("\n"))), piece.style)
 
 
 def words(text: str, style: str = "") -> Text:
@@ -58,36 +58,36 @@ def words(text: str, style: str = "") -> Text:
 
 
 def out() -> Console:
-    """Return the console of the data; made at each call so that it follows a redirected stdout."""
+    """Return the console for data; it is made at each call, so that it follows a redirected stdout."""
     return _console(stderr=False)
 
 
 def messages() -> Console:
-    """Return the console of everything else."""
+    """Return the console for messages, on stderr."""
     return _console(stderr=True)
 
 
 def emit(
-    told: Result | Mapping[str, Any],
+    result: Result | Mapping[str, Any],
     *,
     render: Page | Callable[[Console], None],
     headline: Headline | None = None,
     notes: Iterable[Note] = (),
     is_file: bool = False,
 ) -> Mapping[str, Any]:
-    """Print a result, or its body, and return that: as one JSON object, or for a reader.
+    """Print a result, or the JSON body of one, and return the body with the headline: as one JSON object, or as text.
 
-    A reader gets the headline, then the notes as warnings, then the page that `render` is, or what it prints; where it is to be
-    quiet, the headline alone. Only what is no result, as a page of the guide, has no headline. Where what `render` prints
-    `is_file`, to be redirected to one, the headline goes to stderr, and the file is what is left where it is to be quiet.
+    As text: the headline, then the notes as warnings, then `render`, which is a page or a function that prints; with `--quiet`
+    the headline alone. A page of the guide, which is no result, has no headline. is_file: `render` prints the text of a file, to
+    be redirected to one; then the headline goes to stderr, and `--quiet` leaves it out and not the text.
     """
     if headline is not None:
-        _SAID.set(headline.says)
-    body = body_of(told) if isinstance(told, Result) else told
-    whole = body if headline is None else {**body, "headline": body_of(headline)}
+        _VERDICT.set(headline.says)
+    body = body_of(result) if isinstance(result, Result) else result
+    body = body if headline is None else {**body, "headline": body_of(headline)}
     if voice().is_json:
-        sys.stdout.write(json.dumps(plain(whole), allow_nan=False) + "\n")
-        return whole
+        sys.stdout.write(json.dumps(plain(body), allow_nan=False) + "\n")
+        return body
     to = out()
     if headline is not None and is_file:
         for line in headline.lines:
@@ -95,7 +95,7 @@ def emit(
     elif headline is not None:
         print_headline(to, headline)
         if voice().is_quiet:
-            return whole
+            return body
         warn(notes)
         to.print()
         for rest in headline.rest:
@@ -104,25 +104,25 @@ def emit(
         print_page(to, render)
     else:
         render(to)
-    return whole
+    return body
 
 
-def said() -> str:
-    """Return the verdict of the last result, and forget it."""
-    verdict = _SAID.get()
-    _SAID.set("")
+def take_verdict() -> str:
+    """Return the verdict of the last result that was printed, and clear it; empty where there was none."""
+    verdict = _VERDICT.get()
+    _VERDICT.set("")
     return verdict
 
 
 def print_headline(to: Console, headline: Headline) -> None:
-    """Print the first lines of a result, each whole on a line of its own: they are read, and pasted."""
+    """Print the first lines of a result, each on one line however long: the last is pasted."""
     for i, line in enumerate(headline.lines):
         to.print(words(line, "bold" if i == 0 else ""), soft_wrap=True)
     to.file.flush()
 
 
 def print_file(to: Console, text: str) -> None:
-    """Print the text of a file: byte for byte where it is redirected to one, line by line to a terminal."""
+    """Print the text of a file: unchanged where it is redirected to a file, else line by line as plain text."""
     if not to.is_terminal:
         to.file.write(text)
         return
@@ -131,27 +131,27 @@ def print_file(to: Console, text: str) -> None:
 
 
 def print_page(to: Console, page: Page) -> None:
-    """Print the blocks and sentences of a page: the first lines of the result stand for its title and warnings."""
+    """Print the blocks and sentences of a page, without its title and warnings: the headline has taken their place."""
     for i, block in enumerate(filter(has_content, page.blocks)):
         if i and (isinstance(block, Block) or block.startswith("\n")):
             to.print()
         if isinstance(block, Block):
             to.print(table(block), crop=False)
             continue
-        said = one_line(block.removeprefix("\n"))
-        for line in [said] if isinstance(block, Whole) else folded(said, to.width, rest="").split("\n"):
+        sentence = one_line(block.removeprefix("\n"))
+        for line in [sentence] if isinstance(block, Whole) else folded(sentence, to.width, rest="").split("\n"):
             to.print(line, soft_wrap=True)
     for line in page.closing:
         to.print(line, soft_wrap=True)
 
 
 class Rows(Table):
-    """A table that is shown row by row, a line for each cell, where its numbers or names do not fit: no line ends within one."""
+    """A table that is shown row by row, a line for each cell, where its columns do not fit: no number or name is broken."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """Yield the table where it fits, if with one blank between columns, or on a page not narrow with its words folded."""
+        """Yield the table where it fits: with one blank between columns, or, where NARROW or wider, with its words folded."""
         for line in folded(one_line(str(self.title)), options.max_width, rest="").split("\n") if self.title else ():
-            yield _whole(words(line, "bold"))
+            yield _unfolded(words(line, "bold"))
         shown, far = copy(self), options.update(max_width=FAR)
         shown.title = None
         wanted = Measurement.get(console, far, shown).maximum
@@ -167,26 +167,26 @@ class Rows(Table):
         for row in zip(*(column.cells for column in self.columns), strict=True):
             for head, cell in zip(heads, map(str, row), strict=True):
                 for i, line in enumerate(folded(one_line(cell), options.max_width - wide, rest="").split("\n") if cell else ()):
-                    yield _whole(words(f"{'' if i else head:<{wide}}", "dim").append_text(words(line)))
+                    yield _unfolded(words(f"{'' if i else head:<{wide}}", "dim").append_text(words(line)))
             yield ""
 
     @staticmethod
     def _least(console: Console, far: ConsoleOptions, column: Column) -> int:
-        """Return the columns of a terminal that one of the table takes at least: all of a number, a word or a name of words."""
+        """Return the least width of a column in characters: that of its longest number, or of its longest word."""
         cells = Measurement.get(console, far, Group(column.header, *column.cells))
         if column.width is not None:
             return column.width
         return cells.maximum if column.no_wrap else max(cells.minimum, min(cells.maximum, LEAST_WORDS))
 
 
-def _whole(line: Text) -> Text:
-    """Return a line that no page cuts or folds."""
+def _unfolded(line: Text) -> Text:
+    """Mark a line as one that is neither cut nor folded, and return it."""
     line.no_wrap, line.overflow = True, "ignore"
     return line
 
 
 def table(block: Block) -> Table:
-    """Return the table of a block: its columns behind those of words are to the right, and whole if of numbers."""
+    """Return the table of a block: the first `left` columns to the left, the others to the right, numbers never folded."""
     block = dense(block)
     made = Rows(
         title=block.title or None,
@@ -198,9 +198,9 @@ def table(block: Block) -> Table:
         show_header=any(block.columns),
     )
     for i, column in enumerate(block.columns or [""] * len(block.rows[0])):
-        whole = i >= block.left and any(_is_number(cell) for row in block.rows for cell in row[i : i + 1])
+        has_numbers = i >= block.left and any(_is_number(cell) for row in block.rows for cell in row[i : i + 1])
         side: JustifyMethod = "left" if i < block.left else "right"
-        made.add_column(column, justify=side, header_style="dim", overflow="fold", no_wrap=whole)
+        made.add_column(column, justify=side, header_style="dim", overflow="fold", no_wrap=has_numbers)
     if block.kept:
         made.columns[0].width = min(max(len(row[0]) for row in block.rows), block.kept)
     for row in block.rows:
@@ -213,63 +213,63 @@ def _is_number(cell: str) -> bool:
 
 
 def say(text: str) -> None:
-    """Print a message on stderr, unless the command is to be quiet."""
+    """Print a message on stderr; nothing with `--quiet`."""
     if not voice().is_quiet:
         complain(text)
 
 
 def complain(*lines: str) -> None:
-    """Print on stderr what makes the exit code other than 0, however quiet the command is to be."""
+    """Print on stderr why the exit code is not 0, also with `--quiet`."""
     for line in lines:
         messages().print(words(line), soft_wrap=True)
 
 
 def warn(notes: Iterable[Note], *, of: str = "") -> None:
-    """Print warnings on stderr, each with its code; on a terminal a line each, whole with `-v`; none where it is to be quiet."""
+    """Print warnings on stderr, each with its code: shortened to a line on a terminal, in full with `-v`, none with `--quiet`."""
     if voice().is_quiet:
         return
     where, to = f"{of}: " if of else "", messages()
     for note in notes:
-        said = f"{where}{note.message} [{note.code}]"
-        to.print(words(f"warning: {shortened(said, to.width) if to.is_terminal else said}", "yellow"), soft_wrap=True)
+        text = f"{where}{note.message} [{note.code}]"
+        to.print(words(f"warning: {shortened(text, to.width) if to.is_terminal else text}", "yellow"), soft_wrap=True)
 
 
-def alike(found: Iterable[tuple[Hashable, str, Note]]) -> list[Note]:
-    """Return one warning of each kind, that of the first run that has it and how many more have it.
+def one_of_each_kind(found: Iterable[tuple[Hashable, str, Note]]) -> list[Note]:
+    """Return one warning of each kind: that of the first run that has it, with the number of the others.
 
-    `found` gives of each its kind, whose it is, and the note.
+    found: of each warning its kind, the name of its run, and the note.
     """
     kinds: dict[Hashable, list[tuple[str, Note]]] = {}
-    for kind, whose, note in found:
-        kinds.setdefault(kind, []).append((whose, note))
-    said = []
-    for (whose, note), *others in kinds.values():
+    for kind, run, note in found:
+        kinds.setdefault(kind, []).append((run, note))
+    merged = []
+    for (run, note), *others in kinds.values():
         more = f" (and {len(others)} more like it)" if others else ""
-        of = "" if whose in note.message else f"{whose}: "
-        said.append(Note(note.code, f"{of}{note.message}{more}", {}))
-    return said
+        of = "" if run in note.message else f"{run}: "
+        merged.append(Note(note.code, f"{of}{note.message}{more}", {}))
+    return merged
 
 
 def shortened(text: str, width: int) -> str:
-    """Return a warning as it fits a line behind `warning: `, its code kept; whole with `-v`."""
+    """Return a warning shortened to a line behind `warning: `, with its code; unchanged with `-v`."""
     room = width - len("warning: ")
     if voice().is_verbose or len(text) <= room:
         return text
-    words, _, code = text.rpartition(" [")
+    message, _, code = text.rpartition(" [")
     end = f" ... [{code} -v"
-    return f"{words[: max(room - len(end), 20)].rstrip()}{end}"
+    return f"{message[: max(room - len(end), 20)].rstrip()}{end}"
 
 
 @contextmanager
 def progress(says: str, total: int) -> Iterator[Callable[[], None]]:
-    """Yield a function that moves a bar on by one; the bar is drawn on stderr, and only on a terminal."""
+    """Yield a function that advances a progress bar by one; the bar is drawn on stderr, and only on a terminal."""
     with _bar(TextColumn("{task.completed}/{task.total}")) as bar:
         task = bar.add_task(says, total=total)
         yield lambda: bar.advance(task)
 
 
 def tracked(items: Sequence[T], says: str) -> Iterator[tuple[T, Callable[[float], None]]]:
-    """Yield the items while a bar on a terminal shows how far it is, each with a function that tells how much of it is done."""
+    """Yield each item with a function that sets the share of it that is done; a bar on a terminal shows the progress."""
     with _bar(TaskProgressColumn()) as bar:
         task = bar.add_task(says, total=len(items))
         for i, item in enumerate(items):
@@ -278,7 +278,7 @@ def tracked(items: Sequence[T], says: str) -> Iterator[tuple[T, Callable[[float]
 
 
 def shows_progress(console: Console) -> bool:
-    """Whether what is under way is drawn: on a terminal, unless the command is to be quiet."""
+    """Whether progress is drawn: on a terminal, unless with `--quiet`."""
     return console.is_terminal and not voice().is_quiet
 
 

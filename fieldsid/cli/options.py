@@ -11,16 +11,16 @@ from fieldsid.models.axis import Axis
 
 READ, LIMITS, WRITTEN, ANSWER = "What is read", "Limits", "What is written", "How it answers"
 GROUPS = ("Arguments", "Options", READ, LIMITS, WRITTEN, ANSWER)
-"""The groups of options on a command's page of help, in their order; what a command alone has may have groups of its own."""
+"""Groups of options on a command's page of help, in their order; a command may add groups for the options that only it has."""
 
 
 def argument(metavar: str, says: str) -> Any:
-    """Return an argument: what stands for it on the page of help, and what it is."""
+    """Return an argument; metavar: its placeholder on the page of help, says: its description."""
     return typer.Argument(metavar=metavar, help=says)
 
 
 def option(names: str, metavar: str, says: str, group: str | None = None, **bounds: float) -> Any:
-    """Return an option: its names, what stands for its value, what it does, its group, and the bounds `min` and `max`."""
+    """Return an option; metavar: the placeholder of its value, says: its description, bounds: `min` and `max` of its value."""
     return typer.Option(*names.split(), metavar=metavar or None, help=says, rich_help_panel=group, **bounds)  # type: ignore[arg-type]
 
 

@@ -1,4 +1,4 @@
-"""A command line as the program that parses it: one Typer application for the command that its first word names."""
+"""The program that parses a command line: one Typer application for the command that its first word names."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ if TYPE_CHECKING:
     import typer
 
 
-ONCE_NAMED = {"--rudder-max": "--fin-max", "--fin-limit": "--fin-max"}
-"""Options by the names they had when each command had its own: still understood, and named nowhere."""
+FORMER_NAMES = {"--rudder-max": "--fin-max", "--fin-limit": "--fin-max"}
+"""Former names of options, each with its present one: they are still understood, and documented nowhere."""
 
 
 def program_of(arguments: Sequence[str]) -> tuple[typer.Typer, list[str], str]:
-    """Return the program of a command, the words it takes, and the name it goes by; raises UsageError for an unknown command."""
+    """Return the program of a command, the words to give it, and its name in messages; raises UsageError where unknown."""
     from fieldsid.cli.help.catalogue import entries
 
     known, name = entries(), arguments[0]
-    arguments = [name, *(_as_named_now(word) for word in arguments[1:] if word != JSON)]
+    arguments = [name, *(_with_present_name(word) for word in arguments[1:] if word != JSON)]
     if name not in known:
         raise _unknown(name, tuple(known))
     import typer
@@ -39,9 +39,9 @@ def program_of(arguments: Sequence[str]) -> tuple[typer.Typer, list[str], str]:
     return program, arguments[1:], f"sysid {name}"
 
 
-def _as_named_now(word: str) -> str:
+def _with_present_name(word: str) -> str:
     name, equals, value = word.partition("=")
-    return f"{ONCE_NAMED.get(name, name)}{equals}{value}"
+    return f"{FORMER_NAMES.get(name, name)}{equals}{value}"
 
 
 def _unknown(name: str, known: tuple[str, ...]) -> Exception:

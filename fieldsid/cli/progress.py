@@ -1,4 +1,4 @@
-"""For commands that take seconds: an output that exists is refused before the work, and a terminal shows the progress."""
+"""For commands that take seconds: an existing output is refused before the work, and a terminal shows the progress."""
 
 from __future__ import annotations
 
@@ -20,23 +20,20 @@ if TYPE_CHECKING:
     from fieldsid.fitting.jit_warmup import Warmup
 
 FILES = (".yaml", ".yml", ".json", ".csv", ".parquet")
-"""How the files end that commands write: no folder is meant by such a name."""
+"""Suffixes of the files that commands write: a path that ends so is not meant as a folder."""
 LINE_EVERY_S = 5.0
 """Seconds between two lines of progress where standard error is no terminal."""
 
 
 def refuse_existing(*paths: Path | None, force: bool) -> None:
-    """Refuse outputs that exist, or cannot be written, before the work is done and not after it; raises ArtifactError."""
+    """Raise ArtifactError for an output that exists or cannot be written; called before the work and not after it."""
     for path in paths:
         if path is not None:
             check_output(path, force=force)
 
 
 def refuse_closed(folder: Path | None) -> None:
-    """Refuse a folder that nothing can be written to, or with the name of a file, before the work is done and not after it.
-
-    Raises ArtifactError or UsageError.
-    """
+    """Raise ArtifactError for a folder that cannot be written to, UsageError for the name of a file; called before the work."""
     from fieldsid.figures.kinds import is_figure
 
     if folder is not None and (is_figure(folder) or folder.suffix in FILES) and not folder.is_dir():
@@ -50,7 +47,7 @@ def refuse_closed(folder: Path | None) -> None:
 
 
 def refuse_place(output: Path | None, *, force: bool) -> None:
-    """Refuse what figures cannot be written to, a folder or a figure's name, as `refuse_closed` and `refuse_figure` do."""
+    """Raise an error for a place that figures cannot be written to: a file name as `refuse_figure` does, else `refuse_closed`."""
     from fieldsid.figures.kinds import is_figure
 
     if output is not None and is_figure(output):
@@ -60,7 +57,7 @@ def refuse_place(output: Path | None, *, force: bool) -> None:
 
 
 def refuse_figure(path: Path | None, *, force: bool) -> None:
-    """Refuse a figure's file that exists, or of a kind that is not drawn, before the work; raises ArtifactError or UsageError."""
+    """Raise ArtifactError for a figure file that exists, UsageError for a suffix of no figure; called before the work."""
     from fieldsid.figures.kinds import kind_of
 
     if path is not None:
@@ -70,34 +67,35 @@ def refuse_figure(path: Path | None, *, force: bool) -> None:
 
 @contextmanager
 def trying(says: str) -> Iterator[Callable[[str], None]]:
-    """Yield a function that shows what is being tried, on stderr: on a terminal as it goes, elsewhere in a line now and then."""
+    """Yield a function that shows on stderr what is being tried: on a terminal at once, elsewhere every LINE_EVERY_S seconds."""
     console = messages()
     if not shows_progress(console):
-        yield _now_and_then(says, say)
+        yield _throttled(says, say)
         return
-    # drawn by hand: a thread that redraws would keep the search from using a second core
+    # Without automatic refresh: its thread would keep the search from using a second core.
     with Live(console=console, auto_refresh=False, transient=True) as line:
         yield lambda text: line.update(f"{says}: {text}", refresh=True)
 
 
-def _now_and_then(says: str, show: Callable[[str], None], clock: Callable[[], float] = monotonic) -> Callable[[str], None]:
-    """Return a function that shows what is being tried no more often than every LINE_EVERY_S seconds."""
+def _throttled(says: str, show: Callable[[str], None], clock: Callable[[], float] = monotonic) -> Callable[[str], None]:
+    """Return a function that shows what is being tried, at most once in LINE_EVERY_S seconds."""
     last = clock()
 
-    def told(text: str) -> None:
+    def show_if_due(text: str) -> None:
         nonlocal last
         if clock() - last >= LINE_EVERY_S:
             last = clock()
             show(f"{says}: {text}")
 
-    return told
+    return show_if_due
 
 
 @contextmanager
-def compiling(*besides: Callable[[], None]) -> Iterator[Warmup]:
+def compiling(*more: Callable[[], None]) -> Iterator[Warmup]:
     """Compile the kernels in a forked worker while the context runs, the first time on a machine; a terminal shows that.
 
-    Yields the warm-up, that of the command's session where it is part of one; see `fitting.jit_warmup.warming_up`.
+    more: functions that compile other kernels. Yields the warm-up, which is the session's where the command is part of one; see
+    `fitting.jit_warmup.warming_up`.
     """
     from fieldsid.fitting.jit_warmup import warming_up
 
@@ -105,7 +103,7 @@ def compiling(*besides: Callable[[], None]) -> Iterator[Warmup]:
         yield shared.warmup
         return
     console = messages()
-    with warming_up(lambda text: console.print(text) if shows_progress(console) else None, besides) as warmup:
+    with warming_up(lambda text: console.print(text) if shows_progress(console) else None, more) as warmup:
         yield warmup
 
 

@@ -1,4 +1,4 @@
-"""What the commands of one tour share, and where a command draws its figures: with the tour's other tasks, or with its own."""
+"""What the commands of a tour share, and the drawing of figures, in the background tasks of the tour or in new ones."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _SESSION: ContextVar[Session | None] = ContextVar("session", default=None)
 
 
 def session() -> Session | None:
-    """Return the session that the command under way is part of; None for a command on its own."""
+    """Return the session that the running command is part of; None for a single command."""
     return _SESSION.get()
 
 
 @contextmanager
-def part_of(whole: Session | None) -> Iterator[None]:
-    """Run a command as a part of a session, or on its own."""
-    before = _SESSION.set(whole)
+def in_session(shared: Session | None) -> Iterator[None]:
+    """Run the context as part of a session; None for a single command."""
+    before = _SESSION.set(shared)
     try:
         yield
     finally:
@@ -41,19 +41,19 @@ def part_of(whole: Session | None) -> Iterator[None]:
 
 
 @contextmanager
-def drawing() -> Iterator[BackgroundTasks]:
-    """Yield the background tasks of the command's session; for a command on its own new ones, waited for at the end."""
+def figure_tasks() -> Iterator[BackgroundTasks]:
+    """Yield the background tasks of the command's session; for a single command new ones, waited for at the end."""
     from fieldsid.runtime.background_tasks import BackgroundTasks
 
     if (shared := session()) is not None:
         yield shared.tasks
         return
-    with BackgroundTasks() as own:
-        yield own
+    with BackgroundTasks() as tasks:
+        yield tasks
 
 
-def drawn_at(path: Path | None, plot: Callable[[], Any], *, force: bool) -> str | None:
-    """Draw a figure to a file and return that, None where none is asked for."""
+def draw_figure(path: Path | None, plot: Callable[[], Any], *, force: bool) -> str | None:
+    """Draw a figure to a file and return its path; None where no file is named."""
     if path is None:
         return None
     from fieldsid.figures.canvas import save
@@ -62,8 +62,11 @@ def drawn_at(path: Path | None, plot: Callable[[], Any], *, force: bool) -> str 
     return str(save(plot(), path, force=force, tasks=None if shared is None else shared.tasks))
 
 
-def drawn_in(output: Path | None, plots: Mapping[str, Callable[[], Any]], *, force: bool) -> list[str]:
-    """Draw figures by their names in a folder, the only one at a figure's name, and return the files; none without a place."""
+def draw_figures(output: Path | None, plots: Mapping[str, Callable[[], Any]], *, force: bool) -> list[str]:
+    """Draw figures, by their names, to a folder and return the files; none without an output.
+
+    An output with the name of a figure is the file of the only one, or a part of the name of each of several.
+    """
     if output is None:
         return []
     from fieldsid.figures.canvas import save
@@ -72,5 +75,5 @@ def drawn_in(output: Path | None, plots: Mapping[str, Callable[[], Any]], *, for
     def place(name: str) -> Path:
         return figure_at(output, name, is_one=len(plots) == 1)
 
-    with drawing() as own:
-        return [str(save(plot(), place(name), force=force, tasks=own)) for name, plot in plots.items()]
+    with figure_tasks() as tasks:
+        return [str(save(plot(), place(name), force=force, tasks=tasks)) for name, plot in plots.items()]

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Skips:
-    """The logs that one command skips; a step calls `skip` for each log that it cannot use."""
+    """The logs that a command skips: each step calls `skip` for a log that it cannot use."""
 
     def __init__(self) -> None:
         self.records: list[Skipped] = []
@@ -36,13 +36,16 @@ class Skips:
         self.records.append(Skipped(name, shown, error.what, error.found, error.hint))
         complain(*f"skipped `{one_line(shown)}`: {error}\n".split("\n"))
 
-    def left_of(self, runs: Sequence[Run]) -> list[Run]:
-        """Return those of the runs read that were not skipped afterwards."""
+    def without_skipped(self, runs: Sequence[Run]) -> list[Run]:
+        """Return the runs without those that were skipped after they had been read."""
         return [run for run in runs if run.name not in self._runs]
 
-    def end(self, result: Mapping[str, Any], used: int) -> Mapping[str, Any]:
-        """Return a command's result; where logs were skipped end it with exit code 1, and say how many."""
+    def end(self, body: Mapping[str, Any], used: int) -> Mapping[str, Any]:
+        """Return the JSON body of a command; where logs were skipped, say how many and end the command with exit code 1.
+
+        used: the number of logs that were used.
+        """
         if not self.records:
-            return result
+            return body
         complain(f"{len(self.records)} of {len(self.records) + used} logs skipped, for the reasons above")
         raise typer.Exit(1)

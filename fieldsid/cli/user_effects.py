@@ -1,6 +1,6 @@
-"""The user's own effects: every YAML file in `effects/` of the folder a command is run in takes part in that command.
+"""The user's own effects: a command knows every effect that is defined in `effects/` of the folder it is run in.
 
-A model takes those it holds along: in another folder its own definitions are used, whatever is there by the same names.
+A model file contains the definitions of its user effects: in another folder they are used, and not those of the same name there.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ OWN_EFFECTS = "effects"
 
 
 def load_own_effects() -> None:
-    """Make the effects of the working folder known to this process, and no other's; one that cannot be used takes no part."""
+    """Register the effects of the working folder, and forget those of another; one that cannot be used is left out."""
     if "fieldsid.registry" in sys.modules:
         from fieldsid.registry import forget
 
         forget("fieldsid.effects")
-    if not os.path.isdir(OWN_EFFECTS) or not _may_hold_effects():  # noqa: PTH112 - no import
+    if not os.path.isdir(OWN_EFFECTS) or not _may_contain_effects():  # noqa: PTH112 - no import
         return
     from pathlib import Path
 
@@ -35,9 +35,9 @@ def load_own_effects() -> None:
 
 
 def read_model(path: Path) -> Model:
-    """Return the model of a file whose effects are all known; raises ArtifactError, EffectError naming the file.
+    """Return the model of a file; raises ArtifactError, and EffectError naming the file where an effect of it is not known.
 
-    Says on stderr where an effect of the model is another one than what is known here by its name.
+    Warns on stderr where the model's definition of an effect differs from that of the same name here.
     """
     from fieldsid.models.model import load_model
 
@@ -47,7 +47,7 @@ def read_model(path: Path) -> Model:
 
 
 def read_source(paths: Sequence[Path], laws: Sequence[str] = ()) -> ParameterSource:
-    """Return the source of parameters that files give, the effects of its models all known; raises as `read_model` does."""
+    """Return the source of parameters that files give; raises and warns as `read_model` does for the effects of its models."""
     from fieldsid.plant.parameter_source import load_parameter_source
 
     source = load_parameter_source(paths, laws=laws)
@@ -56,7 +56,7 @@ def read_source(paths: Sequence[Path], laws: Sequence[str] = ()) -> ParameterSou
 
 
 def check_effects(models: Iterable[tuple[Path, Model]]) -> None:
-    """Raise EffectError naming the file of a model whose effects are not all known; say which are another one than those here."""
+    """Raise EffectError naming the file of a model with an unknown effect; warn of effects that are defined otherwise here."""
     from fieldsid.cli.console import warn
     from fieldsid.dynamics.free_run import effects_of
     from fieldsid.errors import EffectError
@@ -74,8 +74,8 @@ def check_effects(models: Iterable[tuple[Path, Model]]) -> None:
             warn(differences(model.own), of=str(path))
 
 
-def _may_hold_effects() -> bool:
-    """Whether the folder has files that may be effects; one that cannot be looked into is asked again where its error is kept."""
+def _may_contain_effects() -> bool:
+    """Whether the folder has files that may define effects; True where it cannot be listed: reading it reports the error."""
     try:
         return any(n.endswith((".yaml", ".yml", ".py")) for n in os.listdir(OWN_EFFECTS))  # noqa: PTH208 - no import
     except OSError:

@@ -1,4 +1,4 @@
-"""How every command speaks: `--json` an object, `--quiet` its first lines, `-v` warnings in full, `--deg` its text in degrees."""
+"""The options of every command that set how it prints: `--json`, `--quiet`, `-v` and `--deg`."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ SAYS = {
     VERBOSE: "Say warnings in full, where a terminal gets a line of each.",
     DEGREES: "Show angles in degrees; files and JSON stay in radians.",
 }
-"""What each of them does, in the words of the pages of help."""
+"""The description of each on the pages of help."""
 HAS_OWN_V = ("demo",)
-"""Commands whose own `-v` says more than warnings."""
+"""Commands that have a `-v` of their own, which prints more than warnings."""
 
 
 @dataclass(frozen=True, slots=True)
 class Voice:
-    """Whether a result is one JSON object, or its first lines alone, whether warnings are said in full, angles in degrees."""
+    """How a command prints: JSON in place of text, the first lines alone, warnings in full, angles in degrees."""
 
     is_json: bool = False
     is_quiet: bool = False
@@ -36,24 +36,24 @@ _VOICE = ContextVar("voice", default=Voice())  # noqa: B039 - frozen
 
 
 def voice() -> Voice:
-    """Return how much the command under way says."""
+    """Return how the running command prints."""
     return _VOICE.get()
 
 
 def take(arguments: Sequence[str]) -> list[str]:
-    """Set the voice by a command line and return the line without what set it, but for `--json`, which its journal keeps.
+    """Set the voice from a command line and return the line without these options, except `--json`, which the journal records.
 
-    What follows `--` is left as it is.
+    Words after `--` are no options.
     """
     end = arguments.index("--") if "--" in arguments else len(arguments)
-    own, rest = arguments[:end], arguments[end:]
-    _VOICE.set(Voice(is_json=JSON in own, is_quiet=QUIET in own, is_verbose=VERBOSE in own, is_in_degrees=DEGREES in own))
+    words, rest = arguments[:end], arguments[end:]
+    _VOICE.set(Voice(is_json=JSON in words, is_quiet=QUIET in words, is_verbose=VERBOSE in words, is_in_degrees=DEGREES in words))
     taken = set(SAYS) - {JSON} - ({VERBOSE} if arguments and arguments[0] in HAS_OWN_V else set())
-    return [*(a for a in own if a not in taken), *rest]
+    return [*(a for a in words if a not in taken), *rest]
 
 
 def command_first(arguments: Sequence[str]) -> list[str]:
-    """Return a command line with what any command answers to behind the command, where it stands before it."""
+    """Return a command line with the options of every command moved behind the command, where they were typed before it."""
     before = list(takewhile(SAYS.__contains__, arguments))
     rest = list(arguments[len(before) :])
     end = rest.index("--") if "--" in rest else len(rest)

@@ -1,5 +1,5 @@
-"""The Python face: every step of the command line as a function with the same arguments, on runs and models in memory or on disk.
+"""The Python interface: every step of the command line as a function, on runs and models in memory or on disk.
 
 `import fieldsid as fs` gives these functions by their names, see `fieldsid/__init__.py`. They take files, patterns, pandas tables
-and records alike, fill in what a command fills in, and return the records that the rooms below make.
+and records alike, use the same defaults as the commands, and return the records of the packages that they call.
 """

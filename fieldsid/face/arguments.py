@@ -1,4 +1,4 @@
-"""What a step takes where nothing is given: the folder's vehicle and effects, the limits of the fin, the models' own runs."""
+"""Defaults of the steps: the working folder's vehicle and effects, the fin's limit, the runs that models were fitted to."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ if TYPE_CHECKING:
 File: TypeAlias = "str | PathLike[str]"
 OWN_EFFECTS = Path("effects")
 UNKNOWN = Vehicle("")
-"""A vehicle that nothing is stated of."""
+"""A vehicle without any stated property."""
 
 
-def own_effects() -> None:
-    """Make the user's effects of the working folder known, as every command does; raises EffectError naming the file."""
+def load_user_effects() -> None:
+    """Register the user's effects of the working folder, as every command does; raises EffectError naming the file."""
     if OWN_EFFECTS.is_dir():
         add_user_effects(OWN_EFFECTS)
 
 
 def axis_of(axis: Axis | str | None) -> Axis | None:
-    """Return an axis by its name, None for None; raises UsageError."""
+    """Return the axis of a name, None for None; raises UsageError for an unknown name."""
     if axis is None:
         return None
     known = [a.value for a in Axis]
@@ -45,20 +45,23 @@ def axis_of(axis: Axis | str | None) -> Axis | None:
 
 
 def axis_excited(runs: Sequence[Run], written: str = '`axis="{axis}"`') -> Axis:
-    """Return the axis that runs excite; written: how one is stated. Raises what `excited_axis` does."""
+    """Return the axis that runs excite; raises as `excited_axis` does.
+
+    written: how the caller states an axis, for the hint of an error.
+    """
     from fieldsid.logs.segments import excited_axis
 
     return Axis(excited_axis(runs, written=written))
 
 
 def names_of(names: str | Iterable[str] | None) -> tuple[str, ...]:
-    """Return names given one by one, or as the command line takes them, `a,b` or `a+b`; none where none are given."""
+    """Return names from a sequence, or from a text as the command line takes it, `a,b` or `a+b`; none for None."""
     parts = re.split(r"[,+\s]+", names) if isinstance(names, str) else names or ()
     return tuple(n.strip() for n in parts if n.strip())
 
 
 def vehicle_of(vehicle: Vehicle | File | None) -> Vehicle:
-    """Return a vehicle, that of a file, or without one that of the working folder, else one that states nothing.
+    """Return the given vehicle, that of a file, or for None that of the working folder; without any of them UNKNOWN.
 
     Raises VehicleError.
     """
@@ -68,14 +71,14 @@ def vehicle_of(vehicle: Vehicle | File | None) -> Vehicle:
 
 
 def fins_of(vehicle: Vehicle, axis: Axis) -> PlaneFins | None:
-    """Return the fins that an axis' command is made of; None where it is one."""
+    """Return the fins that together make the command of an axis; None where it is a single fin."""
     return None if vehicle.fins is None else vehicle.fins.of(axis.value)
 
 
 def fin_limit_of(vehicle: Vehicle, source: ParameterSource, say: Callable[[str], None], fin: str = "fin limit") -> float:
-    """Return the largest angle of the fin in rad where none is given: the vehicle's limit, or that of the models' runs.
+    """Return the largest fin angle in rad: the vehicle's limit, else the largest angle in the models' runs.
 
-    say is called with the last, and what the `fin` is called. Raises UsageError where there is none.
+    say: called with a message in the second case, in which `fin` names the fin. Raises UsageError where neither is known.
     """
     if (limit := vehicle.fin_max_rad(source.axis.value)) is not None:
         return limit
@@ -87,30 +90,33 @@ def fin_limit_of(vehicle: Vehicle, source: ParameterSource, say: Callable[[str],
 
 
 def read_again(log: NamedLog, mapping: ChannelMap | None = None) -> Run:
-    """Return the run of a log that a model names, by a mapping, else by that of then; raises as `load_run` does."""
+    """Return the run of a log that a model names, read with a mapping, else with its former one; raises as `load_run` does."""
     from fieldsid.logs import load_run
 
     return load_run(str(log.now), log.mapping if mapping is None else mapping, recognise=True)
 
 
 def run_files(source: ParameterSource, say: Callable[[str], None]) -> list[NamedLog]:
-    """Return the logs that the model files of a source name, where they still are; say is called where some are not.
+    """Return the logs that the model files of a source name and that still exist; say: called where some are missing.
 
-    Models without effects go by a formula, which needs none.
+    None for models without effects: their turning radius follows from a formula, without runs.
     """
     from fieldsid.plant.parameter_source import logs_of
 
     if not any(m.effects for m in source.models):
         return []
     named = logs_of(source.paths)
-    there = [log for log in named if log.now is not None]
-    if len(there) < len(named):
+    present = [log for log in named if log.now is not None]
+    if len(present) < len(named):
         say("some runs of the models are not where they were: name them with `--runs` for the loss of speed")
-    return there
+    return present
 
 
-def runs_behind(source: ParameterSource, say: Callable[[str], None]) -> list[Run]:
-    """Return the runs that the models of a yaw source came from, where they still are: they have the speed lost in a turn."""
+def runs_of_models(source: ParameterSource, say: Callable[[str], None]) -> list[Run]:
+    """Return the runs that the models of a yaw source were fitted to, where they still exist: they show the speed lost in turns.
+
+    say: called where some cannot be read. Empty for pitch, and for a source that is no model.
+    """
     from fieldsid.logs.several.sifting import attempt
     from fieldsid.plant.parameter_source import logs_of
     from fieldsid.runtime.parallel_map import parallel_map
@@ -118,22 +124,22 @@ def runs_behind(source: ParameterSource, say: Callable[[str], None]) -> list[Run
     if not source.models or not source.paths or source.axis is not Axis.YAW:
         return []
     named = logs_of(source.paths)
-    there = [log for log in named if log.now is not None]
-    runs = [run for run in parallel_map(lambda log: attempt(read_again, log), there) if not isinstance(run, FieldsidError)]
+    present = [log for log in named if log.now is not None]
+    runs = [run for run in parallel_map(lambda log: attempt(read_again, log), present) if not isinstance(run, FieldsidError)]
     if len(runs) < len(named):
-        lost = f"{len(named) - len(runs)} of {len(named)} runs of the models"
-        say(f"{lost} are gone, closed or outside of this folder: the speed lost in a turn is not measured in them")
+        missing = f"{len(named) - len(runs)} of {len(named)} runs of the models"
+        say(f"{missing} are gone, closed or outside of this folder: the speed lost in a turn is not measured in them")
     return runs
 
 
 def designed_from(schedule: Schedule, name: str) -> list[Path]:
-    """Return the files of the models a schedule was designed from; raises ArtifactError where they are not there any more."""
+    """Return the model files that a schedule was designed from; raises ArtifactError where one of them no longer exists."""
     named = [(m["path"], where_now(m, Path(name))) for m in schedule.provenance.get("models", [])]
-    missing = [said for said, p in named if p is None]
+    missing = [path for path, now in named if now is None]
     if not named or missing:
         raise ArtifactError(
             f"the models of `{name}` are not where they were",
             found=", ".join(missing) or "none named",
             hint=f"name them: `sysid schedule verify {name} --model MODEL`",
         )
-    return [p for _, p in named if p is not None]
+    return [now for _, now in named if now is not None]

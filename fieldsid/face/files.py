@@ -1,4 +1,4 @@
-"""Records to files and back, in the formats that every command reads."""
+"""Writing records to files and reading them back, in the formats of the commands."""
 
 from __future__ import annotations
 

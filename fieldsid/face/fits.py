@@ -1,4 +1,4 @@
-"""From runs to a model, and to the effect it lacks: `sysid identify`, `compare`, `diagnose` and `extend` as functions."""
+"""`sysid identify`, `compare`, `diagnose` and `extend` as functions: from runs to a model, and to the effect that it lacks."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from fieldsid.errors import UsageError
-from fieldsid.face.arguments import File, axis_excited, axis_of, names_of, own_effects, vehicle_of
+from fieldsid.face.arguments import File, axis_excited, axis_of, load_user_effects, names_of, vehicle_of
 from fieldsid.face.models import AnyModel, model_of
 from fieldsid.face.runs import Logs, runs_mapped
 from fieldsid.face.several import Several
@@ -36,17 +36,17 @@ def identify(
     mapping: ChannelMap | File | None = None,
     vehicle: Vehicle | File | None = None,
 ) -> Several[Fit]:
-    """Return the fit of the yaw or pitch model to each run, or a single one to all of them when joint.
+    """Return the fit of the yaw or pitch model to each run, or with `joint` a single fit to all of them.
 
-    axis: by default the one that the runs excite. Of each run the part is used that excites it; all of it when `whole`, or
-    between start and end in s. bandwidth: that of the state-variable filter in rad/s. forgetting: the factor of `svf_rls`. Raises
-    DataError for runs that do not allow the fit, UsageError for a method or effect that cannot do what is asked or runs that
-    excite both axes or none, and as `load` does.
+    axis: by default the one that the runs excite. Of each run the part that excites the axis is used; all of it with `whole`, or
+    the part from start to end in s. bandwidth: that of the state-variable filter in rad/s. forgetting: the factor of `svf_rls`.
+    Raises DataError for runs that do not allow the fit, UsageError for a method that does not take the effects or several runs,
+    for an unknown effect and for runs that excite both axes or none, and as `load` does.
     """
     from fieldsid.fitting.identify import identify as fit_runs
     from fieldsid.fitting.problem.estimator import Options
 
-    own_effects()
+    load_user_effects()
     plane, known = axis_of(axis), runs_mapped(runs, mapping, start, end)
     return Several(
         fit_runs(
@@ -70,14 +70,14 @@ def compare(
     end: float | None = None,
     mapping: ChannelMap | File | None = None,
 ) -> Several[Comparison]:
-    """Return the comparison of a model's free run with each run, and where it fails.
+    """Return the comparison of a model's free run with each run, and the conditions under which it fails.
 
-    start and end cut the runs, in s. Raises DataError for a run without the signals, ModelError when the model grows without
-    bound, ArtifactError for a file that is no model, and as `load` does.
+    start, end: the part of each run, in s. Raises DataError for a run without the signals, ModelError where the simulation
+    diverges, ArtifactError for a file that is no model, and as `load` does.
     """
     from fieldsid.comparison.compare import compare as compare_runs
 
-    own_effects()
+    load_user_effects()
     return Several(compare_runs(model_of(model), runs_mapped(runs, mapping, start, end, models=[model])))
 
 
@@ -93,19 +93,19 @@ def diagnose(
     """Return which physical effect a model of the runs lacks, how sure that is, and what else it could be.
 
     axis: by default the model's, or that which the runs excite. validate: runs that no fit sees; without them a part of the runs
-    is held back. model: one whose effects are known already. thorough: go on for as long as there is something to try. Raises
+    is held out. model: one whose effects are known already. thorough: search until nothing is left to try. Raises
     DataError for a run that cannot be fitted, UsageError for a model of the other axis or runs that excite both or none,
     EffectError for an effect of the user's that fails, and as `load` does.
     """
     from fieldsid.diagnosis import diagnose as diagnose_runs
 
-    own_effects()
+    load_user_effects()
     known, plane = None if model is None else model_of(model), axis_of(axis)
     if known is not None and plane is not None and known.axis is not plane:
         raise UsageError(f"that is a {known.axis.value} model", found=f"axis {plane.value}", hint=f'write `"{known.axis.value}"`')
-    learned, unseen = _both(runs, validate, mapping, model)
-    plane = known.axis if known else plane or axis_excited(learned)
-    return diagnose_runs(learned, plane, unseen, model=known, thorough=thorough)
+    training, unseen = _training_and_unseen(runs, validate, mapping, model)
+    plane = known.axis if known else plane or axis_excited(training)
+    return diagnose_runs(training, plane, unseen, model=known, thorough=thorough)
 
 
 def extend(
@@ -118,20 +118,20 @@ def extend(
 ) -> Extension:
     """Return a model with effects added by name and everything refitted to the runs; `pays` says whether to keep it.
 
-    validate: runs that no fit sees, to judge by; without them a part of the runs is held back. Raises UsageError for an effect
+    validate: runs that no fit sees, to judge by; without them a part of the runs is held out. Raises UsageError for an effect
     that is unknown, of the other axis or in the model already, DataError for runs that cannot be used, and as `load` does.
     """
     from fieldsid.extension.extend import extend_in_steps, whole_of
 
-    own_effects()
+    load_user_effects()
     known = model_of(model)
-    return whole_of(extend_in_steps(known, names_of(add), *_both(runs, validate, mapping, model)))
+    return whole_of(extend_in_steps(known, names_of(add), *_training_and_unseen(runs, validate, mapping, model)))
 
 
-def _both(
+def _training_and_unseen(
     runs: Logs, validate: Logs, mapping: ChannelMap | File | None, model: AnyModel | None
 ) -> tuple[Several[Run], Several[Run]]:
-    """Return the runs to learn from and those not seen, all names different."""
-    learned, unseen = (runs_mapped(logs, mapping, models=[model]) for logs in (runs, validate))
-    both = runs_mapped((*learned, *unseen), None)
-    return Several(both[: len(learned)]), Several(both[len(learned) :])
+    """Return the training runs and those that no fit sees, with a different name each."""
+    training, unseen = (runs_mapped(logs, mapping, models=[model]) for logs in (runs, validate))
+    both = runs_mapped((*training, *unseen), None)
+    return Several(both[: len(training)]), Several(both[len(training) :])

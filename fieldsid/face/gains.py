@@ -1,4 +1,4 @@
-"""From models at a few speeds to laws, turns and gains: `sysid fit`, `turn-radius` and `schedule` as functions."""
+"""`sysid fit`, `turn-radius` and `schedule` as functions: from models at a few speeds to laws, turns and gains."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from fieldsid.face.arguments import (
     designed_from,
     fin_limit_of,
     fins_of,
-    own_effects,
+    load_user_effects,
     run_files,
-    runs_behind,
+    runs_of_models,
     vehicle_of,
 )
 from fieldsid.face.models import Models, source_of
@@ -31,16 +31,16 @@ if TYPE_CHECKING:
     from fieldsid.vehicle import Vehicle
 
 _say = logging.getLogger("fieldsid").info
-"""What a command would say on stderr; heard where a program asks its log for it."""
+"""Messages that a command prints on stderr go to this logger, at level INFO."""
 
 
 def fit_laws(models: Models, *, unweighted: bool = False) -> Laws:
     """Return the laws that carry a model from one speed to the next: authority against u^2, damping and trim against u.
 
-    models: models of one axis at two speeds at least, or a table of parameters with a column speed_m_s. unweighted: every point
-    counts alike, standard errors or not. Raises DataError for one speed only.
+    models: models of one axis at two speeds or more, or a table of parameters with a column speed_m_s. unweighted: ignore the
+    standard errors of the points. Raises DataError for one speed only.
     """
-    own_effects()
+    load_user_effects()
     source = source_of(models)
     return source.fitted(weighted=not unweighted)
 
@@ -60,14 +60,14 @@ def turn_radius(
 ) -> TurnPrediction:
     """Return the turning radius over speed, port and starboard apart, with 95 % bands.
 
-    speeds: in m/s or as `0.5:2.5:0.1`, without them the models' own. rudder_max: in rad, without it the vehicle's limit or the
-    largest in the models' runs. measured: runs of turning circles to compare with. runs: those the models came from, without them
-    the files that the models name; the loss of speed in a turn is identified from them. fin_zero: offsets of the fin (rad) below
-    it are not counted. Raises UsageError, ModelError for an unstable model, DataError for a measured run without a circle.
+    speeds: in m/s or as `0.5:2.5:0.1`; by default those of the models. rudder_max: in rad; by default the vehicle's limit, else
+    the largest angle in the models' runs. measured: runs of turning circles to compare with and to learn from. runs: runs that
+    the turn is fitted to, for the loss of speed; by default those that the model files name. fin_zero: fin offsets (rad) below it
+    are ignored. Raises UsageError, ModelError for an unstable model, DataError for a measured run without a circle.
     """
     from fieldsid.turning.radius import turn_radius as radius_over_speed
 
-    own_effects()
+    load_user_effects()
     source, known = source_of(models, law), vehicle_of(vehicle)
     return radius_over_speed(
         source,
@@ -82,7 +82,7 @@ def turn_radius(
 
 
 def _runs_named(source: ParameterSource, mapping: ChannelMap | File | None) -> list[Run]:
-    """Return the runs that the models name, each by a mapping, or else by that which it was read with then."""
+    """Return the runs that the models name, each read with the given mapping, else with its former one."""
     named = run_files(source, _say)
     return [run for log in named for run in runs_mapped(str(log.now), log.mapping if mapping is None else mapping)]
 
@@ -110,20 +110,20 @@ def design_schedule(
 ) -> Schedule:
     """Return gains per speed for heading or pitch, by the models' axis.
 
-    controller: p, pd, pi, pid or lqr; without it pd where the models' runs have a rate, else p. settling (s) or bandwidth
-    (rad/s): how soon a step is to settle at all speeds, without them as soon as the slowest of them can; 0 leaves each its own.
-    overshoot: the most, as a share. step (rad): the error that may ask for fin_use, a share, of the fin's limit. damping: without
-    it that of the overshoot, else 0.7071. phase_margin: in deg. speeds:
-    in m/s or as `1.0,1.5`, without them the models' own. fin_limit (rad), fin_rate (rad/s): without them the vehicle's.
-    fin_lag, delay (s): without them the models'. latency (s): the autopilot's own, on top. depth: the loop above pitch.
-    Raises UsageError for what cannot be meant, ModelError where no gain holds the loop.
+    controller: p, pd, pi, pid or lqr; by default pd where the models' runs have a rate, else p. settling (s) or bandwidth
+    (rad/s): how fast a step settles at every speed; by default as fast as the slowest speed allows, with settling 0 as fast as
+    each speed allows. overshoot: the largest, as a share. step (rad): the error that uses a share fin_use of the fin's limit.
+    damping: the damping ratio; by default that of the overshoot, else 0.7071. phase_margin: in deg. speeds: in m/s or as
+    `1.0,1.5`; by default those of the models. fin_limit (rad), fin_rate (rad/s): by default the vehicle's. fin_lag, delay (s):
+    by default the models'. latency (s): the autopilot's, in addition. depth: add the depth loop above pitch.
+    Raises UsageError for impossible values, ModelError where no gain meets the requirements.
     """
     from fieldsid.schedule.linear_plant import FinLimits
     from fieldsid.schedule.make import design_schedule as design
     from fieldsid.schedule.make import usual_controller
     from fieldsid.schedule.wish import Wish
 
-    own_effects()
+    load_user_effects()
     source, known = source_of(models, law), vehicle_of(vehicle)
     return design(
         source,
@@ -132,22 +132,22 @@ def design_schedule(
         wish=Wish(controller or usual_controller(source), damping, phase_margin, step, bandwidth, settling, overshoot, fin_use),
         limits=FinLimits(fin_lag, delay, known.fin_rate_rad_s if fin_rate is None else fin_rate, latency),
         depth=depth,
-        runs=runs_behind(source, _say),
+        runs=runs_of_models(source, _say),
         length=known.length_m,
         fins=fins_of(known, source.axis),
     )
 
 
 def verify_schedule(schedule: Schedule | File, models: Models | None = None) -> Verification:
-    """Return margins and steps of a schedule at its knots and between, over the errors of the models.
+    """Return the margins and steps of a schedule at its knots and between them, over draws of the models' errors.
 
-    models: those to verify on, without them the files it was designed from. Raises ArtifactError where these are not there.
+    models: the models to verify on; by default the files that it was designed from. Raises ArtifactError where one is missing.
     """
     from fieldsid.schedule.record import Schedule, load_schedule
     from fieldsid.schedule.verify import verify_schedule as verify
 
-    own_effects()
+    load_user_effects()
     known = schedule if isinstance(schedule, Schedule) else load_schedule(Path(schedule))
     name = "SCHEDULE" if isinstance(schedule, Schedule) else str(schedule)
     source = source_of(designed_from(known, name) if models is None else models)
-    return verify(known, source, runs=runs_behind(source, _say))
+    return verify(known, source, runs=runs_of_models(source, _say))

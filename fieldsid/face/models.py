@@ -1,4 +1,4 @@
-"""Models from whatever a user holds: files, patterns, models, and every record that has one."""
+"""Models from what a user passes: files, patterns, models, and records that contain one."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Models: TypeAlias = "OneModel | Laws | Iterable[OneModel]"
 
 
 def model_of(given: AnyModel) -> Model:
-    """Return the one model of a file, a record or a sequence of one; raises UsageError for several, ArtifactError for a file."""
+    """Return the model of a file, a record or a sequence of one; raises UsageError for several, ArtifactError for a bad file."""
     models = list(_models(given))
     if len(models) == 1:
         return models[0]
@@ -32,22 +32,22 @@ def model_of(given: AnyModel) -> Model:
 
 
 def source_of(given: Models, law: str | Sequence[str] = ()) -> ParameterSource:
-    """Return where the parameters at a speed come from: models, a table of parameters, a fit file, or laws.
+    """Return the source of parameters over speed that models, a table of parameters, a fit file or laws give.
 
-    law: laws of one's own, `NAME=c0[,c1]`, as the option. Raises UsageError, DataError and ArtifactError.
+    law: the user's laws, `NAME=c0[,c1]`, as with `--law`. Raises UsageError, DataError and ArtifactError.
     """
     from fieldsid.plant.laws.axis_laws import Laws
     from fieldsid.plant.parameter_source import load_parameter_source, source_of_laws, source_of_models
 
-    own = (law,) if isinstance(law, str) else tuple(law)
+    user_laws = (law,) if isinstance(law, str) else tuple(law)
     items = [given] if isinstance(given, (str, PathLike, Model)) or not isinstance(given, Iterable) else list(given)
     if len(items) == 1 and isinstance(items[0], Laws):
-        return source_of_laws(items[0], laws=own)
+        return source_of_laws(items[0], laws=user_laws)
     named = [item for item in items if isinstance(item, (str, PathLike))]
     if len(named) == len(items):
-        return load_parameter_source([path for item in named for path in files_of(item, "model")], laws=own)
+        return load_parameter_source([path for item in named for path in files_of(item, "model")], laws=user_laws)
     models = [model for item in items for model in _models(item)]
-    return source_of_models(models, [_name(m, i) for i, m in enumerate(models)], laws=own)
+    return source_of_models(models, [_name(m, i) for i, m in enumerate(models)], laws=user_laws)
 
 
 def _models(given: Any) -> Iterator[Model]:
@@ -55,8 +55,8 @@ def _models(given: Any) -> Iterator[Model]:
         yield from (load_model(path) for path in files_of(given, "model"))
     elif isinstance(given, Model):
         yield given
-    elif isinstance(own := getattr(given, "model", None), Model):
-        yield own
+    elif isinstance(model := getattr(given, "model", None), Model):
+        yield model
     elif isinstance(given, Iterable):
         for item in given:
             yield from _models(item)

@@ -1,4 +1,4 @@
-"""Times, shares, bandwidths and decibels as a user types them: `4s`, `10%`, `1rad/s`, `6dB`; a bare number has the first unit."""
+"""Times, shares, bandwidths and decibels as a user types them, `4s`, `10%`, `1rad/s`, `6dB`; a bare number has the first unit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ DECIBEL = {"dB": 1.0}
 
 
 def parse_quantity(text: str, option: str, units: Mapping[str, float], example: str) -> float:
-    """Read a number with one of some units, in the unit of factor one; raises UsageError."""
+    """Return the value of a number with a unit, in the unit whose factor is one; raises UsageError.
+
+    units: factor of each unit, the first that of a bare number. example: a correct value, for the hint.
+    """
     word = text.strip()
     named = [u for u in units if word.lower().endswith(u.lower())]
     unit = max(named, key=len, default=next(iter(units)))
@@ -29,12 +32,15 @@ def parse_quantity(text: str, option: str, units: Mapping[str, float], example: 
 
 
 def parse_time(text: str, option: str, example: str = "0.1s") -> float:
-    """Read a time in s: `4s`, `400ms`, or a bare number, which is s."""
+    """Return a time in s from `4s`, `400ms`, or a bare number of seconds; raises UsageError."""
     return parse_quantity(text, option, TIME, example)
 
 
 def parse_share(text: str, option: str) -> float:
-    """Read a share: `10%`, or a bare number, which is per cent; one that may have been meant as a share is refused."""
+    """Return a share from `10%`, or a bare number, which is per cent.
+
+    Raises UsageError for a bare number up to 1, which may have been meant as a share.
+    """
     value = parse_quantity(text, option, SHARE, "10%")
     if "%" not in text and 0.0 < value <= 0.01:
         raise UsageError(

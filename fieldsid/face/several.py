@@ -1,4 +1,4 @@
-"""Several records of one kind, as the functions return them: a tuple that shows itself."""
+"""Several records of one kind, as the functions return them: a tuple with a summary, a table and a figure."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ RUN = "run"
 
 
 class Several(Plotted, tuple[T_co, ...]):
-    """Records of one kind in their order; `summary` and `to_frame` are of all of them, a figure is of one."""
+    """Records of one kind in order; `summary` and `to_frame` cover all of them, `plot` takes a single one."""
 
     __slots__ = ()
 
@@ -30,14 +30,14 @@ class Several(Plotted, tuple[T_co, ...]):
         return cut(f"<{len(self)} {type(self[0]).__name__} records: {listed(labels, MOST_NAMED)}>", LONGEST)
 
     def summary(self) -> str:
-        """Return the summaries of all records, one under the other."""
+        """Return the summaries of all records, one below the other."""
         return "\n\n\n".join(record.summary() for record in self)
 
     def _repr_html_(self) -> str:
         return f"<div>{''.join(record._repr_html_() for record in self)}</div>"
 
     def to_frame(self, part: str = "") -> DataFrame:
-        """Return a part of all records as one pandas table, its first index the run's name; raises UsageError."""
+        """Return a part of all records as one pandas table, whose first index is the name of the run; raises UsageError."""
         import pandas as pd
 
         if not self:
@@ -48,7 +48,7 @@ class Several(Plotted, tuple[T_co, ...]):
         return pd.concat(tables, keys=[view_of(type(record)).label(record) for record in self], names=[RUN])
 
     def plot(self, part: str = "") -> Any:
-        """Return the matplotlib Figure of the only record; raises UsageError where there are several, which have one each."""
+        """Return the matplotlib Figure of the only record; raises UsageError where there are several, or none."""
         if len(self) != 1:
             raise UsageError(
                 f"{len(self)} records have a figure each", found=repr(self), hint="draw one of them: `[0].plot()`" if self else ""

@@ -9,19 +9,20 @@ from fieldsid.errors import UsageError
 
 MAX_SPEEDS = 2000
 SLOWEST, FASTEST = 0.01, 15.0
-"""m/s: no fin steers below, and no vehicle under water goes beyond."""
+"""Speeds in m/s below which no fin is effective, and above which no underwater vehicle goes."""
 
 
 def speeds_of(given: str | Iterable[float] | None) -> list[float]:
-    """Return the speeds in m/s, rising in a range; empty where nothing is given. Raises UsageError."""
+    """Return the given speeds in m/s, those of a range in rising order, an empty list for None; raises UsageError."""
     if given is None:
         return []
     if not isinstance(given, str):
-        return _possible([float(speed) for speed in given])
-    return _possible(_read(given)) if given.strip() else []
+        return _checked([float(speed) for speed in given])
+    return _checked(_read(given)) if given.strip() else []
 
 
-def _possible(speeds: list[float]) -> list[float]:
+def _checked(speeds: list[float]) -> list[float]:
+    """Return the speeds; raises UsageError for one that no underwater vehicle has."""
     for speed in speeds:
         if speed > 0.0 and not SLOWEST <= speed <= FASTEST:
             raise UsageError(

@@ -1,11 +1,11 @@
-"""The trial as a whole: `sysid compare OLD NEW` and `sysid report` as functions."""
+"""`sysid compare OLD NEW` and `sysid report` as functions."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fieldsid.face.arguments import File, own_effects, vehicle_of
+from fieldsid.face.arguments import File, load_user_effects, vehicle_of
 from fieldsid.face.models import Models, source_of
 
 if TYPE_CHECKING:
@@ -14,31 +14,31 @@ if TYPE_CHECKING:
 
 
 def compare_models(old: Models, new: Models, *, vehicle: Vehicle | File | None = None) -> Change:
-    """Return which parameters and effects have changed beyond their errors between two states, and what follows for the gains.
+    """Return which parameters and effects differ between two states by more than their errors, and what that means for the gains.
 
-    old, new: the models of one axis before and after, flown at a speed in common. vehicle: whose fin limit and fin rate count,
-    without it that of the working folder, else the largest fin in the old models' runs. Raises UsageError for models of two
-    axes or without a common speed.
+    old, new: the models of one axis before and after, with a speed in common. vehicle: gives the fin's limit and rate; by default
+    that of the working folder, else the limit is the largest fin angle in the old models' runs. Raises UsageError for models
+    of two axes or without a common speed.
     """
     from fieldsid.change.compare import compare_models as compare_sources
     from fieldsid.schedule.linear_plant import FinLimits
 
-    own_effects()
+    load_user_effects()
     before, known = source_of(old), vehicle_of(vehicle)
     limit, stated = known.fin_max_rad(before.axis.value), FinLimits(rate=known.fin_rate_rad_s)
     return compare_sources(before, source_of(new), fin_limit=limit, stated=stated)
 
 
 def report(folder: File = ".", output: File | None = None, *, force: bool = False) -> Path:
-    """Write what a trial folder has come to into one HTML file, or a PDF by its suffix, and return its path.
+    """Write the results of a trial folder to one HTML file, or to a PDF where the output ends in .pdf, and return its path.
 
-    output: `report.html` in the folder if not given. Raises UsageError for a folder without runs and models or for another
-    suffix, ArtifactError for a file that exists, where not forced, and for a PDF without a browser.
+    output: by default `report.html` in the folder. Raises UsageError for a folder without runs and models and for another
+    suffix, ArtifactError for a file that exists, unless forced, and for a PDF without a browser.
     """
     from fieldsid.reporting.write import written
     from fieldsid.trial_folder.state import state_of
 
-    own_effects()
+    load_user_effects()
     place = Path(folder)
     path = Path(output) if output is not None else place / "report.html"
     written(state_of(place), path, force=force)

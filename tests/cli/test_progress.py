@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from fieldsid.cli.progress import LINE_EVERY_S, _now_and_then, trying
+from fieldsid.cli.progress import LINE_EVERY_S, _throttled, trying
 from fieldsid.cli.voice import take
 
 
 def test_a_line_is_shown_no_more_often_than_every_few_seconds():
     now, shown = [0.0], []
-    told = _now_and_then("diagnosing", shown.append, lambda: now[0])
+    told = _throttled("diagnosing", shown.append, lambda: now[0])
     for second in range(int(3 * LINE_EVERY_S) + 1):
         now[0] = float(second)
         told(f"set {second}")

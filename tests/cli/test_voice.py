@@ -9,7 +9,7 @@ import pytest
 from cli import trial
 from rich.console import Console
 
-from fieldsid.cli.console import alike, print_page, shortened, shows_progress, table
+from fieldsid.cli.console import one_of_each_kind, print_page, shortened, shows_progress, table
 from fieldsid.cli.voice import Voice, take, voice
 from fieldsid.logs.run import Note
 from fieldsid.page import Block, Page, dense, folded, html_of, text_of
@@ -178,4 +178,4 @@ def test_a_column_that_nothing_stands_in_is_left_out_wherever_a_table_is_shown()
 
 def test_a_warning_that_names_its_run_is_not_told_whose_it_is():
     notes = [("a", "run7", Note("speed_changing", "run 'run7': the speed changes")), ("b", "run7", Note("short", "too short"))]
-    assert [n.message for n in alike(notes)] == ["run 'run7': the speed changes", "run7: too short"]
+    assert [n.message for n in one_of_each_kind(notes)] == ["run 'run7': the speed changes", "run7: too short"]

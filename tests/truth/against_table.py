@@ -1,9 +1,10 @@
-"""The schedule against the best constant gain and the paper's P with feed-forward, on hulls nobody tuned to.
+"""The schedule against the best constant gain and the paper's P with feed-forward, on random hulls that nothing was tuned on.
 
-Every hull is drawn, flown with sensor noise, identified from pulses, given all three, and steered by each at its speeds:
+Every hull is drawn, flown with sensor noise, identified from pulses, and steered by each of the three laws at its speeds:
     python tests/truth/against_table.py --draws 7 --seed 7 [--controller pd] [--settling quickest]
-`said` is what verify says at the rows, `flown` what a step of 20 deg does on the hull itself. The last line counts rows that the
-constant gain is better than by more than 1 %: it lacks less, settles sooner where a row is late, or asks for less fin.
+`said` is what `verify_schedule` predicts at the rows, `flown` what a step of 20 deg does on the hull itself. The last line counts
+the rows where the constant gain is better by more than 1 %: it misses the requirements by less, settles sooner where the row is
+too slow, or uses less fin.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ PAPER, ONE, OWN = "paper's P", "one constant", "schedule"
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """One law at a hull's speeds, (k,) each: s said and flown, overshoot and fin asked as shares, phase margin (deg)."""
+    """One law at a hull's k speeds, (k,) each: settling (s) predicted and flown, overshoot and fin use (shares), phase margin."""
 
     said: np.ndarray
     flown: np.ndarray
@@ -45,14 +46,14 @@ class Rows:
 
 
 def rows_of(hull: Hull, law: np.ndarray, checks: list[Check]) -> Rows:
-    """Return what a law is said to do and does."""
+    """Return what the checks predict of a law, and what it does on the hull."""
     settled, over = zip(*(flown(hull, law, c.speed) for c in checks), strict=True)
     said, fin, margin = zip(*((c.steps[1].settling_most, c.outcome.fin, c.phase_least_deg) for c in checks), strict=True)
     return Rows(*(np.array(part, dtype=float) for part in (said, settled, over, fin, margin)))
 
 
 def flown(hull: Hull, law: np.ndarray, speed: float) -> tuple[float, float]:
-    """Return settling (s) and overshoot of the step on the hull."""
+    """Return the settling time (s) and the overshoot, as a share, of the step on the hull."""
     motion = steered(hull, speed, law, STEP, FLOWN_S)
     heading = motion[:, 1]
     off = np.flatnonzero(np.abs(heading - heading[-600:].mean()) > 0.05 * STEP)
@@ -60,7 +61,7 @@ def flown(hull: Hull, law: np.ndarray, speed: float) -> tuple[float, float]:
 
 
 def compared(hull: Hull, draw: int, seed: int, wish: Wish) -> tuple[dict[str, Rows], int]:
-    """Return the laws of one hull, and at how many of its rows the constant gain is better."""
+    """Return the rows of each law on one hull, and at how many rows the constant gain is better."""
     source, runs = identified(hull, draw, seed, "pulses")
     own = design_schedule(source, hull.rudder_limit, wish=wish, runs=runs)
     found = verify_schedule(own, source, runs=runs)
@@ -77,7 +78,7 @@ def compared(hull: Hull, draw: int, seed: int, wish: Wish) -> tuple[dict[str, Ro
 
 
 def line(name: str, rows: Rows) -> str:
-    """Return one line of the table: the range over the speeds, slowest speed first where it says so."""
+    """Return one line of the table: ranges over the speeds; the fin from the slowest speed to the fastest."""
     spans = [f"{part.min():6.2f} .. {part.max():6.2f}" for part in (rows.said, rows.flown)]
     over, fin = 100.0 * rows.overshoot.max(), 100.0 * rows.fin
     return f"  {name:14s} {spans[0]}   {spans[1]} {over:7.1f} {fin[0]:6.0f} .. {fin[-1]:4.0f} {rows.margin.min():7.0f}"

@@ -1,4 +1,4 @@
-"""The blind bank: cases with a hidden effect, two, none, one of another shape, or a cause no catalogue has."""
+"""The blind bank of simulated cases: one hidden effect, two, none, one in another form, or a cause that is in no catalogue."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ KINDS = ("single", "imperfect", "none", "pair", "uncatalogued")
 SHARES = (0.5, 0.13, 0.13, 0.12, 0.12)
 VISIBLE = 1.35
 LEARNABLE = 1.2
-"""Least base error over the floor on the runs that are judged, and on those that are learned from."""
+"""Least error of the base model over the noise floor, on the validation runs (VISIBLE) and on the training runs (LEARNABLE)."""
 TRIES = 4
 BENT = 0.7
-"""Share of the yaw cases whose trim is a bent fin's, the rest a moment that is the same at every speed."""
+"""Share of the yaw cases whose trim comes from a bent fin; that of the others is a moment independent of speed."""
 WANTS = {
     "current": ("circle", "zigzag"), "compass_deviation": ("circle", "zigzag"), "sway_coupling": ("zigzag",),
     "crossflow_drag": ("circle", "zigzag"), "quadratic_damping": ("circle", "zigzag"), "large_angle_righting": ("stairs",),
@@ -34,21 +34,21 @@ APART = (
     {"trim_drift", "step_change", "prop_moment", "speed_moment", "depth_buoyancy", "wave", "roll_coupling", "gyro_bias"},
     {"current", "compass_deviation", "trim_drift"}, {"large_angle_righting", "step_change", "depth_buoyancy"},
 )  # fmt: skip
-"""Sets of which a pair takes at most one member: telling those apart is a matter for singles."""
+"""Sets of look-alike effects: a pair has at most one member of each; the cases with one effect test telling them apart."""
 
 
 EXPECTED = {"none": frozenset({"sufficient", "disturbed"}), "uncatalogued": frozenset({"unexplained", "disturbed"})}
-"""Verdicts that are right where no effect of the catalogue is hidden: a sea, or a moment like one, is a disturbance."""
+"""Correct verdicts where no effect of the catalogue is hidden; waves, or a moment like theirs, count as a disturbance."""
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
     """One blind case. `training` and `validation` are logs with canonical columns.
 
-    `floor` is the rms, per channel over the validation runs, of the measurement less the truth's own answer without
-    noise and disturbance (start refitted); `ratio` the base model's error over it, both channels pooled, on the
-    validation runs, `ratio_training` on the others; `visible` whether it exceeds 1.35 (and 1.2 on the training runs, or
-    nothing could be learned). `effects` holds the catalogue's names of what is hidden, `accepts` those that count as right.
+    `floor`: rms, per channel over the validation runs, of the measurement less the response of the truth without noise and
+    disturbance, its initial state refitted. `ratio`: error of the base model over that, both channels pooled, on the
+    validation runs; `ratio_training`: on the training runs. `visible`: whether they exceed VISIBLE and LEARNABLE. `effects`:
+    names of the hidden effects in the catalogue; `accepts`: names that count as correct.
     """
 
     name: str
@@ -70,12 +70,12 @@ class Case:
 
 @dataclass(slots=True)
 class Hidden:
-    """Causes of a case: (name, apply, events, strength) each."""
+    """Hidden causes of a case, each a list of name, apply, events and strength."""
 
     causes: list[list]
 
     def updates(self, ratio, run, index=None):
-        """Fields of Physics and of the scene for one run, of one cause or of all."""
+        """Return the fields of Physics and of the scene that one cause, or all of them, set in one run."""
         out: dict[str, float] = {}
         for _, apply, _, strength in self.causes if index is None else [self.causes[index]]:
             new = apply(strength, ratio, run)
@@ -84,13 +84,13 @@ class Hidden:
 
 
 def cases(n: int, seed: int, *, kind: str | None = None, first: int = 0) -> Iterator[Case]:
-    """Yield cases first .. first + n - 1 of a bank; each depends on (seed, its index) alone."""
+    """Yield cases first .. first + n - 1 of a bank; each depends on the seed and its index only."""
     for index in range(first, first + n):
         yield make_case(index, seed, kind=kind)
 
 
 def make_case(index: int, seed: int, *, kind: str | None = None, colour: str | None = None) -> Case:
-    """One case by (seed, index); `kind` and the `colour` of its noise override what the bank would have drawn."""
+    """Return one case by seed and index; kind and colour (of the noise) replace what the bank would draw."""
     rng = np.random.default_rng([seed, index])
     drawn = str(rng.choice(KINDS, p=SHARES))
     kind = drawn if kind is None else kind
@@ -106,7 +106,7 @@ def make_case(index: int, seed: int, *, kind: str | None = None, colour: str | N
 
 
 def draw_names(rng, kind, pitching):
-    """Names of what is hidden."""
+    """Return the names of the hidden causes."""
     catalogue = sorted(PITCH if pitching else YAW)
     if kind == "none":
         return ()
@@ -125,7 +125,7 @@ def draw_names(rng, kind, pitching):
 
 
 def draw_hidden(rng, kind, names, scene):
-    """Shapes of the causes, strength not yet set."""
+    """Return the causes with random shapes; `tune` sets their strengths."""
     catalogue = PITCH if scene.pitching else YAW
     causes = []
     for name in names:
@@ -139,7 +139,7 @@ def draw_hidden(rng, kind, names, scene):
 
 
 def inputs_of(scene, physics, hidden, leg, i, updates, *, noisy, only=None):
-    """The kernel's inputs for one leg: weather, thrust, roll and events."""
+    """Return the kernel's inputs (9, total) for one leg: noise, disturbance, thrust, roll and events."""
     inputs = leg.inputs.copy()
     swing = updates.get("thrust_swing", scene.notes["swing"])
     inputs[kernel.THRUST] = physics.nominal_thrust * (1.0 + swing * inputs[kernel.THRUST])
@@ -155,7 +155,7 @@ def inputs_of(scene, physics, hidden, leg, i, updates, *, noisy, only=None):
 
 
 def fly_leg(scene, hidden, i, *, noisy, only=None, step=0.002):
-    """Fly leg i with all causes or one; returns (physics, inputs, motion, depth at the start)."""
+    """Fly leg i with all causes or one, and return the physics, the inputs, the motion and the depth at the start."""
     leg = scene.legs[i]
     updates = hidden.updates(leg.speed / scene.base.nominal_speed, i, only)
     physics = scene.physics(leg, updates)
@@ -163,7 +163,7 @@ def fly_leg(scene, hidden, i, *, noisy, only=None, step=0.002):
     depth = 6.0 + updates.get("depth_spread", 0.3) * (leg.depth - 6.0)
     flight = {"pitching": scene.pitching, "angle": leg.angle, "depth": depth}
     if updates.get("thrust_swing", scene.notes["swing"]) > 0.0 or physics.surge_loss > 0.0:
-        # authority and damping belong to the speed of the leg, so that must be the run's median speed
+        # authority and damping are given at the speed of the leg, so the run's median speed must equal it
         median = np.median(fly(physics, scene.clock, leg.maneuver, inputs, step=0.01, **flight).surge)
         inputs[kernel.THRUST] *= (leg.speed / median) ** 2
     motion = fly(physics, scene.clock, leg.maneuver, inputs, step=step, **flight)
@@ -171,7 +171,7 @@ def fly_leg(scene, hidden, i, *, noisy, only=None, step=0.002):
 
 
 def sample_of(scene, i, motion, noise=(0.0, 0.0)):
-    """A run as the base fit sees it."""
+    """Return a run as the sample that the base fit takes."""
     leg = scene.legs[i]
     ratio = leg.speed / scene.base.nominal_speed
     angle, rate = motion.angle + noise[0], motion.rate + noise[1]
@@ -179,7 +179,10 @@ def sample_of(scene, i, motion, noise=(0.0, 0.0)):
 
 
 def base_errors(scene, samples, floor):
-    """Pooled error over `floor` of the best base fit on the training runs: (training, validation, rms per channel)."""
+    """Fit the base model to the training runs; return its pooled error over `floor` on training and validation runs.
+
+    The third value is the rms per channel on the validation runs.
+    """
     start = (scene.setting.damping, scene.setting.stiffness)[: 2 if scene.pitching else 1]
     laws = (scene.law,) if len({s.ratio for s in samples}) == 1 else (0.0, 1.0)
     fit = min((fit_base(samples[:TRAINING], start, floor, exponent=e) for e in laws), key=lambda f: f.cost)
@@ -189,12 +192,12 @@ def base_errors(scene, samples, floor):
 
 
 def pooled(rms, floor):
-    """One number for two channels: root of the mean of the squared ratios."""
+    """Return the root of the mean of the squared ratios of rms and floor, one number for both channels."""
     return float(np.sqrt(np.mean((np.asarray(rms) / np.asarray(floor)) ** 2)))
 
 
 def tune(scene, hidden, i, goal):
-    """Set the strength of cause i so that the base error comes near `goal` times the floor; returns how near it came."""
+    """Set the strength of cause i so that the base error is about `goal` times the floor, and return that ratio as reached."""
     name = hidden.causes[i][0]
     largest, seen, floor = LARGEST.get(name, 3.0), [], expected_floor(scene)
     wanted, strength = np.sqrt(goal**2 - 1.0), 0.3
@@ -212,15 +215,15 @@ def tune(scene, hidden, i, goal):
 
 
 def expected_floor(scene):
-    """About what the floor will be: sensor noise, and the gust's part in the angle."""
+    """Return an estimate of the floor: the sensor noise, and the motion that the disturbance causes."""
     gust = scene.notes["gust"] if scene.notes["colour"] in GUSTY else 0.0
     return scene.sigma[0] * np.sqrt(1.0 + gust**2), scene.sigma[1] * (1.0 + 0.3 * min(gust, 1.0))
 
 
 def assemble(name, kind, names, scene, hidden, rng):
-    """Fly every leg with its weather, measure floor and base error, write the logs."""
+    """Fly every leg with its noise and disturbance, measure floor and base error, and return the case with its logs."""
     logs, noise_left, samples = [], [], []
-    if "crossflow_drag" in names:  # without the sway it is drag on the rate squared to anyone
+    if "crossflow_drag" in names:  # without measured sway it cannot be told from quadratic damping
         scene.notes["cross_measured"] = True
     for i, leg in enumerate(scene.legs):
         physics, inputs, motion, depth = fly_leg(scene, hidden, i, noisy=True)
@@ -246,12 +249,12 @@ def assemble(name, kind, names, scene, hidden, rng):
 
 
 def seen(judged, trained, scene):
-    """Whether the base error stands clear of the floor, each of two causes alone as well."""
+    """Whether the base error clearly exceeds the floor, also with each of the causes alone."""
     return judged > VISIBLE and trained > LEARNABLE and min(scene.notes["alone"], default=VISIBLE + 1) > VISIBLE
 
 
 def accepted(names, hidden):
-    """What counts as right: sensors whose clock is late and a late fin are the same thing to a linear hull."""
+    """Return the names that count as correct: to a linear hull, late sensors and a delayed fin are the same."""
     late = hidden.updates(1.0, 0).get("clock_offset", 0.0) < 0.0
     return frozenset(names) | ({"delay"} if late else set())
 

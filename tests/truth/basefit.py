@@ -1,6 +1,6 @@
-"""A plain output-error fit of the base model, to know how badly it fits: linear numbers eliminated, damping searched.
+"""An output-error fit of the base model, which measures how badly it fits: linear parameters eliminated, damping searched.
 
-The small systems are solved by plain loops: the threads of a linear algebra library cost ten times what they give here.
+The small systems are solved by loops: the threads of a linear algebra library cost ten times what they save here.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ FITTED_S = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One run as the fit sees it: fin, angle, rate (n,), interval in s, speed / reference, authority group, trim's factor."""
+    """One run for the fit: fin, angle and rate (n,), interval in s, speed over the reference, authority group, factor on trim."""
 
     fin: np.ndarray
     angle: np.ndarray
@@ -29,7 +29,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class BaseFit:
-    """Damping, stiffness, trim at the reference speed, a group's authority over speed squared, exponent of damping over speed."""
+    """Damping, stiffness, trim at the reference speed, authority by group over speed squared, damping's exponent of speed."""
 
     damping: float
     stiffness: float
@@ -41,7 +41,7 @@ class BaseFit:
 
 @nb.njit(cache=True)
 def _exponential(matrix):
-    """Exponential of a small matrix (3, 3) of norm below about 4, by its series."""
+    """Return the exponential of a (3, 3) matrix of norm below about 4, by its series."""
     total, term, after = np.eye(3), np.eye(3), np.zeros((3, 3))
     for n in range(1, 40):
         for i in range(3):
@@ -54,7 +54,7 @@ def _exponential(matrix):
 
 @nb.njit(cache=True)
 def _march(step, drive, fin):
-    """Responses (n, 2, 4) to the fin, to a constant moment, to a start angle, to a start rate."""
+    """Return the responses (n, 2, 4) of angle and rate to the fin, a constant moment, an initial angle and an initial rate."""
     n = fin.size
     out = np.zeros((n, 2, 4))
     out[0, 0, 2], out[0, 1, 3] = 1.0, 1.0
@@ -68,13 +68,13 @@ def _march(step, drive, fin):
 
 
 def responses(damping, stiffness, fin, interval):
-    """Exact responses (n, 2, 4) of y'' = -damping y' - stiffness y + push for a held fin."""
+    """Return the exact responses (n, 2, 4) of y'' = -damping y' - stiffness y + push, the fin held constant between samples."""
     whole = _exponential(np.array([[0.0, 1.0, 0.0], [-stiffness, -damping, 1.0], [0.0, 0.0, 0.0]]) * interval)
     return _march(whole[:2, :2].copy(), whole[:2, 2].copy(), np.ascontiguousarray(fin))
 
 
 def _system(samples, groups, x, exponent, weights):
-    """Weighted design (rows, p) and target (rows,) of the linear numbers at given damping and stiffness."""
+    """Return the weighted design (rows, p) and target (rows,) of the linear parameters, damping and stiffness x given."""
     rows, targets, p = [], [], groups + 1 + 2 * len(samples)
     for i, s in enumerate(samples):
         unit = responses(x[0] * s.ratio**exponent, x[1] if len(x) > 1 else 0.0, s.fin, s.interval)
@@ -90,7 +90,7 @@ def _system(samples, groups, x, exponent, weights):
 
 @nb.njit(cache=True)
 def _normal(design, target):
-    """design' design (p, p) and design' target (p,): plain loops, for threads of a library cost more than they give."""
+    """Return design' design (p, p) and design' target (p,)."""
     n, p = design.shape
     square, right = np.zeros((p, p)), np.zeros(p)
     for k in range(n):
@@ -108,7 +108,7 @@ def _normal(design, target):
 
 @nb.njit(cache=True)
 def _cholesky_solve(square, right):
-    """Solution (p,) of a small positive system; `square` and `right` are used up."""
+    """Return the solution (p,) of a small positive definite system; `square` and `right` are overwritten."""
     p = right.size
     for i in range(p):
         for j in range(i + 1):
@@ -144,7 +144,10 @@ def _solve(design, target):
 
 
 def _descend(residual, x, low, high):
-    """Levenberg-Marquardt with differences, one or two numbers within bounds: (x, half the sum of squares)."""
+    """Return the minimum of one or two parameters within bounds, and half its sum of squares.
+
+    Levenberg-Marquardt with a Jacobian by differences.
+    """
     here, damp = residual(x), 1e-3
     for _ in range(40):
         step = 1e-4 * np.maximum(np.abs(x), 0.05)
@@ -165,7 +168,7 @@ def _descend(residual, x, low, high):
 
 
 def fit_base(samples, start, weights, *, exponent=0.0):
-    """Fit of `start` = (damping,) or (damping, stiffness); weights: the noise of angle and rate."""
+    """Return the fit from the start values (damping,) or (damping, stiffness); weights: the noise of angle and rate."""
     groups = max(s.group for s in samples) + 1
 
     def residual(x):
@@ -181,14 +184,14 @@ def fit_base(samples, start, weights, *, exponent=0.0):
 
 
 def left_over(fit, sample, weights):
-    """Residuals (n, 2) of angle and rate on a run with nothing but the start refitted."""
+    """Return the residuals (n, 2) of angle and rate on a run, with only the initial state refitted."""
     unit = responses(fit.damping * sample.ratio**fit.exponent, fit.stiffness, sample.fin, sample.interval)
     model = unit[:, :, 0] * fit.authority[sample.group] * sample.ratio**2 + unit[:, :, 1] * fit.trim * sample.trim_factor
     return start_removed(np.stack([sample.angle, sample.rate], axis=1) - model, unit[:, :, 2:], weights)
 
 
 def start_removed(error, unit, weights=(1.0, 1.0)):
-    """Error (n, 2) less the best start: `unit` (n, 2, 2) are the responses to a start angle and a start rate."""
+    """Return an error (n, 2) less its best fit by the responses `unit` (n, 2, 2) to an initial angle and an initial rate."""
     w = np.asarray(weights)[None, :, None]
     design, target = (unit / w).reshape(-1, 2), (error / w[:, :, 0]).reshape(-1)
     best = _solve(design, target)

@@ -1,4 +1,4 @@
-"""A hull of one pole under commands given at times of their own: r' = -a r + b d + c, exact from one command to the next."""
+"""A first-order hull r' = -a r + b d + c under commands at arbitrary times, integrated exactly from one to the next."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True)
 class Commanded:
-    """Commands d (m,) rad given at times (m,) s, the first before all else, and the hull that they move from rest."""
+    """Commands d (m,) in rad at times (m,) in s, the first before every sample, and the hull, which starts at rest."""
 
     times: np.ndarray
     values: np.ndarray
@@ -18,7 +18,7 @@ class Commanded:
     trim: float = 0.0
 
     def motion(self, time):
-        """Angle and rate (2, n) at any times (n,) s, not before the first command."""
+        """Return angle and rate (2, n) at times (n,) in s, none before the first command."""
         a, angle, rate, begun, out = self.damping, 0.0, 0.0, float(self.times[0]), []
         whole = np.append(self.times, np.inf)
         for k, value in enumerate(self.values):
@@ -37,7 +37,7 @@ class Commanded:
 
 
 def pulses(phase, *, every=0.8, count=100, size=0.15, seed=5):
-    """Commands of random sign or none, given `phase` s after whole multiples of `every` s, and one at rest before them."""
+    """Return commands of random sign or zero at `phase` s after multiples of `every` s, and a zero command before them."""
     rng = np.random.default_rng(seed)
     times = every * np.arange(1, count + 1) + phase
     return np.append(0.0, times), np.append(0.0, size * rng.integers(-1, 2, count))

@@ -1,4 +1,4 @@
-"""From the commanded fin to the fin's lift, one fine step at a time: delay, rate limit, lag, play, dead zone, lift curve."""
+"""From the commanded fin angle to the effective one, by fine steps: delay, rate limit, lag, play, dead zone, lift curve."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numba as nb
 
 @nb.njit(cache=True)
 def delayed(command, newest, start, step, sample, delay):
-    """Mean of the held command over [start, start + step] - delay; before the first sample it is the first."""
+    """Return the mean of the zero-order-hold command over [start, start + step] - delay; before sample 0 that of sample 0."""
     a = (start - delay) / sample
     b = (start + step - delay) / sample
     ia = min(max(math.floor(a + 1e-9), 0), newest)
@@ -22,7 +22,7 @@ def delayed(command, newest, start, step, sample, delay):
 
 @nb.njit(cache=True)
 def lagged(memory, target, step, physics):
-    """Mean over the step of a first- or second-order servo's angle; `memory` moves on."""
+    """Return the mean over the step of the angle of a first- or second-order servo; `memory` is advanced."""
     before = memory[1]
     if physics.servo_omega > 0.0:
         w, z = physics.servo_omega, physics.servo_zeta
@@ -42,7 +42,10 @@ def lagged(memory, target, step, physics):
 
 @nb.njit(cache=True)
 def dead_zone(memory, d, physics):
-    """Textbook: nothing below the width, |d| - w above; sticking: all or nothing, let go at half the width."""
+    """Return the angle after a dead zone of width w: zero below it and |d| - w above.
+
+    A sticking one passes the whole angle once it exceeds w, until it is below w / 2.
+    """
     w = physics.deadband_width
     if w <= 0.0:
         return d
@@ -58,7 +61,10 @@ def dead_zone(memory, d, physics):
 
 @nb.njit(cache=True)
 def lift(d, physics):
-    """Asymmetric effect, then the lift's fall beyond the stall angle, sharp or blended over `stall_blend`."""
+    """Return the effective angle after the fin's asymmetry and its loss of lift beyond the stall angle.
+
+    The loss begins sharply, or blended over `stall_blend` rad.
+    """
     d = d * (1.0 + physics.asymmetry if d > 0.0 else 1.0 - physics.asymmetry) + physics.lift_bend * d * d
     if physics.stall_angle <= 0.0:
         return d
@@ -75,9 +81,10 @@ def lift(d, physics):
 
 @nb.njit(cache=True)
 def fin_step(memory, target, step, physics):
-    """Effective fin angle over one step for a command already delayed.
+    """Return the effective fin angle over one step for a delayed command.
 
-    `memory` (5,) moves on: angle after the rate limit, after the lag, its speed, after the play, dead zone engaged.
+    `memory` (5,) is advanced: the angle after the rate limit, that after the lag, its rate, the angle after the play, and
+    whether a sticking dead zone passes it.
     """
     if physics.max_rate > 0.0:
         reach = physics.max_rate * step * (physics.falling_rate if target < memory[0] else 1.0)

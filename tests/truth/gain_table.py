@@ -1,6 +1,7 @@
-"""Gains designed and verified on hulls nobody tuned to, flown on the hulls themselves: settling said and flown, by kind.
+"""Settling times that `verify_schedule` predicts against those flown, on random hulls that nothing was tuned on, by kind.
 
-Every hull is drawn, flown with sensor noise, identified from a training set, given a schedule, and steered by it at its speeds:
+Every hull is drawn, flown with sensor noise, identified from a training set, and steered at its speeds by a schedule designed
+from that:
     python tests/truth/gain_table.py --draws 14 --seed 7 [--controller pd] [--set pulses+zigzag] [--json rows.json]
 """
 
@@ -34,22 +35,23 @@ from truth.maneuvering.trials import SETS, training
 
 EFFECTS = ("servo_lag", "sway_coupling", "quadratic_damping")
 WITHIN, AT_LEAST_S = 0.25, 0.5
-"""How far settling may be off what was said: a share of it, or seconds."""
+"""How far the settling time may differ from the predicted median: a share of it, or seconds."""
 HUNTS = 0.1
-"""Peak to peak in the last quarter over the step: a limit cycle."""
+"""Peak-to-peak heading in the last quarter of a flight, over the step, above which the loop is in a limit cycle."""
 FLOWN_S = 240.0
-"""Long enough for the largest hull to come to rest from 90 deg."""
+"""Duration in which the largest hull settles after a step of 90 deg."""
 
 
 BAND_EDGE = 0.05
-"""Share by which the 2.5 and 97.5 % points of 60 draws differ from one seed to another."""
+"""Share by which the 2.5 and 97.5 % points of 60 draws vary from seed to seed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """One step flown beside what was said of it: median and 95 % band of the draws (s); NaN without a schedule.
+    """The settling time (s) of one flown step, and its prediction: median (`said`) and 95 % band of the draws.
 
-    `said` alone is NaN where verify gives no settling time, as of a step that hangs on what no run showed.
+    All are NaN without a schedule; only `said` is NaN where verify predicts no settling time, as for a step that depends on
+    motion that no run contains.
     """
 
     draw: int
@@ -67,27 +69,27 @@ class Outcome:
     margin: float
     refused: str = ""
     extrapolated: bool = False
-    """Whether verify said that the step turns tighter than any run did."""
+    """Whether verify reported that the step turns tighter than any run."""
 
     @property
     def as_said(self) -> bool:
-        """Whether settling is the median that was said, to the share or the seconds."""
+        """Whether the settling time equals the predicted median, to WITHIN or AT_LEAST_S."""
         return bool(np.isfinite(self.said)) and abs(self.flown - self.said) <= max(WITHIN * self.said, AT_LEAST_S)
 
     @property
     def in_band(self) -> bool:
-        """Whether settling is as said, or in the band that was said, whose edges are known from 60 draws to BAND_EDGE."""
+        """Whether the settling time is as predicted, or in the predicted band, whose edges 60 draws determine to BAND_EDGE."""
         edges = (1.0 - BAND_EDGE) * self.said_low, (1.0 + BAND_EDGE) * self.said_high
         return self.as_said or edges[0] <= self.flown <= edges[1]
 
     @property
     def hunts(self) -> bool:
-        """Whether the loop goes on swinging."""
+        """Whether the loop is in a limit cycle."""
         return not self.swing <= HUNTS
 
 
 def identified(hull: Hull, draw: int, seed: int, which: str) -> tuple[ParameterSource, list[Run]]:
-    """Return the models of a hull's training set, one per speed by its pulses, and the runs."""
+    """Return the models of a hull's training set, one for each speed, fitted to its pulses, and the runs."""
     logs = training(hull, which, np.random.default_rng([seed, draw, SETS.index(which)]), sway=True)
     runs = [Run(log.name, log.time, log.columns) for log in logs]
     models = [f.model for run in runs if run.name.startswith("pulses") for f in identify([run], Axis.YAW, effects=EFFECTS)]
@@ -95,13 +97,13 @@ def identified(hull: Hull, draw: int, seed: int, which: str) -> tuple[ParameterS
 
 
 def law_of(schedule: Schedule) -> np.ndarray:
-    """Return a schedule as the table that steers a hull."""
+    """Return a schedule as the table (k, 7) that `steered` takes."""
     names = ("speed_m_s", "kp", "ki", "kd", "feed_forward_rad", "reference_gain", "fin_limit_rad")
     return np.array([schedule.column(n) for n in names], dtype=float).T
 
 
 def evaluate(hull: Hull, draw: int, seed: int, kind: str, which: str) -> list[Outcome]:
-    """Return the steps of one hull."""
+    """Return the outcome of each step on one hull, refused ones included."""
     nan = float("nan")
     try:
         source, runs = identified(hull, draw, seed, which)
@@ -123,7 +125,7 @@ def evaluate(hull: Hull, draw: int, seed: int, kind: str, which: str) -> list[Ou
 
 
 def flown(hull: Hull, draw: int, law: np.ndarray, speed: float, size: float, said: StepCheck, margin: float) -> Outcome:
-    """Return what a step (rad) of the course does on the hull."""
+    """Return the outcome of a course step (rad) on the hull, next to its prediction."""
     motion = steered(hull, speed, law, size, FLOWN_S)
     heading = motion[:, 1]
     tail = heading[-round(0.25 * heading.size) :]
@@ -142,7 +144,7 @@ def line(name: str, rows: list[Outcome]) -> str:
     if not known:
         why = "none said" if flights else f"none designed: {rows[0].refused[:60]}"
         return f"{name:34s} {len(rows):5d} {why}"
-    # what was said never to settle is off by the whole
+    # a step that was predicted never to settle counts as 100 % off
     off = np.array([abs(r.flown - r.said) / max(r.said, AT_LEAST_S / WITHIN) if np.isfinite(r.said) else 1.0 for r in known])
     held = 100.0 * float(np.mean([r.as_said for r in known]))
     below = 100.0 * float(np.mean([r.in_band for r in known]))
@@ -154,7 +156,7 @@ def line(name: str, rows: list[Outcome]) -> str:
 
 
 def table(rows: list[Outcome]) -> list[str]:
-    """Return the table's lines: all, then by kind, by size of step, stable and unstable."""
+    """Return the lines of the table: all hulls, then by kind, size of step, extrapolation and stability."""
     heads = "rows none   mid %  worst %  as said% in band %  hunt  over %   margin"
     lines = [f"{'settling flown against said':34s}  {heads}", line("all", rows)]
     lines += [line(f"  {kind}", part) for kind in KINDS if (part := [r for r in rows if r.kind == kind])]

@@ -73,11 +73,11 @@ class Hull(NamedTuple):
 
 
 REMUS = Hull()
-"""As published: directionally unstable at small angles (Munk moment), held by cross-flow drag."""
+"""As published: directionally unstable at small angles (Munk moment), limited by cross-flow drag."""
 
 
 def with_fins(hull: Hull, factor: float) -> Hull:
-    """The same hull with `factor` times the fin area: fin lift acts on v, r, w, q and the fin angle alike."""
+    """Return the hull with `factor` times the fin area, which scales the fin lift by v, r, w, q and the fin angle alike."""
     lift, arm = hull.Yuudr, hull.Nuudr / hull.Yuudr
     more = (factor - 1.0) * lift
     return hull._replace(
@@ -92,7 +92,7 @@ STEADY = with_fins(REMUS, 2.5)
 
 
 def inverse_mass(hull: Hull):
-    """Inverse (6, 6) of rigid-body and added mass."""
+    """Return the inverse (6, 6) of the rigid-body and added mass."""
     m, zg = hull.mass, hull.zg
     matrix = np.diag(
         [m - hull.Xudot, m - hull.Yvdot, m - hull.Zwdot, hull.Ixx - hull.Kpdot, hull.Iyy - hull.Mqdot, hull.Izz - hull.Nrdot]
@@ -105,7 +105,7 @@ def inverse_mass(hull: Hull):
 
 
 def yaw_plane(hull: Hull, speed: float):
-    """Linear sway-yaw dynamics at a speed: matrices (2, 2) on (v, r) and (2,) on the rudder."""
+    """Return the linear sway-yaw dynamics at a speed: the matrix (2, 2) on (v, r) and the vector (2,) on the rudder."""
     mass = np.array([[hull.mass - hull.Yvdot, -hull.Yrdot], [-hull.Nvdot, hull.Izz - hull.Nrdot]])
     force = speed * np.array([[hull.Yuv, hull.Yur - hull.mass], [hull.Nuv, hull.Nur]])
     return np.linalg.solve(mass, force), np.linalg.solve(mass, speed**2 * np.array([hull.Yuudr, hull.Nuudr]))

@@ -14,7 +14,7 @@ U, V, W, P, Q, R, X, Y, Z, PHI, THETA, PSI = range(12)
 
 @nb.njit(cache=True)
 def loads(s, h, rudder, elevator, thrust, out):
-    """Forces and moments (6,) but for the added-mass accelerations."""
+    """Write the forces and moments (6,), without the added-mass terms in the accelerations, to `out`."""
     u, v, w, p, q, r = s[U], s[V], s[W], s[P], s[Q], s[R]
     m, zg, light = h.W / h.g, h.zg, h.W - h.B
     sin_t, cos_t, sin_f, cos_f = math.sin(s[THETA]), math.cos(s[THETA]), math.sin(s[PHI]), math.cos(s[PHI])
@@ -34,7 +34,10 @@ def loads(s, h, rudder, elevator, thrust, out):
 
 @nb.njit(cache=True)
 def hull_slope(s, h, minv, rudder, elevator, thrust, water, gust, load, out):
-    """Time derivative (12,) of the state; velocities are through the water, `water` (3,) is the current in NED."""
+    """Write the time derivative (12,) of the state to `out`.
+
+    u, v, w are velocities through the water; `water` (3,) is the current in NED, in m/s.
+    """
     loads(s, h, rudder, elevator, thrust, load)
     load[4] += gust[0]
     load[5] += gust[1]
@@ -56,9 +59,9 @@ def hull_slope(s, h, minv, rudder, elevator, thrust, water, gust, load, out):
 
 @nb.njit(cache=True)
 def hull_advance(s, h, minv, fins, commands, memory, thrust, water, gust, step, count):
-    """Advance the state by `count` fine steps with held commands (rudder, elevator); returns the fins' last angles.
+    """Advance the state by `count` fine steps, (rudder, elevator) commands held constant, and return the fins' last angles.
 
-    `memory` (2, 5) belongs to the two fins' paths; both fins are of the same make (`fins`).
+    `memory` (2, 5) is that of the two fins' paths, whose coefficients are the same (`fins`).
     """
     k, load, mid = np.zeros((4, 12)), np.zeros(6), np.zeros(12)
     rudder, elevator = 0.0, 0.0

@@ -13,13 +13,14 @@ ANGLE, RATE, CROSS, ROLL, ROLL_RATE, DEPTH, SURGE, MEMORY, SLOSH, SLOSH_RATE = r
 STATES = 10
 DISTURBANCE, EVENT, AUTHORITY, DAMPING, JAM, THRUST, ROLL_PUSH, ANGLE_NOISE, RATE_NOISE = range(9)
 INPUTS = 9
-"""Rows of `inputs` (9, n): moments, factors on authority and damping, fin jammed, thrust, roll push, sensor noise."""
+"""Rows of `inputs` (9, n): two moments (rad/s^2), factors on authority and damping, whether the fin is jammed, thrust (N), roll
+acceleration (rad/s^2), noise of angle and rate."""
 OPEN, HOLD, ZIGZAG = 0, 1, 2
 
 
 @nb.njit(cache=True)
 def crossflow(s, p):
-    """32 * integral over xi in [-1/2, 1/2] of (s + xi p)|s + xi p| xi, exactly."""
+    """Return 32 times the integral over xi in [-1/2, 1/2] of (s + xi p)|s + xi p| xi, exactly."""
     if abs(s) >= 0.5 * abs(p):
         return 32.0 * math.copysign(1.0, s) * s * p / 6.0
     k = -s / p
@@ -31,7 +32,10 @@ def crossflow(s, p):
 
 @nb.njit(cache=True)
 def strips(s, p):
-    """integral over xi in [-1/2, 1/2] of (s + xi p)|s + xi p|, by Simpson's rule on either side of where the flow turns."""
+    """Return the integral over xi in [-1/2, 1/2] of (s + xi p)|s + xi p|.
+
+    By Simpson's rule on either side of the station where the flow changes sign.
+    """
     turn = min(max(-s / p, -0.5), 0.5) if p != 0.0 else 0.5
     total = 0.0
     for low, high in ((-0.5, turn), (turn, 0.5)):
@@ -43,7 +47,7 @@ def strips(s, p):
 
 @nb.njit(cache=True)
 def moments(y, q, t, event, thrust):
-    """Sum of the moments that are neither damping, stiffness nor fin, in rad/s^2."""
+    """Return the sum of the moments other than damping, stiffness and fin, in rad/s^2."""
     deep = y[DEPTH] - q.depth_reference
     m = event + q.thrust_moment * thrust + q.roll_moment * y[ROLL] + q.depth_moment * deep
     m += q.thrust_square * (thrust - q.reference_thrust) ** 2 + q.roll_rate_moment * y[ROLL_RATE] + q.depth_square * deep**2
@@ -69,7 +73,7 @@ def moments(y, q, t, event, thrust):
 
 @nb.njit(cache=True)
 def slope(y, out, q, t, fin, now, pitching):
-    """Time derivative of the state (10,) into `out`; `now` (9,) are the inputs of this instant."""
+    """Write the time derivative of the state (10,) to `out`; `now` (9,): the inputs at time t."""
     authority, damping = q.authority * now[AUTHORITY], q.damping * now[DAMPING]
     if q.speed_varying > 0.0:
         ratio = y[SURGE] / q.median_speed
@@ -103,7 +107,7 @@ def slope(y, out, q, t, fin, now, pitching):
 
 @nb.njit(cache=True)
 def advance(y, work, q, t, h, fin, now, pitching):
-    """One Runge-Kutta step of length h; `work` (5, 10) is scratch."""
+    """Advance the state y (10,) by one Runge-Kutta step of length h (s); `work` (5, 10) is scratch."""
     slope(y, work[0], q, t, fin, now, pitching)
     for i in range(STATES):
         work[4, i] = y[i] + 0.5 * h * work[0, i]
@@ -120,7 +124,7 @@ def advance(y, work, q, t, h, fin, now, pitching):
 
 @nb.njit(cache=True)
 def pilot(mode, held, angle, rate, q, last):
-    """Fin command of the closed-loop modes, within the fin's limit; `held` is the angle to hold."""
+    """Return the fin command of the closed-loop modes, within the fin's limit; `held`: the angle to keep."""
     sign = math.copysign(1.0, q.authority)
     if mode == ZIGZAG:
         away = (angle - held) * sign
@@ -137,11 +141,11 @@ def pilot(mode, held, angle, rate, q, last):
 
 @nb.njit(cache=True)
 def fly(q, y, plan, mode, inputs, known, sample, steps, origin, pitching):
-    """Fly one run: returns (command (n,), fine (n * steps, 3): angle, rate, fin, and states (n, 10) at the samples).
+    """Fly one run; return command (n,), angle, rate and fin at the fine steps (n * steps, 3), states (n, 10) at the samples.
 
-    plan, mode (n,): open-loop command and who steers, a plan other than zero in HOLD means the angle of that moment;
-    inputs (9, n); known (3, n): roll, depth and surge as they were, or (3, 0) when they are to be simulated;
-    origin: time of sample 0.
+    plan, mode (n,): the open-loop command, and whether it, the pilot or the zig-zag rule steers; in HOLD a plan other than zero
+    makes the pilot keep the angle at which HOLD begins, not the initial one. inputs (9, n). known (3, n): roll, depth and surge
+    to impose, or (3, 0) to simulate them. origin: time of sample 0, in s.
     """
     n = plan.size
     command, fine, states = np.zeros(n), np.zeros((n * steps, 3)), np.zeros((n, STATES))
@@ -151,7 +155,7 @@ def fly(q, y, plan, mode, inputs, known, sample, steps, origin, pitching):
         after = min(k + 1, n - 1)
         angle, rate = y[ANGLE] + inputs[ANGLE_NOISE, k], y[RATE] + inputs[RATE_NOISE, k]
         if mode[k] == HOLD and last_mode != HOLD and last_mode >= 0 and q.stiffness == 0.0 and plan[k] != 0.0:
-            held = angle  # hold the course of this moment rather than the one of the start
+            held = angle  # keep the present course, not the initial one
         last_mode = mode[k]
         last = command[k - 1] if k > 0 else 0.0
         steered = pilot(mode[k], held, angle, rate, q, last)

@@ -1,4 +1,4 @@
-"""A flown run becomes a log: canonical columns with the noise of each sensor, some sensors not fitted; logs become files."""
+"""Logs of flown runs: canonical columns with the noise of each sensor, where some sensors are missing; logs as files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ DEG = np.pi / 180.0
 
 
 def write_log(rng, scene, motion, sample, inputs):
-    """Columns (n,) by canonical name; commands only, as a log has them; sway (heave) in about half of the logs' vehicles."""
+    """Return the columns (n,) by canonical name: of the fin the command only, and sway (heave) for about half of the vehicles."""
     n, clock = motion.time.size, scene.clock
     noise = lambda sigma: sigma * rng.standard_normal(n)  # noqa: E731
     fitted = scene.notes.setdefault("cross_measured", bool(rng.random() < 0.5))
@@ -37,7 +37,10 @@ def flown(
     physics, clock, maneuver, *, pitching=False, angle_noise=0.0, rate_noise=0.0, gust=0.0, gust_s=1.0, seed=0,
     angle=0.0, depth=2.0,
 ):  # fmt: skip
-    """Fly one run and log it: white noise (rad, rad/s), and a disturbance moment of spread gust (rad/s^2) over gust_s."""
+    """Fly one run and return its log, with white noise (rad, rad/s).
+
+    gust, gust_s: standard deviation (rad/s^2) and correlation time (s) of a disturbance moment.
+    """
     rng, inputs = np.random.default_rng(seed), calm(clock, physics.nominal_thrust)
     inputs[kernel.ANGLE_NOISE] = white(rng, clock.total, angle_noise)
     inputs[kernel.RATE_NOISE] = white(rng, clock.total, rate_noise)
@@ -53,7 +56,7 @@ def flown(
 
 
 def write_csv(log, path):
-    """Write a log (columns by canonical name) as .csv or .csv.gz, nine digits, NaN as an empty field; returns the path."""
+    """Write a log (columns by canonical name) as .csv or .csv.gz, nine digits, NaN as an empty field, and return the path."""
     path, names = Path(path), list(log)
     table = np.stack([log[name] for name in names], axis=1)
     rows = (",".join("" if np.isnan(v) else f"{v:.9g}" for v in row) for row in table)

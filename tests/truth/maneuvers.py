@@ -1,4 +1,4 @@
-"""Excitations written a second time: who steers at each sample, and the open-loop command."""
+"""Excitations, written independently of the package: the open-loop command, and at each sample who steers."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from truth.kernel import HOLD, OPEN, ZIGZAG
 
 @dataclass(frozen=True, slots=True)
 class Maneuver:
-    """Command (n,) in rad where mode (n,) is OPEN; in HOLD the pilot steers, in ZIGZAG the rule of the zig-zag does.
+    """The command (n,) in rad where mode (n,) is OPEN; in HOLD the pilot steers, in ZIGZAG the zig-zag rule.
 
-    A command other than zero in HOLD tells the pilot to keep the heading of that moment, not of the start.
+    A command other than zero in HOLD makes the pilot keep the heading at which HOLD begins, not the initial one.
     """
 
     name: str
@@ -23,7 +23,7 @@ class Maneuver:
 
 
 def _sequence(name, time, parts, *, keep_course=False):
-    """Put open-loop parts [(start, end, fin)] into a held course."""
+    """Return a maneuver with the open-loop parts [(start, end, fin)], in s and rad, and a pilot who keeps the course between."""
     command, mode = np.zeros(time.size), np.full(time.size, HOLD)
     if keep_course:
         command[:] = 1.0
@@ -34,7 +34,7 @@ def _sequence(name, time, parts, *, keep_course=False):
 
 
 def pulses(time, amplitude=0.26, second=0.15, *, width=2.0, start=2.0, recovery=11.0, polarity=1.0, name="pulses"):
-    """The paper's: +/- `amplitude` for `width` s each, recovery by the pilot, +/- `second`, recovery; again in mirror image."""
+    """Return the paper's pulses: +/- `amplitude`, `width` s each, recovery by the pilot, +/- `second`, recovery; mirrored."""
     parts, t, sign = [], start, polarity
     while t + 2 * width + 4.0 < time[-1]:
         for size in (amplitude, second):
@@ -45,7 +45,7 @@ def pulses(time, amplitude=0.26, second=0.15, *, width=2.0, start=2.0, recovery=
 
 
 def three_two_one_one(time, amplitude=0.2, *, step=1.2, start=2.0, recovery=9.0):
-    """Steps of 3, 2, 1, 1 times `step` s in turn to either side, then recovery, the next one mirrored."""
+    """Return 3-2-1-1 inputs: 3, 2, 1 and 1 times `step` s to alternate sides, then recovery; every second one mirrored."""
     parts, t, sign = [], start, 1.0
     while t + 7 * step + 3.0 < time[-1]:
         for i, length in enumerate((3, 2, 1, 1)):
@@ -56,7 +56,7 @@ def three_two_one_one(time, amplitude=0.2, *, step=1.2, start=2.0, recovery=9.0)
 
 
 def prbs(time, rng, amplitude=0.15, *, hold=0.8, start=2.0, block=14.0, recovery=6.0):
-    """Random binary fin, constant over `hold` s, in blocks of `block` s with recovery between."""
+    """Return a random binary fin, constant over `hold` s, in blocks of `block` s with recovery between them."""
     parts, t = [], start
     while t + 4.0 < time[-1]:
         end = min(t + block, time[-1] - 2.0)
@@ -67,7 +67,7 @@ def prbs(time, rng, amplitude=0.15, *, hold=0.8, start=2.0, block=14.0, recovery
 
 
 def multisine(time, rng, amplitude=0.2, *, start=2.0, end_rest=4.0):
-    """Sum of six sines from 0.08 to 1.2 Hz scaled to a peak of `amplitude`."""
+    """Return a sum of six sines from 0.08 to 1.2 Hz, scaled to a peak of `amplitude`."""
     inside = (time >= start) & (time < time[-1] - end_rest)
     wave = sum(np.sin(2 * np.pi * f * (time - start) + rng.uniform(0, 2 * np.pi)) / f**0.3 for f in np.geomspace(0.08, 1.2, 6))
     scale = amplitude / np.abs(wave[inside]).max()
@@ -75,13 +75,13 @@ def multisine(time, rng, amplitude=0.2, *, start=2.0, end_rest=4.0):
 
 
 def zigzag(time, fin=0.17, angle=0.17, *, start=2.0, end_rest=4.0):
-    """Fin +/- `fin` reversed whenever the heading (pitch) is `angle` off the start."""
+    """Return a zig-zag: the fin, +/- `fin`, is reversed when the heading (pitch) differs by `angle` from the initial one."""
     inside = (time >= start) & (time < time[-1] - end_rest)
     return Maneuver("zigzag", np.zeros(time.size), np.where(inside, ZIGZAG, HOLD), {"zigzag_fin": fin, "zigzag_angle": angle})
 
 
 def circle(time, fin=0.2, *, start=2.0, length=22.0, rest=6.0):
-    """Constant fin to one side for `length` s, rest on the course reached, then the other side."""
+    """Return circles: a constant fin to one side for `length` s, a rest on the course reached, then the other side."""
     parts, t, sign = [], start, 1.0
     while t + 5.0 < time[-1]:
         parts.append((t, min(t + length, time[-1] - 2.0), sign * fin))
@@ -90,7 +90,7 @@ def circle(time, fin=0.2, *, start=2.0, length=22.0, rest=6.0):
 
 
 def stairs(time, amplitude=0.2, *, start=2.0, length=5.0, rest=4.0):
-    """Steps of growing size to alternating sides, with recovery between: 1/4, 1/2, 3/4 and the whole amplitude."""
+    """Return steps of 1/4, 1/2, 3/4 and 1 times the amplitude to alternate sides, with recovery between them."""
     parts, t, i = [], start, 0
     while t + length + 2.0 < time[-1]:
         parts.append((t, t + length, amplitude * (0.25 * (1 + i % 4)) * (-1) ** i))

@@ -1,4 +1,4 @@
-"""What a real day adds: sensor noise, a disturbance moment, quantisation, gaps, and the events no model knows."""
+"""Sensor noise, disturbance moments, quantisation, gaps, and events that are in no model."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from truth import kernel
 
 PRE_S = 1.0
 TAIL_S = 0.6
-"""Flown before the log starts and after it ends, so that delays and shifted clocks have something to look at."""
+"""Time (s) flown before the log starts and after it ends, which delays and shifted clocks need."""
 
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """Sampling of one log: interval in s and number of samples, with the parts flown around it."""
+    """Sampling of one log: interval in s and number of samples; PRE_S and TAIL_S are flown around it."""
 
     sample: float
     samples: int
@@ -35,21 +35,21 @@ class Clock:
 
     @property
     def whole(self):
-        """Time of every sample that is flown, (total,), zero where the log starts."""
+        """Times (total,) of all flown samples in s, zero at the start of the log."""
         return (np.arange(self.total) - self.pre) * self.sample
 
     def logged(self, values):
-        """The part of a flown series (total,) that is in the log."""
+        """Return the part of a flown series (total,) that is in the log."""
         return values[self.pre : self.pre + self.samples]
 
 
 def white(rng, n, sigma):
-    """White Gaussian noise (n,)."""
+    """Return white Gaussian noise (n,)."""
     return sigma * rng.standard_normal(n)
 
 
 def ar1(rng, n, sigma, correlation_s, sample):
-    """Stationary Ornstein-Uhlenbeck noise (n,) of standard deviation sigma."""
+    """Return stationary Ornstein-Uhlenbeck noise (n,) of standard deviation sigma."""
     keep = np.exp(-sample / correlation_s)
     drive = rng.standard_normal(n) * sigma * np.sqrt(1.0 - keep * keep)
     drive[0] = sigma * rng.standard_normal()
@@ -57,12 +57,12 @@ def ar1(rng, n, sigma, correlation_s, sample):
 
 
 def quantised(values, step):
-    """Values rounded to whole counts of `step`."""
+    """Return values rounded to multiples of `step`."""
     return np.round(np.asarray(values) / step) * step
 
 
 def with_gaps(rng, values, count, length):
-    """A copy with `count` gaps of `length` samples set to NaN."""
+    """Return a copy with `count` gaps of `length` samples set to NaN."""
     out = np.array(values, dtype=float)
     for start in rng.integers(0, max(out.size - length, 1), count):
         out[start : start + length] = np.nan
@@ -70,7 +70,7 @@ def with_gaps(rng, values, count, length):
 
 
 def telegraph(rng, time, low, mean_s):
-    """A factor (n,) that jumps between 1 and `low`, staying about `mean_s` at each."""
+    """Return a factor (n,) that jumps between 1 and `low` and stays about `mean_s` s at each."""
     out, level, until = np.ones(time.size), 1.0, time[0] + rng.exponential(mean_s)
     for i, t in enumerate(time):
         if t >= until:
@@ -80,7 +80,7 @@ def telegraph(rng, time, low, mean_s):
 
 
 def bursts(rng, time, amplitude, count):
-    """A moment (n,): short trains of oscillation at random times."""
+    """Return a moment (n,) of short trains of oscillation at random times."""
     out = np.zeros(time.size)
     for _ in range(count):
         start, length, omega = rng.uniform(2.0, time[-1] - 6.0), rng.uniform(3.0, 7.0), rng.uniform(1.0, 3.0)
@@ -90,7 +90,7 @@ def bursts(rng, time, amplitude, count):
 
 
 def jams(rng, time, count, length_s):
-    """One (n,) where the fin is jammed, zero elsewhere."""
+    """Return an array (n,) that is one where the fin is jammed and zero elsewhere."""
     out = np.zeros(time.size)
     for _ in range(count):
         start = rng.uniform(3.0, max(time[-1] - length_s - 2.0, 4.0))
@@ -99,7 +99,7 @@ def jams(rng, time, count, length_s):
 
 
 def calm(clock, thrust=50.0):
-    """Inputs of the kernel (9, total) with nothing in them but a steady thrust."""
+    """Return the inputs of the kernel (9, total) without noise and events, at a steady thrust (N)."""
     out = np.zeros((kernel.INPUTS, clock.total))
     out[[kernel.AUTHORITY, kernel.DAMPING]] = 1.0
     out[kernel.THRUST] = thrust

@@ -1,4 +1,4 @@
-"""The paper's identified vehicles (tables 2 and 3) as truth, flown as its experiment was: 33 s at 20 Hz, pulses, recovery."""
+"""The paper's identified vehicles (tables 2 and 3) as truth, flown as in its experiment: pulses and recovery, 33 s at 20 Hz."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ PITCH = (
 
 
 def physics_of(row: YawRow | PitchRow) -> Physics:
-    """The truth of a row, with a pilot who keeps its trim."""
+    """Return the physics of a row, with a pilot who cancels its trim."""
     if isinstance(row, YawRow):
         base = Physics(damping=row.a22, authority=row.b2, trim=row.C0, nominal_speed=row.speed)
         return base._replace(kp=0.8 / abs(row.b2), kd=0.4 / abs(row.b2), fin_trim=-row.C0 / row.b2)
@@ -56,7 +56,7 @@ def physics_of(row: YawRow | PitchRow) -> Physics:
 
 
 def paper_run(row: YawRow | PitchRow, *, angle_noise=0.0, rate_noise=0.0, seed=0, rate_hz=20.0, duration=33.0):
-    """A log (canonical columns) of the paper's experiment on a row of its tables; noise white, rad and rad/s."""
+    """Return a log (canonical columns) of the paper's experiment with a row of its tables; white noise in rad and rad/s."""
     pitching, clock = isinstance(row, PitchRow), Clock(1.0 / rate_hz, round(duration * rate_hz))
     plan = maneuvers.pulses(clock.time, 0.26, 0.15, start=2.0, recovery=9.0)
     start = row.theta0_deg * DEG if pitching else 0.0

@@ -1,4 +1,4 @@
-"""Numbers of the truth: base model, actuator, hydrodynamics, sensor, and what no catalogue has.
+"""Coefficients of the simulated truth: base model, actuator, hydrodynamics, sensor, and causes that are in no catalogue.
 
 Angle y, rate p, fin d, speed u, time t since the log's start:
     y' = p,  p' = -damping p - stiffness y + authority (d + fin_bend) + trim + effects.
@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 
 class Physics(NamedTuple):
-    """All coefficients of one run, SI and radians; floats only, so that the compiled kernel takes it whole."""
+    """All coefficients of one run, SI and radians; floats only, so that it can be passed to the compiled kernel."""
 
     damping: float = 1.0
     stiffness: float = 0.0
@@ -110,7 +110,7 @@ class Physics(NamedTuple):
 
 @dataclass(frozen=True)
 class HiddenEffect:
-    """An effect: its coefficients here, those that a fit must give back, the maneuver, and within which share."""
+    """An effect to recover: its coefficients here, the values that a fit must return, their relative tolerance, the maneuver."""
 
     name: str
     physics: dict[str, float]
@@ -152,4 +152,4 @@ HIDDEN_EFFECTS = (
     HiddenEffect("large_angle_righting", {"righting": 1.0}, {"righting_sin": 0.4, "righting_cos": -0.02}, "stairs", "pitch", 0.1),
     HiddenEffect("depth_buoyancy", {"depth_moment": 0.01}, {"depth_moment": 0.01}, "stairs", "pitch"),
 )  # fmt: skip
-"""What each effect of the catalogue is recovered from; tests/recovery flies and fits them."""
+"""The case from which each effect of the catalogue is recovered; tests/recovery flies and fits them."""

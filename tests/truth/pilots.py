@@ -12,7 +12,10 @@ from truth.vehicle import QUIET, STOCK, Controller, Fins, Measured, fly_vehicle
 
 @dataclass(slots=True)
 class Autopilot:
-    """Heading PD and depth through pitch PD for the REMUS' signs; None for the heading leaves the rudder at its offset."""
+    """PD control of heading, and of depth through pitch, with the signs of the REMUS.
+
+    heading None: the rudder stays at its trim. depth None: the pitch is controlled to `pitch`.
+    """
 
     heading: float | None = 0.0
     depth: float | None = 5.0
@@ -27,7 +30,7 @@ class Autopilot:
     largest_pitch: float = 0.35
 
     def __call__(self, _t: float, seen: Measured) -> tuple[float, float]:
-        """Rudder and elevator for one sample: positive rudder turns to port, positive elevator noses down."""
+        """Return rudder and elevator (rad) for one sample: positive rudder turns to port, positive elevator noses down."""
         wanted = self.pitch
         if self.depth is not None:
             wanted = float(np.clip(self.depth_gain * (seen.depth - self.depth), -self.largest_pitch, self.largest_pitch))
@@ -39,9 +42,9 @@ class Autopilot:
 
 
 def excited(pilot: Autopilot, axis: str, times, fins, *, keep_course: bool = False) -> Controller:
-    """A pilot that leaves one fin to an open-loop program: `fins` (n,) held from `times` (n,) on, NaN where it steers.
+    """Return a pilot who leaves one fin to an open-loop program: `fins` (n,) held constant from `times` (n,) on.
 
-    keep_course: hold the heading reached when the program lets go, not the one of the start.
+    The pilot steers where fins is NaN. keep_course: keep the heading at the end of the program, not the initial one.
     """
     times, fins = np.asarray(times), np.asarray(fins)
 
@@ -58,7 +61,10 @@ def excited(pilot: Autopilot, axis: str, times, fins, *, keep_course: bool = Fal
 
 
 def zigzagging(pilot: Autopilot, axis: str, *, fin: float, angle: float, start: float = 2.0, end: float = 56.0) -> Controller:
-    """The zig-zag rule on one axis between two times: the fin goes over when heading (pitch) is `angle` off the start."""
+    """Return a pilot who follows the zig-zag rule on one axis between two times.
+
+    The fin is reversed when the heading (pitch) differs by `angle` from that at the start.
+    """
     state = {"fin": -fin, "from": None}  # positive fin turns to negative angles on this vehicle
 
     def steer(t, seen):
@@ -75,7 +81,7 @@ def zigzagging(pilot: Autopilot, axis: str, *, fin: float, angle: float, start: 
 
 
 def steady_turn(rudder: float, *, speed: float = 1.54, hull: Hull = STEADY, fins: Fins = STOCK, settle: float = 90.0):
-    """The settled turn under a held rudder at level depth: radius in m, speed in m/s, rate in rad/s, drift angle in rad."""
+    """Return radius (m), speed (m/s), yaw rate (rad/s) and drift angle (rad) of the steady turn at constant rudder and depth."""
     level = Autopilot(heading=None, depth=5.0)
 
     def hold(t, seen):

@@ -1,7 +1,7 @@
-"""The truth of a case in the words of the catalogue: what an effect's coefficients are where the truth has it.
+"""The truth of a case as coefficients of the catalogue's effects.
 
-A shape that is not the textbook's is given by the textbook's part of it; what the base model's numbers are beside it is left to
-the reader, who fits them with these held.
+A form that is not the textbook's is represented by its textbook part. The parameters of the base model are not given where they
+change with it; the caller fits them with these coefficients fixed.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True)
 class Projection:
-    """Coefficients that all runs share, and those that each training run has of its own; numbers of the base where known."""
+    """Coefficients shared by all runs, those of each training run, and parameters of the base model where known."""
 
     shared: dict[str, float]
     per_run: list[dict[str, float]] = field(default_factory=list)
@@ -21,9 +21,10 @@ class Projection:
 
 
 def without_fin(damping, stiffness, authority, cross):
-    """Base and cross state (damping, rate) of the same response to the fin, the fin's own lift on the cross state taken away.
+    """Return damping, stiffness, cross damping and cross rate of a model with the same response to the fin but no fin term in x'.
 
-    (s^2 + a s + k)(s + c) + n s and b (s + c) + f, as x' = -c x - n p + f d: the zero c + f / b becomes the cross damping.
+    The cross state is x' = -c x - n p + f d, (c, n, f) = `cross`. The transfer function from fin to angle has the denominator
+    (s^2 + a s + k)(s + c) + n s and the numerator b (s + c) + f; its zero c + f / b becomes the cross damping.
     """
     c, n, f = cross
     zero = c + f / authority
@@ -33,7 +34,7 @@ def without_fin(damping, stiffness, authority, cross):
 
 
 def of_own_bank(case, reference):
-    """Projection of a case of tests/truth/bank.py at a reference speed in m/s."""
+    """Return the projection of a case of tests/truth/bank.py at a reference speed in m/s."""
     d, name = case.details, case.effects[0]
     u = reference / d["nominal_speed"] if np.isfinite(reference) else 1.0
     q = d["fields"]
@@ -84,7 +85,7 @@ def of_own_bank(case, reference):
 
 
 def of_second_bank(key, run_s):
-    """Projection of a case of the second bank by its key; run_s is the length of its runs in s."""
+    """Return the projection of a case of the second bank from its key; run_s: duration of its runs in s."""
     p, v, name = key["parameters"], key["vehicle"], key["effects"][0]
     pitching, speed = key["axis"] == "pitch", float(np.median(key["speeds_m_s"]))
     base = {"damping": v["c2"] if pitching else v["a"], "stiffness": v["c3"] if pitching else 0.0}
@@ -102,7 +103,7 @@ def of_second_bank(key, run_s):
         "current": lambda: {"current_sin": p["k_c"] * np.cos(p["psi_c"]), "current_cos": -p["k_c"] * np.sin(p["psi_c"])},
         "wave": lambda: {"period": p["t_w"], "amplitude": p["a_w"]},
         "trim_drift": lambda: {"drift": 60.0 * p["k_t"]},
-        # the log's thrust ratio is n itself, and the moment goes with its square: the slope at the middle
+        # the log's thrust ratio is n, and the moment is proportional to n^2: take the slope at the mean
         "prop_moment": lambda: {"prop_moment": 2.0 * p["k_n"] * speed / 2.4},
         "compass_deviation": lambda: {
             "deviation_sin": p["dev"] * np.cos(p["dev_ph"]),

@@ -1,4 +1,4 @@
-"""The prior of the maneuvering model from the ensemble: writes `fieldsid/turning/maneuvering/prior_table.py` again.
+"""The prior of the maneuvering model from an ensemble of hulls: writes `fieldsid/turning/maneuvering/prior_table.py`.
 
 python tests/truth/radius_prior.py [--draws 1400] [--write]
 """
@@ -18,11 +18,11 @@ from truth.maneuvering.hulls import Coefficients, draw_hull
 SEED = 1
 TABLE = Path(__file__).resolve().parents[2] / "fieldsid" / "turning" / "maneuvering" / "prior_table.py"
 OFFSET_SD = 0.02
-"""rad: fins are rigged worse than the ensemble has it."""
+"""Standard deviation of the rudder offset in rad, larger than in the ensemble: real fins are mounted less precisely."""
 
 
 def reduced(h: Coefficients) -> np.ndarray:
-    """Return the model's vector without the length: D, M, t, R, a, k, Yv, Yr, Nv, Nr, C, c, d0, lag, X, rate limit."""
+    """Return the model's parameters without the length: D, M, t, R, a, k, Yv, Yr, Nv, Nr, C, c, d0, lag, X, rate limit."""
     mass, size = h.mass_sway, h.length
     return np.array(
         [
@@ -47,7 +47,7 @@ def reduced(h: Coefficients) -> np.ndarray:
 
 
 def table(draws: int) -> str:
-    """Return the text of the table."""
+    """Return the text of the module with the table."""
     sample = np.array([reduced(draw_hull(i, SEED).of) for i in range(draws)])
     spread = sample.std(axis=0)
     spread[12] = OFFSET_SD

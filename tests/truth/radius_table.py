@@ -1,12 +1,12 @@
-"""Full-rudder radius of hulls nobody tuned to: errors, coverage and width of the bands, by kind and by training set.
+"""Predicted full-rudder radius of random hulls that nothing was tuned on: errors, coverage and width of the bands.
 
 Every hull is drawn, flown with sensor noise, identified, and turned to both sides at five speeds:
     python tests/truth/radius_table.py --draws 300 --seed 7 --json rows.json [--minutes 8] [--sets pulses,pulses+zigzag]
     python tests/truth/radius_table.py --pool rows.json more.json
-Rows are saved after every hull; the same command goes on where the last one ended, after so many minutes if asked to.
-With `--length` the hull's length is stated, as vehicle.yaml has it.
+Rows are saved after every hull; the same command resumes where the last one ended. With `--minutes` it ends after so many.
+With `--length` the hull's length is stated, as in vehicle.yaml.
 Further sets: pulses+uturn, pulses+half, "pulses+zigzag by rpm".
-Of every fourteen hulls seven log no sway. Seed 1 is that of the prior (`radius_prior.py`): measure with another.
+Of every fourteen hulls seven log no sway. The prior was made with seed 1 (`radius_prior.py`): use another one.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from truth.maneuvering.trials import MORE_SETS, SETS, TURNS, Log, training
 
 EFFECTS = ("servo_lag", "sway_coupling", "quadratic_damping")
 WANTED = {"pulses": 0.8, "pulses+zigzag": 0.35, "pulses+circle": 0.35} | dict.fromkeys(MORE_SETS, 0.35)
-"""Widest band wanted, as a share of the radius."""
+"""Largest desired width of the band, as a share of the radius."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """One predicted turn beside the true one, m; NaN where the tool refused it."""
+    """One predicted turn and the true one, in m; the prediction is NaN where it was refused."""
 
     draw: int
     kind: str
@@ -60,12 +60,12 @@ class Outcome:
 
     @property
     def error(self) -> float:
-        """Share by which the prediction is off."""
+        """Relative error of the prediction."""
         return self.radius / self.truth - 1.0
 
     @property
     def holds(self) -> bool:
-        """Whether the band holds the truth."""
+        """Whether the band contains the true radius."""
         return self.low <= self.truth <= self.high
 
     @property
@@ -75,12 +75,12 @@ class Outcome:
 
 
 def as_run(log: Log) -> Run:
-    """Return a log as the program's own record of a run."""
+    """Return a log as a Run of the package."""
     return Run(log.name, log.time, log.columns)
 
 
 def evaluate(hull: Hull, draw: int, which: str, seed: int, *, length_stated: bool) -> list[Outcome]:
-    """Return the turns of one hull after one training set, its length stated or not."""
+    """Return the predicted turns of one hull from one training set, its length stated or not."""
     sway = draw // len(KINDS) % 2 == 0
     rng = np.random.default_rng([seed, draw, (*SETS, *MORE_SETS).index(which)])
     logs = training(hull, which, rng, sway=sway)
@@ -122,7 +122,7 @@ def line(name: str, rows: list[Outcome]) -> str:
 
 
 def table(rows: list[Outcome]) -> list[str]:
-    """Return the table's lines: by training set, each with its kinds, trusted rows and sensors apart."""
+    """Return the lines of the table: for each training set all rows, then by kind, by logged sway and by trust."""
     head = ("rows", "bad", "bias %", "mid %", "90th %", "worst %", "held %", "width", "w 90th")
     wide = (5, 4, 7, 7, 7, 8, 7, 7, 7)
     lines = [" ".join([" " * 42, *(f"{h:>{w}s}" for h, w in zip(head, wide, strict=True))])]
@@ -141,13 +141,13 @@ def table(rows: list[Outcome]) -> list[str]:
 
 
 def saved(paths: Sequence[Path]) -> list[Outcome]:
-    """Return the rows that were saved, those of files that hold the same ones once."""
+    """Return the rows of some files, without duplicates."""
     rows = [Outcome(**row) for path in paths if path.exists() for row in json.loads(path.read_text())]
     return list({(r.seed, r.draw, r.training, r.length_stated, r.speed, r.side): r for r in rows}.values())
 
 
 def measured(given: argparse.Namespace) -> list[Outcome]:
-    """Return the rows asked for, those saved before taken as they are."""
+    """Return the rows of the given draws and sets, computing those that were not saved before."""
     rows = saved([given.json] if given.json else [])
     done = {(r.seed, r.draw, r.training, r.length_stated) for r in rows}
     begun = time.monotonic()
@@ -170,7 +170,7 @@ def measured(given: argparse.Namespace) -> list[Outcome]:
 
 
 def main() -> None:
-    """Draw, fly, identify, turn, and print the table; or print that of rows saved before."""
+    """Draw, fly, identify, turn, and print the table; with `--pool` print that of saved rows."""
     asked = argparse.ArgumentParser(description=__doc__)
     asked.add_argument("--draws", type=int, default=14)
     asked.add_argument("--first", type=int, default=0)

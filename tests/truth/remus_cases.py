@@ -1,4 +1,4 @@
-"""Cases flown by the six-degree-of-freedom REMUS: the effects in it are its own, not one that was put in."""
+"""Cases flown by the six-degree-of-freedom REMUS, whose equations contain effects that were not added by hand."""
 
 from __future__ import annotations
 
@@ -16,12 +16,15 @@ OWN = {
     "yaw": {"sway_coupling", "quadratic_damping", "crossflow_drag"},
     "pitch": {"heave_coupling", "quadratic_damping", "crossflow_drag"},
 }
-"""What the equations of motion hold beside the base model; a fin that lags comes on top."""
+"""Effects that the equations of motion contain in addition to the base model; a lagging fin comes on top."""
 COLUMNS = {"yaw": ("yaw_rad", "yaw_rate_rad_s", "rudder_rad"), "pitch": ("pitch_rad", "pitch_rate_rad_s", "elevator_rad")}
 
 
 def remus_case(index: int, seed: int) -> Case:
-    """One case by (seed, index): yaw or pitch, 1.0 to 1.8 m/s, fins that lag or not, pulses to learn and others to judge."""
+    """Return one case by seed and index: yaw or pitch, 1.0 to 1.8 m/s, with or without servo lag.
+
+    Pulses and a 3-2-1-1 are the training runs, a zig-zag and a long maneuver the validation runs.
+    """
     rng = np.random.default_rng([seed, index, 100])
     axis, lag = str(rng.choice(["yaw", "pitch"], p=[0.6, 0.4])), float(rng.choice([0.0, 0.1, 0.2]))
     hull, fins = with_fins(REMUS, rng.uniform(2.2, 3.0)), Fins(lag=lag, limit=0.35)
@@ -53,7 +56,7 @@ def remus_case(index: int, seed: int) -> Case:
 
 
 def pilot_for(rng, kind, axis):
-    """The pilot of one leg; `long` is a circle in yaw and stairs in pitch."""
+    """Return the pilot of one leg; `long`: a circle in yaw, stairs in pitch."""
     time, pilot = np.arange(0.0, RUN_S, 0.05), Autopilot(depth=None if axis == "pitch" else 5.0)
     if kind == "zigzag":
         return zigzagging(pilot, axis, fin=rng.uniform(0.12, 0.22), angle=rng.uniform(0.15, 0.35))
@@ -67,13 +70,13 @@ def pilot_for(rng, kind, axis):
 
 
 def sample_of(axis, flight, speed, group):
-    """A flight as the base fit sees it."""
+    """Return a flight as the sample that the base fit takes."""
     angle, rate, fin = (flight.log[name] for name in COLUMNS[axis])
     return Sample(fin, angle, rate, 0.05, speed / 1.4, group)
 
 
 def noise_of(axis, flights):
-    """Rms (2,) of measurement less truth over some flights."""
+    """Return the rms (2,) of measured less true angle and rate over some flights."""
     return np.array([np.sqrt(np.mean([np.mean((f.log[n] - f.truth[n]) ** 2) for f in flights])) for n in COLUMNS[axis][:2]])
 
 

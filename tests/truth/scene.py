@@ -1,4 +1,4 @@
-"""Random base vehicles and the runs they fly: speeds, headings, maneuvers, weather. One case's world without its effect."""
+"""Random base vehicles and their runs: speeds, headings, maneuvers, noise and disturbance. A case without its hidden cause."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ RUN_S = 60.0
 TRAINING, VALIDATION = 3, 2
 DEG = np.pi / 180.0
 GUSTY, BOTH = ("disturbance", "both"), 0.5
-"""Days on which a moment disturbs the hull, and the share of those with coloured sensors that are among them."""
+"""Colours with a disturbance moment, and the share of cases with coloured sensor noise that have one too."""
 SCATTER = 0.02
-"""Share by which runs of a group miss its speed, in half of the scenes."""
+"""Largest relative difference of a run's speed from that of its group, in half of the scenes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """One run before it is flown: speed, group, maneuver, start, weather (9, total) of unit disturbance and noise."""
+    """One run before it is flown: speed, group, maneuver, initial angle and depth, inputs (9, total) of unit variance."""
 
     speed: float
     group: int
@@ -49,11 +49,11 @@ class Scene:
     notes: dict[str, object]
 
     def trim_factor(self, leg):
-        """A leg's trim moment over the nominal one: that of a bent fin goes with the authority."""
+        """Return the trim moment of a leg over the nominal one; that of a bent fin is proportional to the authority."""
         return (leg.speed / self.base.nominal_speed) ** 2 * self.scatter[leg.group] if self.notes.get("bent_fin") else 1.0
 
     def physics(self, leg, updates):
-        """Coefficients of a leg: authority ~ u^2 with scatter, damping ~ u^law, thrust ~ u^2, pilot's gains to match."""
+        """Return the coefficients of a leg: authority ~ u^2 with scatter, damping ~ u^law, thrust ~ u^2, pilot's gains."""
         ratio = leg.speed / self.base.nominal_speed
         updates = {k: v for k, v in updates.items() if k not in ("thrust_swing", "roll_push", "depth_spread")}
         times = updates.pop("authority_times", 1.0)
@@ -69,14 +69,14 @@ class Scene:
 
 
 def gains(damping, stiffness, authority, omega):
-    """Gains of a pilot who places the natural frequency at `omega` rad/s with damping ratio 0.8."""
+    """Return the gains of a pilot who places the natural frequency at `omega` rad/s with a damping ratio of 0.8."""
     b = abs(authority)
     kp = max(omega**2 - stiffness, 0.3 * stiffness) / b
     return min(kp, 4.0), min(max((1.6 * np.sqrt(stiffness + min(kp, 4.0) * b) - damping) / b, 0.0), 3.0)
 
 
 def draw_scene(rng, pitching, wants=(), colour=None):
-    """A random vehicle with five legs; `wants` are kinds of maneuver that should be among them, `colour` that of the noise."""
+    """Return a random vehicle with five legs; wants: maneuvers that should be among them, colour: that of the noise."""
     clock = Clock(1.0 / rng.choice([20.0, 10.0, 50.0], p=[0.76, 0.12, 0.12]), 0)
     clock = Clock(clock.sample, round(RUN_S / clock.sample))
     base, setting = draw_vehicle(rng, pitching)
@@ -104,7 +104,7 @@ def draw_scene(rng, pitching, wants=(), colour=None):
 
 
 def draw_vehicle(rng, pitching):
-    """A base model at its reference speed, and what an effect's size is measured against."""
+    """Return a random base model at its reference speed, and the setting that scales the effects."""
     damping = np.exp(rng.uniform(np.log(0.3), np.log(3.0)))
     stiffness = np.exp(rng.uniform(np.log(0.15), np.log(1.5))) if pitching else 0.0
     pulse = responses(damping, stiffness, np.full(41, 0.26), 0.05)[:, 0 if pitching else 1, 0]
@@ -123,7 +123,7 @@ def draw_vehicle(rng, pitching):
 
 
 def pick_maneuvers(rng, pitching, wants):
-    """Names of the five maneuvers: three to train on, two to judge on, of other kinds where that is possible."""
+    """Return the names of five maneuvers: three for training, two for validation, of other kinds where possible."""
     every = ["pulses", "3211", "prbs", "multisine", "zigzag", "stairs" if pitching else "circle"]
     names = [w for w in wants if w in every]
     rest = [k for k in every if k not in names]
@@ -138,7 +138,7 @@ def pick_maneuvers(rng, pitching, wants):
 
 
 def draw_maneuver(rng, kind, time, *, pitching):
-    """A maneuver of a kind with random settings."""
+    """Return a maneuver of a kind with random settings."""
     fin = rng.uniform(0.14, 0.28)
     kinds = {
         "pulses": lambda: maneuvers.pulses(time, 0.26, 0.15, polarity=rng.choice([-1.0, 1.0]), recovery=rng.uniform(6.0, 12.0)),
@@ -153,7 +153,7 @@ def draw_maneuver(rng, kind, time, *, pitching):
 
 
 def unit_weather(rng, clock, weather):
-    """Inputs (9, total) with disturbance and sensor noise of standard deviation one, thrust swing between -1 and 1."""
+    """Return inputs (9, total) with disturbance and sensor noise of standard deviation one, and a thrust between -1 and 1."""
     out, n, h = calm(clock), clock.total, clock.sample
     wander = weather["wander"] if weather["colour"] in ("ar1", "both") else 0.0
     for row in (kernel.ANGLE_NOISE, kernel.RATE_NOISE):
@@ -168,7 +168,7 @@ def unit_weather(rng, clock, weather):
 
 
 def calibrated(scene):
-    """The scene with the disturbance scaled so that it moves the angle by `gust` times the sensor's noise."""
+    """Return the scene with the disturbance scaled so that it moves the angle by `gust` times the sensor noise (rms)."""
     if scene.notes["colour"] not in GUSTY:
         return scene
     moved = []

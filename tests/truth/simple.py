@@ -1,4 +1,4 @@
-"""Fly the one-axis truth with its effects, and say what an ideal model of it would have answered."""
+"""Simulate the one-axis truth with its effects, and the noise-free response that an ideal model would give."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ FINE_S = 0.002
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """A flown run at the log's samples (n,); angle and rate as ideal sensors with their systematic errors give them.
+    """A flown run at the log's samples (n,); angle and rate have the sensors' systematic errors, but no noise.
 
-    `whole` keeps what was flown before and after the log: command (total,) and roll, depth, surge (3, total).
+    `whole_command` (total,) and `known` (3, total), which is roll, depth and surge, include the time around the log.
     """
 
     time: np.ndarray
@@ -36,7 +36,7 @@ class Motion:
 
 
 def start_state(physics, angle, depth, thrust):
-    """A state (10,) that is steady at an angle but for the trim."""
+    """Return a state (10,) that is at rest at an angle, except for the trim moment."""
     y = np.zeros(kernel.STATES)
     y[kernel.ANGLE], y[kernel.DEPTH] = angle, depth
     y[kernel.SURGE] = physics.nominal_speed * np.sqrt(max(thrust, 0.0) / physics.nominal_thrust)
@@ -44,7 +44,7 @@ def start_state(physics, angle, depth, thrust):
 
 
 def fly(physics, clock, maneuver, inputs=None, *, pitching=False, angle=0.0, depth=2.0, step=FINE_S):
-    """Fly a maneuver (n,) with the pilot in the loop; inputs (9, total) as of `noise.calm`."""
+    """Fly a maneuver (n,) with the pilot in the loop; inputs (9, total): as `noise.calm` returns them."""
     inputs = calm(clock, physics.nominal_thrust) if inputs is None else inputs
     physics = physics._replace(**maneuver.settings)
     plan, mode = np.zeros(clock.total), np.full(clock.total, kernel.HOLD)
@@ -54,9 +54,9 @@ def fly(physics, clock, maneuver, inputs=None, *, pitching=False, angle=0.0, dep
 
 
 def replay(physics, clock, motion, inputs, *, pitching=False, angle=0.0, depth=2.0, step=FINE_S):
-    """The answer without noise and, from the log's start on, without disturbance, to the command that was flown.
+    """Return the response to the flown command without noise and, from the start of the log, without disturbance.
 
-    Roll, depth and surge are those of `motion`; events that belong to the truth (inputs' other rows) stay.
+    Roll, depth and surge are those of `motion`; the events in the other rows of the inputs are part of the truth.
     """
     quiet = inputs.copy()
     quiet[kernel.DISTURBANCE, clock.pre :] = 0.0

@@ -1,4 +1,4 @@
-"""Every effect as a function of one strength: 0 is absent, 1 is gross. Shapes are drawn once, then scaled."""
+"""Every effect as a function of one strength, 0 absent and 1 very large. The shape is random, the strength scales it."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What an effect's size is measured against: the base model at the reference speed.
+    """The base model at the reference speed, by which the sizes of the effects are scaled.
 
-    `moment` is that of a fin of 0.26 rad (rad/s^2), `rate` the turn (pitch) rate it leads to (rad/s).
+    `moment`: that of a fin of 0.26 rad (rad/s^2); `rate`: the yaw (pitch) rate that it causes (rad/s).
     """
 
     pitching: bool
@@ -72,12 +72,12 @@ def stall(rng, _k):
 
 
 def drag_size(k):
-    """Quadratic drag of strength one in 1/rad; that of the REMUS in pitch is 22, and no hull has much more."""
+    """Return the quadratic damping (1/rad) of strength one; that of the REMUS in pitch is 22, and few hulls have more."""
     return min(3.0 * k.damping / k.rate, 8.0)
 
 
 def quadratic_damping(rng, k):
-    if not k.pitching and rng.random() < 0.12:  # an unstable hull that only the quadratic part holds
+    if not k.pitching and rng.random() < 0.12:  # an unstable hull, limited by its quadratic damping only
         values = {"damping": -rng.uniform(0.05, 0.15), "quadratic": rng.uniform(0.5, 1.5) * k.damping / k.rate}
         return lambda _s, _u, _i: dict(values)
     return _fixed(quadratic=drag_size(k))
@@ -118,7 +118,7 @@ def prop_moment(rng, k):
     size, swing = _sign(rng) * 1.0 * k.moment / k.thrust, rng.uniform(0.2, 0.4)
 
     def apply(s, u, _i):
-        # trimmed away by the fin in yaw, which goes with the speed as the thrust does, by a weight in pitch
+        # cancelled in yaw by the fin, whose moment is proportional to u^2 as the thrust is, in pitch by a weight
         held = {"trim": -size * s * k.thrust} if k.pitching else {"fin_trim": -size * s * k.thrust * u * u}
         return {"thrust_moment": size * s, "thrust_swing": swing} | held
 
@@ -202,11 +202,11 @@ LARGEST = {
     "gyro_scale": 1.2, "gyro_bias": 1.5, "servo_lag": 1.2, "rate_limit": 1.5, "backlash": 1.0, "deadband": 1.2,
     "compass_deviation": 1.5, "wave": 1.5,
 }  # fmt: skip
-"""Largest strength that is still physical; 3 for the others."""
+"""Largest strength that is still physical; that of effects not listed is 3."""
 
 
 def reshaped(name: str, apply: Apply, setting: Setting, rng: np.random.Generator) -> Apply:
-    """The same effect in a form that is not the textbook's; raises KeyError where there is none."""
+    """Return the effect in a form that is not the textbook's; raises KeyError where there is none."""
 
     def servo(values):
         return {"servo_tau": 0.0, "servo_omega": 1.4 / values["servo_tau"], "servo_zeta": 0.7}

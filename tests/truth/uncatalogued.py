@@ -1,4 +1,4 @@
-"""Causes that no catalogue has: each a function of one strength, with the events it needs per run."""
+"""Causes that are in no catalogue: each a function of one strength, with the events that it needs in each run."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from truth.noise import ar1, bursts, jams, telegraph
 
 
 def fin_memory(rng, k):
-    """A moment by the fin's recent mean square (heated actuator, wake on the tail)."""
+    """Return a moment proportional to the recent mean square of the fin angle (heated actuator, wake on the tail)."""
     size, tau = 1.2 * k.moment / 0.26**2, rng.uniform(3.0, 8.0)
     return (lambda s, _u, _i: {"memory_moment": size * s, "memory_tau": tau}), None
 
 
 def sloshing(rng, k):
-    """A hardly damped mass on a spring (liquid in a half-full section) that the turning hull shakes.
+    """Return a lightly damped mass on a spring (liquid in a half-full section) that the turning hull excites.
 
-    y'' = -w^2 y - 2 z w y' - p', p' += mu (w^2 y + 2 z w y') with mu its share of the inertia: passive, so stable.
+    y'' = -w^2 y - 2 z w y' - p', p' += mu (w^2 y + 2 z w y'), mu being its share of the inertia; passive, hence stable.
     """
     omega = rng.uniform(1.0, 3.5)
     return (lambda s, _u, _i: {"slosh_moment": 0.5 * s, "slosh_omega": omega, "slosh_zeta": 0.04}), None
 
 
 def hidden_product(rng, k):
-    """Damping that comes and goes with a motion that is not in the log."""
+    """Return a damping that varies with a motion that is not in the log."""
     seeds = rng.integers(0, 2**31, k.runs)
 
     def events(inputs, clock, s, i):
@@ -35,7 +35,7 @@ def hidden_product(rng, k):
 
 
 def authority_jumps(rng, k):
-    """A fin that now and then loses part of its grip (ventilation, a loose coupling)."""
+    """Return a fin that sometimes loses part of its authority (ventilation, a loose coupling)."""
     seeds, mean = rng.integers(0, 2**31, k.runs), rng.uniform(2.5, 6.0)
 
     def events(inputs, clock, s, i):
@@ -45,7 +45,7 @@ def authority_jumps(rng, k):
 
 
 def moment_bursts(rng, k):
-    """Short trains of oscillating moment at random times (thruster pulsing)."""
+    """Return short trains of an oscillating moment at random times (thruster pulsing)."""
     seeds = rng.integers(0, 2**31, k.runs)
 
     def events(inputs, clock, s, i):
@@ -55,7 +55,7 @@ def moment_bursts(rng, k):
 
 
 def fin_jams(rng, k):
-    """A fin that stays where it is for some seconds."""
+    """Return a fin that jams for some seconds."""
     seeds = rng.integers(0, 2**31, k.runs)
 
     def events(inputs, clock, s, i):

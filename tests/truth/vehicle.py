@@ -1,4 +1,4 @@
-"""Fly the six-degree-of-freedom vehicle with any pilot, in a current, with fins that lag and stop, and log it."""
+"""Fly and log the six-degree-of-freedom vehicle with any pilot, in a current, with fins that have a lag and stops."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FINE_S = 0.0025
 
 
 class Measured(NamedTuple):
-    """What the pilot sees: noisy sensors at one sample, SI and radians."""
+    """The noisy measurements that the pilot gets at one sample, SI and radians."""
 
     yaw: float
     yaw_rate: float
@@ -37,7 +37,7 @@ Controller = Callable[[float, Measured], tuple[float, float]]
 
 @dataclass(frozen=True, slots=True)
 class Fins:
-    """What lies between command and fin: delay and lag in s, rate in rad/s (0 for none), stops in rad."""
+    """The actuators: delay and lag in s, rate limit in rad/s (0: none), stops and offsets in rad."""
 
     delay: float = 0.0
     lag: float = 0.0
@@ -76,7 +76,7 @@ CALM = Sea()
 
 @dataclass(frozen=True, slots=True)
 class Flight:
-    """`log`: canonical columns (n,) with noise, fins as commands; `truth`: the same names without noise, fins as they were."""
+    """`log`: canonical columns (n,) with noise and fin commands; `truth`: the same without noise, with true fin angles."""
 
     log: dict[str, np.ndarray]
     truth: dict[str, np.ndarray] = field(default_factory=dict)
@@ -91,7 +91,7 @@ SEEN = ("yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s", "roll_rad"
 
 
 def thrust_for(speed: float, hull: Hull = STEADY) -> float:
-    """Thrust in N that holds a speed in m/s on a straight course."""
+    """Return the thrust (N) that keeps a speed (m/s) on a straight course."""
     return -hull.Xuu * speed**2
 
 
@@ -111,7 +111,7 @@ def fly_vehicle(
     run_up: Controller | None = None,
     run_up_s: float = 0.0,
 ) -> Flight:
-    """Fly `duration` s from straight running at `speed`; `run_up` steers the unlogged time before (t < 0)."""
+    """Fly `duration` s from straight running at `speed` (m/s); `run_up` steers for run_up_s before that (t < 0), unlogged."""
     rng, before = np.random.default_rng(seed), round(run_up_s / sample)
     n = round(duration / sample) + before
     state = np.zeros(12)
@@ -141,7 +141,7 @@ def fly_vehicle(
 
 
 def _held_parts(k, late):
-    """Parts of interval k as (start, end, index of the command in force), in samples; `late` is the delay in samples."""
+    """Return the parts of interval k as (start, end, index of the command in force); times and delay `late` in samples."""
     whole = int(np.floor(late + 1e-9))
     rest = max(late - whole, 0.0)
     parts = [(0.0, rest, max(k - whole - 1, 0))] if rest > 1e-9 else []

@@ -1,7 +1,7 @@
-"""One hull told in the times of an aircraft, a REMUS, a barge and a ship: yaw with time constants of 0.2 to 60 s.
+"""One hull scaled in time to an aircraft, a REMUS, a barge and a ship: yaw with time constants of 0.2 to 60 s.
 
-All are the same vehicle but for the unit of time T, the time constant of its turn: damping 1 / T, authority and moments in
-1 / T^2, rates in 1 / T, maneuvers and samples in T, so that what is found of one must be found of all. Angles know no time.
+All are the same vehicle except for the unit of time T, the time constant of the turn: damping 1 / T, authority and moments in
+1 / T^2, rates in 1 / T, maneuvers and samples in T. Angles do not scale. So each must give the same diagnosis.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from truth.physics import Physics
 from truth.simple import fly
 
 SAMPLES_A_TIME_CONSTANT, RUN = 20, 70.0
-"""Samples in T, and the length of a run in T."""
+"""Number of samples in T, and the duration of a run in T."""
 FIN, ANGLE_NOISE, RATE_NOISE = 0.26, 0.004, 0.006
-"""Fin in rad; noise of the heading in rad, of the rate in rad / T."""
+"""Fin amplitude in rad; noise of the heading in rad and of the rate in rad / T."""
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of vehicle: time constant of its turn in s, speed in m/s."""
+    """A kind of vehicle: the time constant of its turn in s, and its speed in m/s."""
 
     name: str
     time_constant: float
@@ -36,12 +36,12 @@ HIDDEN = {
     "quadratic_damping": {"quadratic": 3.0},
     "sway_coupling": {"cross_damping": 0.7, "cross_rate": 0.6, "cross_moment": -0.9},
 }
-"""What is hidden, in units of T: nothing, drag with the square of the rate (1/rad), a sway (1/T each)."""
+"""Hidden effects in units of T: none, quadratic damping (1/rad), sway coupling (1/T each)."""
 POWERS = {"quadratic": 0, "cross_damping": -1, "cross_rate": -1, "cross_moment": -1}
 
 
 def physics_of(kind: Kind, effect: str) -> Physics:
-    """Numbers of a kind with an effect hidden in it, SI."""
+    """Return the physics (SI) of a kind with a hidden effect."""
     t = kind.time_constant
     hidden = {name: value * t ** POWERS[name] for name, value in HIDDEN[effect].items()}
     return Physics(
@@ -51,7 +51,7 @@ def physics_of(kind: Kind, effect: str) -> Physics:
 
 
 def plans(t: float, time: np.ndarray) -> dict[str, maneuvers.Maneuver]:
-    """Maneuvers of a kind with time constant t: pulses and zig-zags to learn from, the same of other sizes to judge on."""
+    """Return the maneuvers for a time constant t: pulses and zig-zags for training, others of other sizes for validation."""
     pulses = {"width": 2.0 * t, "start": 2.0 * t, "recovery": 9.0 * t}
     zigzag = {"start": 2.0 * t, "end_rest": 4.0 * t}
     return {
@@ -67,7 +67,7 @@ TRAINING = ("pulses", "zigzag", "zigzag_large")
 
 
 def logs_of(kind: Kind, effect: str, seed: int = 0) -> dict[str, dict[str, np.ndarray]]:
-    """The logs of a kind with an effect hidden in it, by maneuver, canonical columns."""
+    """Return the logs of a kind with a hidden effect, by maneuver, with canonical columns."""
     t = kind.time_constant
     clock = Clock(t / SAMPLES_A_TIME_CONSTANT, round(RUN * SAMPLES_A_TIME_CONSTANT))
     physics, rng, logs = physics_of(kind, effect), np.random.default_rng(seed), {}

@@ -1,1 +1,1 @@
-"""One thin file per command: parse, call, print."""
+"""The commands, one thin file each: parse the arguments, call the package, print the result."""

@@ -15,7 +15,7 @@ import typer
 from fieldsid.cli.console import emit, progress, say
 from fieldsid.cli.exit_codes import GATE_FAILED
 from fieldsid.cli.options import AxisOption, FigureFile, Force, MappingFile, Method, VehicleFile, argument, flag, option
-from fieldsid.cli.session import drawn_at
+from fieldsid.cli.session import draw_figure
 from fieldsid.figures.kinds import sketch
 from fieldsid.page import Page, written
 from fieldsid.rounding import number, with_error
@@ -76,52 +76,52 @@ def command(
     begin = time.monotonic()
     with progress("logs", len(tasks)) as step:
         rows, known = all_rows(output, tasks, work, step)
-    parquet, table = write_table(output, axis, rows)
+    parquet, csv = write_table(output, axis, rows)
     trends = trends_of([dict(r) for r in rows], axis) if trend or figure is not None else ()
     place = figure or output / f"trend_{axis.value}.png"
     plot = sketch("trend", trends, axis.value)
-    drawn = drawn_at(place if trends else None, plot, force=force or figure is None)
+    drawn = draw_figure(place if trends else None, plot, force=force or figure is None)
     unusable = [row for row in rows if row["status"] != "done"]
-    told = Batch(
+    result = Batch(
         axis=axis,
         logs=len(tasks),
         known_logs=known,
         runs=len(rows) - len(unusable),
         table=str(parquet),
-        csv=str(table),
+        csv=str(csv),
         where=where,
         seconds=time.monotonic() - begin,
         verdicts=dict(Counter(r["verdict"] for r in rows if r.get("verdict")).most_common()),
         effects=dict(Counter(r["effects"] for r in rows if r.get("effects")).most_common()),
-        skipped_runs=tuple(_not_used(r) for r in unusable),
+        skipped_runs=tuple(_unused_log(r) for r in unusable),
         trend=trends,
         figure=drawn,
     )
     from fieldsid.cli.headlines.trial import of_batch
 
-    result = emit(told, render=_page(told), headline=of_batch(told, trend=trend))
+    body = emit(result, render=_page(result), headline=of_batch(result, trend=trend))
     if (trend or figure is not None) and not trends:
         say(f"no trend: fewer than 6 runs of different dates know a parameter of {axis.value}")
     if trends and (dated := sum(row.get("time_from") == "file" for row in rows)):
         say(f"{dated} of {len(rows)} runs have no date in their log: theirs is that of the file's last change")
     if unusable:
         raise typer.Exit(GATE_FAILED)
-    return result
+    return body
 
 
 def _logs(found: Sequence[Path], output: Path) -> list[Path]:
-    """Return the logs without what an earlier batch has written among them; raises UsageError where none is left."""
+    """Return the logs without the files that an earlier batch wrote to its folder; raises UsageError where none remains."""
     from fieldsid.errors import UsageError
 
-    own = output.resolve()
-    left = [log for log in found if own not in log.resolve().parents]
-    if not left:
+    written_by_batch = output.resolve()
+    remaining = [log for log in found if written_by_batch not in log.resolve().parents]
+    if not remaining:
         raise UsageError("there are no logs here", found="no files", hint="name logs, or a folder that holds some")
-    return left
+    return remaining
 
 
 def _work(workers: int | None, scheduler: str | None, timeout: float, memory: float) -> tuple[Work, str]:
-    """Return what works on tasks, and where that is in words."""
+    """Return the function that works on the tasks, in local processes or on a Dask cluster, and its place in words."""
     from functools import partial
 
     if scheduler is not None:
@@ -136,26 +136,27 @@ def _work(workers: int | None, scheduler: str | None, timeout: float, memory: fl
     return partial(run_here, workers=count, timeout_s=timeout, memory_mb=memory), said
 
 
-def _not_used(row: Mapping[str, Any]) -> NotUsed:
+def _unused_log(row: Mapping[str, Any]) -> NotUsed:
     from fieldsid.results.trial import NotUsed
 
     what, found, hint = (str(row.get(k) or "") for k in ("what", "found", "hint"))
     return NotUsed(row["run"], row["log"], what, found, hint, row["status"])
 
 
-def _page(told: Batch) -> Page:
-    why: dict[str, list[str]] = {}  # what was said, by that without the names of file and run
-    for row in told.skipped_runs:
-        why.setdefault(row.what.replace(row.file, "").replace(row.run, ""), []).append(row.what)
-    lines = [line for t in told.trend for line in _trend(t)]
-    shown = [(said[0], len(said) - 1) for said in list(why.values())[:MOST_REASONS]]
-    lines += [f"not used: {said}" + (f"; the same of {more} more" if more else "") for said, more in shown]
-    if len(why) > MOST_REASONS:
-        lines.append(f"and for {len(why) - MOST_REASONS} other reasons: see the column `what`")
-    return Page("", closing=(*lines, *written(table=f"{told.table} and {told.csv}", figure=told.figure)))
+def _page(result: Batch) -> Page:
+    reasons: dict[str, list[str]] = {}  # messages, by their text without the names of file and run
+    for row in result.skipped_runs:
+        reasons.setdefault(row.what.replace(row.file, "").replace(row.run, ""), []).append(row.what)
+    lines = [line for t in result.trend for line in _trend_lines(t)]
+    shown = [(messages[0], len(messages) - 1) for messages in list(reasons.values())[:MOST_REASONS]]
+    lines += [f"not used: {message}" + (f"; the same of {more} more" if more else "") for message, more in shown]
+    if len(reasons) > MOST_REASONS:
+        lines.append(f"and for {len(reasons) - MOST_REASONS} other reasons: see the column `what`")
+    return Page("", closing=(*lines, *written(table=f"{result.table} and {result.csv}", figure=result.figure)))
 
 
-def _trend(trend: Trend) -> Iterator[str]:
+def _trend_lines(trend: Trend) -> Iterator[str]:
+    """Yield a line for each date at which a parameter changed: by how much, in per cent where it was not zero."""
     for c in trend.changes:
         by = f"{number(c.after - c.before, 2)} {trend.name}"
         if c.before:

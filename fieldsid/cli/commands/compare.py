@@ -13,7 +13,7 @@ from fieldsid.cli.console import complain, emit
 from fieldsid.cli.inputs import fitted_to
 from fieldsid.cli.options import FigurePlace, Figures, Force, FromS, MappingFile, ToS, argument, option
 from fieldsid.cli.progress import get_ready, refuse_place
-from fieldsid.cli.session import drawn_in
+from fieldsid.cli.session import draw_figures
 from fieldsid.cli.voice import angles
 from fieldsid.errors import UsageError
 from fieldsid.figures.kinds import sketch
@@ -60,16 +60,16 @@ def command(
 
     Example: sysid compare before/models after/models -o figures/
     """
-    from fieldsid.cli.commands._before_after import before_after, is_side
+    from fieldsid.cli.commands._compare_states import compare_states, is_side
 
     refuse_place(output, force=force)
     from fieldsid.logs.unknown_file import own_kind
 
     reading: dict[str, Any] = {"mapping": mapping, "start": start, "end": end}
     if own_kind(model) == "schedule":
-        from fieldsid.cli.commands._as_promised import as_promised
+        from fieldsid.cli.commands._promised_steps import compare_steps
 
-        return as_promised(model, runs, reading)
+        return compare_steps(model, runs, reading)
     sides = [p for p in (model, *runs) if is_side(p)]
     others, output = [p for p in runs if p not in sides], output if figures else None
     if len(sides) == len(runs) + 1 == 2:
@@ -77,7 +77,7 @@ def command(
             raise UsageError(
                 "`--from`, `--to`, `--mapping` and `--min-fit` are for runs", found="two models and no run", hint="leave them out"
             )
-        return before_after(sides[0], sides[1], output, force=force)
+        return compare_states(sides[0], sides[1], output, force=force)
     from fieldsid.cli.inputs import model_first, read_runs
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.cli.user_effects import check_effects
@@ -88,9 +88,9 @@ def command(
         if not others or any(p.is_dir() for p in sides):
             given = ", ".join(str(p) for p in (*sides, *others))
             raise UsageError("several models are compared over runs", found=given, hint="sysid compare M1.yaml M2.yaml RUN")
-        from fieldsid.cli.commands._several_models import several_models
+        from fieldsid.cli.commands._compare_several import compare_several
 
-        several = several_models(sides, others, Skips(), reading=reading, output=output, force=force)
+        several = compare_several(sides, others, Skips(), reading=reading, output=output, force=force)
         _gate([run for m in several["models"] for run in m["runs"]], min_fit)
         return several
     model, runs = model_first(model, runs)
@@ -103,22 +103,23 @@ def command(
 
     found = compare(known, logs, unfit=skips.skip)
     plots = {f"{model.stem}_on_{c.run}": sketch("compare", c, known, model.name) for c in found}
-    drawn: Sequence[str | None] = drawn_in(output, plots, force=force) or [None] * len(found)
+    drawn: Sequence[str | None] = draw_figures(output, plots, force=force) or [None] * len(found)
     fitted = fitted_to(model, known, logs)
     compared = tuple(compared_run(c, file, fitted) for c, file in zip(found, drawn, strict=True))
     notes = left_out(logs, known.axis)
-    told = Compared(model=str(model), axis=known.axis, runs=compared, warnings=notes, skipped_runs=tuple(skips.records))
+    result = Compared(model=str(model), axis=known.axis, runs=compared, warnings=notes, skipped_runs=tuple(skips.records))
     from fieldsid.cli.headlines.models import of_compare
     from fieldsid.cli.inputs import files_of
     from fieldsid.records.named_inputs import inputs_of
 
-    headline = of_compare(told, known, files_of(logs), inputs_of(model))
-    result = emit(told, render=_page(found, compared, top), headline=headline, notes=notes)
-    _gate(result["runs"], min_fit)
-    return skips.end(result, len(compared))
+    headline = of_compare(result, known, files_of(logs), inputs_of(model))
+    body = emit(result, render=_page(found, compared, top), headline=headline, notes=notes)
+    _gate(body["runs"], min_fit)
+    return skips.end(body, len(compared))
 
 
 def _gate(entries: Sequence[Mapping[str, Any]], least: float | None) -> None:
+    """End the command with exit code 1 where a run's angle or rate fit (per cent) is below the least one accepted."""
     if least is None:
         return
     found = [(e["run"], name, e[f"{name}_fit_percent"]) for e in entries for name in e["over_floor"]]

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from fieldsid.fitting.jit_warmup import Warmup
     from fieldsid.planning.design.leg import Leg
     from fieldsid.results.trial import Demo
-    from fieldsid.results.trial import Step as Taken
+    from fieldsid.results.trial import Step as StepResult
 
 HIDDEN = "servo_lag"
 FOLDER = "sysid-demo"
@@ -42,7 +42,7 @@ SHORT_OPENING = (
     "`sysid demo --verbose` prints them with all they say."
 )
 BRIEF, VERBOSE, SILENT = "brief", "verbose", "silent"
-"""How much of the tour is told while it goes on."""
+"""How much of the tour is printed while it runs: a line for each command, all that they print, or nothing."""
 
 
 def command(
@@ -59,17 +59,18 @@ def command(
     Example: sysid demo --effect sway_coupling -o tour
     """
     began = perf_counter()
-    told = SILENT if voice().is_json or voice().is_quiet else VERBOSE if verbose else BRIEF
+    detail = SILENT if voice().is_json or voice().is_quiet else VERBOSE if verbose else BRIEF
     with compiling(_compile_loops) as warmup:
-        tour = _tour(effect, output, began, warmup, force=force, told=told)
-    if told != SILENT:
+        tour = _tour(effect, output, began, warmup, force=force, detail=detail)
+    if detail != SILENT:
         sys.stdout.write("\n")
     figures = written(figure=[f for f in tour.files if verbose and f.endswith(".png")])
     page = Page("", closing=(*figures, "`sysid --help` lists every command."))
     return emit(tour, render=page, headline=of_demo(tour))
 
 
-def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, force: bool, told: str) -> Demo:
+def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, force: bool, detail: str) -> Demo:
+    """Run every step of the tour in its folder and return the record of it; began: the time at which the command started."""
     from fieldsid.demo.steps import PLAN, STEPS, places
     from fieldsid.demo.trial import make_trial
     from fieldsid.demo.vehicle import hidden_vehicle
@@ -79,17 +80,17 @@ def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, for
     folder = _folder(output, force=force)
     vehicle = hidden_vehicle(effect)
     known = dict(places(folder, vehicle.axis))
-    _told(OPENING if told == VERBOSE else SHORT_OPENING, told)
+    _write_text(OPENING if detail == VERBOSE else SHORT_OPENING, detail)
     with BackgroundTasks() as tasks:
         session = Session(warmup, tasks)
-        done = [_taken(1, PLAN, known, session, force=force, told=told)]
+        done = [_run_step(1, PLAN, known, session, force=force, detail=detail)]
         (leg,) = load_plan(folder / "plan" / "plan.yaml").legs
         trial = make_trial(vehicle, folder / "trial", leg, force=force)
-        if told == VERBOSE:
-            _told(_flown(trial, folder, leg), told)
+        if detail == VERBOSE:
+            _write_text(_flights_in_words(trial, folder, leg), detail)
         for step in (s for s in STEPS if vehicle.axis in s.axes):
             if step.possible(known):
-                done.append(_taken(len(done) + 1, step, known, session, force=force, told=told))
+                done.append(_run_step(len(done) + 1, step, known, session, force=force, detail=detail))
                 known |= step.learns(done[-1].result or {})
     return Demo(
         folder=str(folder),
@@ -107,41 +108,45 @@ def _compile_loops() -> None:
     compile_loops()
 
 
-def _folder(asked: Path | None, *, force: bool) -> Path:
-    """Return the folder to work in: the one asked for, or the first of sysid-demo, sysid-demo-2, ... that is free."""
-    if asked is None:
+def _folder(output: Path | None, *, force: bool) -> Path:
+    """Return the folder to work in: the given one, or the first of sysid-demo, sysid-demo-2, ... that does not exist.
+
+    Raises ArtifactError where the given one is not empty, unless forced.
+    """
+    if output is None:
         numbered = (Path(f"{FOLDER}-{i}") for i in range(2, 10_000))
         return next(p for p in (Path(FOLDER), *numbered) if not p.exists())
-    if asked.is_dir() and any(asked.iterdir()) and not force:
+    if output.is_dir() and any(output.iterdir()) and not force:
         raise ArtifactError(
-            f"`{asked}` is not empty",
-            found=f"{sum(1 for _ in asked.iterdir())} entries",
+            f"`{output}` is not empty",
+            found=f"{sum(1 for _ in output.iterdir())} entries",
             hint="add `--force`, or name another folder",
         )
-    return asked
+    return output
 
 
-def _taken(place: int, step: Step, known: Mapping[str, str], session: Session, *, force: bool, told: str) -> Taken:
+def _run_step(place: int, step: Step, known: Mapping[str, str], session: Session, *, force: bool, detail: str) -> StepResult:
+    """Run the command of one step of the tour, print as much of it as the detail asks for, and return its record."""
     from fieldsid.demo.steps import expanded, words_of
-    from fieldsid.results.trial import Step as Taken
+    from fieldsid.results.trial import Step as StepResult
 
     words = words_of(step.line, known)
-    if told == VERBOSE:
+    if detail == VERBOSE:
         sys.stdout.write(f"\n{place}. {step.title}\n$ sysid {' '.join(words)}\n\n")
         sys.stdout.flush()
     began = perf_counter()
-    with nullcontext() if told == VERBOSE else _silence():
+    with nullcontext() if detail == VERBOSE else _silence():
         result = run([*expanded(words), *(["--force"] if force else [])], session)
     sys.stderr.flush()
     brief, meaning = step.tells(result)
-    if told == BRIEF:
+    if detail == BRIEF:
         said = f"{place:2d}. {step.title}{'' if step.title.endswith('?') else ':'} {brief}"
         sys.stdout.write(f"{folded(said, WIDTH, rest='    ')}\n")
         sys.stdout.flush()
-    if told == VERBOSE:
+    if detail == VERBOSE:
         sys.stdout.write(f"\n{folded(meaning, WIDTH, first='=> ', rest='   ')}\n")
         sys.stdout.flush()
-    return Taken("sysid " + " ".join(words), perf_counter() - began, meaning, result)
+    return StepResult("sysid " + " ".join(words), perf_counter() - began, meaning, result)
 
 
 @contextmanager
@@ -150,13 +155,13 @@ def _silence() -> Iterator[None]:
         yield
 
 
-def _told(text: str, told: str) -> None:
-    if told != SILENT:
-        sys.stdout.write(f"\n{folded(text, WIDTH, rest='')}\n" + ("\n" if told == BRIEF else ""))
+def _write_text(text: str, detail: str) -> None:
+    if detail != SILENT:
+        sys.stdout.write(f"\n{folded(text, WIDTH, rest='')}\n" + ("\n" if detail == BRIEF else ""))
         sys.stdout.flush()
 
 
-def _flown(trial: Trial, folder: Path, leg: Leg) -> str:
+def _flights_in_words(trial: Trial, folder: Path, leg: Leg) -> str:
     from fieldsid.demo.trial import CHECK_SPEEDS, TRAIN_SPEEDS
 
     others = " and ".join(f"{u:.1f}" for u in TRAIN_SPEEDS if u != leg.speed)

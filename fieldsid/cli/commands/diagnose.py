@@ -21,7 +21,7 @@ from fieldsid.cli.options import (
     option,
 )
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, refuse_figure, trying
-from fieldsid.cli.session import drawn_at
+from fieldsid.cli.session import draw_figure
 from fieldsid.cli.voice import angles
 from fieldsid.display import page_of
 from fieldsid.errors import UsageError
@@ -68,12 +68,12 @@ def command(
 
     refuse_existing(output, force=force)
     refuse_figure(figure, force=force)
-    known = _known(model, axis)
+    known = _known_model(model, axis)
     skips, ready = Skips(), partial(get_ready, "fieldsid.diagnosis")
-    held = partial(check_effects, [(model, known)] if model and known else [])
+    check = partial(check_effects, [(model, known)] if model and known else [])
     models = [model] if model else []
     training, unseen = read_groups(
-        [runs, validate or []], mapping=mapping, models=models, check=held, meanwhile=ready, refused=skips.skip
+        [runs, validate or []], mapping=mapping, models=models, check=check, meanwhile=ready, refused=skips.skip
     )
     from fieldsid.diagnosis import diagnose
     from fieldsid.face.arguments import axis_excited
@@ -82,9 +82,9 @@ def command(
     axis = known.axis if known else axis or axis_excited(training, AXIS_OPTION)
     with compiling_first(), trying("diagnosing") as report:
         found = diagnose(training, axis, unseen, model=known, report=report, thorough=thorough, unfit=skips.skip)
-    training, unseen = skips.left_of(training), skips.left_of(unseen)
+    training, unseen = skips.without_skipped(training), skips.without_skipped(unseen)
     logs = files_of([*training, *unseen])
-    told = Diagnosed(
+    result = Diagnosed(
         found=found,
         runs=tuple(r.name for r in training),
         validation_runs=tuple(r.name for r in unseen),
@@ -92,20 +92,23 @@ def command(
         known=() if known is None else known.effects,
         skipped_runs=tuple(skips.records),
     )
-    told = replace(
-        told, file=_saved(told, output, [*logs, *models], force=force), figure=drawn_at(figure, found.plot, force=force)
+    result = replace(
+        result,
+        file=_save_diagnosis(result, output, [*logs, *models], force=force),
+        figure=draw_figure(figure, found.plot, force=force),
     )
     if apply:
         used = mapping or mapping_behind(models, logs)
-        told = replace(told, applied=_applied(found, (known, model), training, unseen, used, force=force))
+        result = replace(result, applied=_add_effects(found, (known, model), training, unseen, used, force=force))
     from fieldsid.cli.headlines.missing import Searched, of_diagnosis
 
-    headline = of_diagnosis(told, Searched(files_of(training), files_of(unseen), model, thorough))
-    result = emit(told, render=_page(told), headline=headline, notes=found.notes)
-    return skips.end(result, len(training) + len(unseen))
+    headline = of_diagnosis(result, Searched(files_of(training), files_of(unseen), model, thorough))
+    body = emit(result, render=_page(result), headline=headline, notes=found.notes)
+    return skips.end(body, len(training) + len(unseen))
 
 
-def _known(path: Path | None, axis: Axis | None) -> Model | None:
+def _known_model(path: Path | None, axis: Axis | None) -> Model | None:
+    """Return the model of a file, None without one; raises UsageError where it is of another axis than the one stated."""
     if path is None:
         return None
     from fieldsid.models.model import load_model
@@ -118,20 +121,23 @@ def _known(path: Path | None, axis: Axis | None) -> Model | None:
     return model
 
 
-def _saved(told: Diagnosed, path: Path | None, inputs: Sequence[Path], *, force: bool) -> str | None:
+def _save_diagnosis(result: Diagnosed, path: Path | None, inputs: Sequence[Path], *, force: bool) -> str | None:
     if path is None:
         return None
     from fieldsid.artifacts import save_record
 
-    kept = {k: v for k, v in body_of(told).items() if k not in ("schema", "applied", "file", "figure")}
+    kept = {k: v for k, v in body_of(result).items() if k not in ("schema", "applied", "file", "figure")}
     return str(save_record(path, "fieldsid/diagnosis/1", kept, inputs=inputs, force=force))
 
 
-def _applied(
+def _add_effects(
     found: Diagnosis, model: tuple[Model | None, Path | None], training: Sequence[Run],
     unseen: Sequence[Run], mapping: Path | None, *, force: bool,
 ) -> tuple[Applied, ...]:  # fmt: skip
-    """Extend the model diagnosed by each named effect in turn, write each model, and return what each step has changed."""
+    """Extend the diagnosed model by each named effect in turn, write the model of each step, and return what it has changed.
+
+    A base model that was given no file is written first, as the parent of the others.
+    """
     from fieldsid.cli.commands.extend import step_files
     from fieldsid.cli.headlines.missing import MODELS
     from fieldsid.cli.inputs import files_of
@@ -157,13 +163,13 @@ def _applied(
     )
 
 
-def _page(told: Diagnosed) -> Page:
-    """Return the page of the diagnosis, with the error before the first addition and after each where effects were added."""
-    closing = written(model=[step.model for step in told.applied], file=told.file, figure=told.figure)
-    return Page("", blocks=(*page_of(told.found, angles()).blocks, _steps(told.applied)), closing=closing)
+def _page(result: Diagnosed) -> Page:
+    """Return the page of the diagnosis; where effects were added, with the error before the first and after each addition."""
+    closing = written(model=[step.model for step in result.applied], file=result.file, figure=result.figure)
+    return Page("", blocks=(*page_of(result.found, angles()).blocks, _error_by_step(result.applied)), closing=closing)
 
 
-def _steps(applied: Sequence[Applied]) -> Block:
+def _error_by_step(applied: Sequence[Applied]) -> Block:
     def row(name: str, errors: Pair, floor: Noise) -> tuple[str, ...]:
         return (name, *(times(side.over(floor)) for side in (errors.train, errors.validation)))
 

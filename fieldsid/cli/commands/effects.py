@@ -37,8 +37,8 @@ def list_(axis: Annotated[Axis | None, option("--axis", "", "Only the effects of
     from fieldsid.results.effects import Catalogue, Described
 
     known = tuple(all_effects(axis).values())
-    told = Catalogue(axis, tuple(map(Described, known)))
-    return emit(told, render=_list_page(known), headline=of_catalogue(known))
+    result = Catalogue(axis, tuple(map(Described, known)))
+    return emit(result, render=_list_page(known), headline=of_catalogue(known))
 
 
 @command.command("show", short_help="Show all that is known of one effect.")
@@ -73,15 +73,15 @@ def new(
     path = output or Path(OWN_EFFECTS) / f"{name}.yaml"
     _refuse_name(name, path)
     refuse_existing(path, force=force)
-    write_text(path, _started(name, axis, path), force=force)
-    load_own_effects()  # what was broken in a file that is replaced is so no more
-    told = NewEffect(name, axis, str(path))
-    page = Page("", closing=written(effect=told.file))
-    return emit(told, render=page, headline=of_new_effect(told, _look_at(path, name)))
+    write_text(path, _template_text(name, axis, path), force=force)
+    load_own_effects()  # a replaced file may have been broken: register the new one
+    result = NewEffect(name, axis, str(path))
+    page = Page("", closing=written(effect=result.file))
+    return emit(result, render=page, headline=of_new_effect(result, _command_to_show(path, name)))
 
 
 def _refuse_name(name: str, path: Path) -> None:
-    """Refuse a name that no effect can have, or that one has which is not in the file to be written; raises FieldsidError."""
+    """Raise FieldsidError for a name that no effect can have, or that an effect of another file has already."""
     from fieldsid.effects import all_effects
     from fieldsid.effects._user_file import checked_name, name_like
     from fieldsid.models.effect import REGISTRY
@@ -97,8 +97,8 @@ def _refuse_name(name: str, path: Path) -> None:
         raise why
 
 
-def _started(name: str, axis: Axis, path: Path) -> str:
-    """Return the text of a new effect; raises FieldsidError where the file would not be read as that effect."""
+def _template_text(name: str, axis: Axis, path: Path) -> str:
+    """Return the template of an effect under the new name and axis; raises FieldsidError where it could not be read back."""
     from fieldsid.effects import all_effects, refuse_clash
     from fieldsid.effects._user_file import SUFFIXES, effect_of_text
     from fieldsid.templates import template_path
@@ -108,23 +108,23 @@ def _started(name: str, axis: Axis, path: Path) -> str:
             f"`{path}` is no YAML file", found=path.suffix or "no suffix", hint=f"write `-o {path.with_suffix('.yaml')}`"
         )
     text = template_path("effect.yaml").read_text(encoding="utf-8")
-    for old, own in _changes(name, axis):
-        text = text.replace(old, own)
-    others = [e for e in all_effects().values() if e.name != name]  # whose that name is, `_refuse_name` has asked
+    for old, new in _substitutions(name, axis):
+        text = text.replace(old, new)
+    others = [e for e in all_effects().values() if e.name != name]  # `_refuse_name` has checked the name itself
     refuse_clash(effect_of_text(text, path, origin=str(path)), others)
     return text
 
 
-def _look_at(path: Path, name: str) -> str:
-    """Return the line to look at it when it is edited: it is read from the working folder's own place alone."""
+def _command_to_show(path: Path, name: str) -> str:
+    """Return the command line that shows the edited effect; a file outside `effects/` is copied there first, to be read."""
     show = pasted("effects", "show", name)
     if path.parent.resolve() == Path(OWN_EFFECTS).resolve():
         return show
     return f"mkdir -p {OWN_EFFECTS} && cp {quote(str(path))} {OWN_EFFECTS}/ && {show}"
 
 
-def _changes(name: str, axis: Axis) -> tuple[tuple[str, str], ...]:
-    """What of the template is the user's: its name, its axis, and a coefficient's name that no other effect has."""
+def _substitutions(name: str, axis: Axis) -> tuple[tuple[str, str], ...]:
+    """Return what to replace in the template: its name, its axis, and its coefficient by one that no other effect has."""
     return (
         ("roll_rate_drag", name),
         ("axes: [yaw]", f"axes: [{axis}]"),
@@ -142,10 +142,10 @@ def _list_page(known: Iterable[Effect]) -> Page:
     return Page("", blocks=(*blocks, *paragraph(own, Whole)))
 
 
-def _form_in_words(effect: Effect, form: Form, asked: Variant) -> str:
-    """Return what a form says, with its axes and signals where they are not the effect's."""
-    own = [*([] if len(form.axes) == len(effect.axes) else form.axes), *(f"needs {role}" for role in asked.needs)]
-    return form.says + (f" ({', '.join(own)})" if own else "")
+def _form_in_words(effect: Effect, form: Form, variant: Variant) -> str:
+    """Return the description of a variant's form, with its axes and signals where they differ from the effect's."""
+    differences = [*([] if len(form.axes) == len(effect.axes) else form.axes), *(f"needs {role}" for role in variant.needs)]
+    return form.says + (f" ({', '.join(differences)})" if differences else "")
 
 
 def _page(effect: Effect) -> Page:

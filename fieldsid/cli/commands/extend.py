@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from fieldsid.cli.console import emit
-from fieldsid.cli.headlines.missing import left_says, of_extension, of_undoing
+from fieldsid.cli.headlines.missing import left_in_words, of_extension, of_undoing
 from fieldsid.cli.headlines.typed import pasted, repeated
-from fieldsid.cli.headlines.words import used
+from fieldsid.cli.headlines.words import next_use
 from fieldsid.cli.options import Force, MappingFile, ModelFile, OutputFile, ValidateRuns, argument, flag, option
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, trying
 from fieldsid.cli.skipped_logs import Skips
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from fieldsid.results.extensions import AddedCoefficient, Extended, LeftOver
 
 MUCH, SMALL = 100.0, 1e-3
-"""A standard error so many times the value, or the smallest value that counts, is no knowledge."""
+"""A coefficient is not determined where its standard error exceeds MUCH times its value, or MUCH * SMALL."""
 
 
 def command(
@@ -55,7 +55,7 @@ def command(
             raise UsageError(
                 "`--undo` takes the model alone", found="runs or options beside it", hint=f"sysid extend {model} --undo"
             )
-        return _undone(model, output, force=force)
+        return _restore_parent(model, output, force=force)
     from fieldsid.cli.inputs import files_of, mapping_behind, model_first, read_groups
     from fieldsid.face.arguments import names_of
     from fieldsid.models.model import load_model
@@ -68,7 +68,7 @@ def command(
     skips, validate = Skips(), validate or []
     known, names = load_model(path), list(dict.fromkeys(n for given in add or [] for n in names_of(given)))
     targets = step_files(path, names, output, force=force) if names else []
-    check, ready = partial(_check, path, known, names), partial(get_ready, "fieldsid.extension.extend")
+    check, ready = partial(_check_request, path, known, names), partial(get_ready, "fieldsid.extension.extend")
     training, unseen = read_groups(
         [runs, validate], mapping=mapping, models=[path], check=check, meanwhile=ready, refused=skips.skip
     )
@@ -80,14 +80,14 @@ def command(
     with compiling_first(), trying("extending") as report:
         steps = extend_in_steps(known, names, training, unseen, report=report, unfit=skips.skip)
     found = whole_of(steps)
-    training, unseen = skips.left_of(training), skips.left_of(unseen)
+    training, unseen = skips.without_skipped(training), skips.without_skipped(unseen)
     kept = found.pays or keep
     if kept:
         used = mapping or mapping_behind([path], files_of([*training, *unseen]))
         save_steps(steps, targets, path, (training, unseen), mapping=used, force=force)
     now = targets[-1] if kept else path
-    left, next_ = _left(found, now, known, runs, validate, kept=kept)
-    told = Extended(
+    left, next_ = _remaining_error(found, now, known, runs, validate, kept=kept)
+    result = Extended(
         gain=found.gain,
         axis=known.axis,
         log_evidence=found.evidence,
@@ -103,12 +103,15 @@ def command(
         next=next_,
         skipped_runs=tuple(skips.records),
     )
-    result = emit(told, render=_page(told), headline=of_extension(told), notes=told.notes)
-    return skips.end(result, len(runs) + len(validate) - len(skips.records))
+    body = emit(result, render=_page(result), headline=of_extension(result), notes=result.notes)
+    return skips.end(body, len(runs) + len(validate) - len(skips.records))
 
 
 def step_files(parent: Path, effects: Sequence[str], last: Path | None = None, *, force: bool = False) -> list[Path]:
-    """Return the file of the model after each of some effects, beside the last or the parent; refuses those that exist."""
+    """Return the file of the model after each added effect, in the folder of the last one or of the parent.
+
+    Raises ArtifactError for a file that exists, unless forced.
+    """
     stems = [f"{parent.stem}+{'+'.join(effects[: i + 1])}" for i in range(len(effects))]
     files = [(last or parent).with_name(f"{stem}.yaml") for stem in stems]
     files[-1] = last or files[-1]
@@ -117,7 +120,8 @@ def step_files(parent: Path, effects: Sequence[str], last: Path | None = None, *
     return files
 
 
-def _check(path: Path, model: Model, names: Sequence[str]) -> None:
+def _check_request(path: Path, model: Model, names: Sequence[str]) -> None:
+    """Raise an error for an effect that is unknown, of the other axis, or in the model already."""
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.extension.extend import new_effects
 
@@ -125,18 +129,18 @@ def _check(path: Path, model: Model, names: Sequence[str]) -> None:
     new_effects(model, names)
 
 
-def _left(
+def _remaining_error(
     found: Extension, model: Path, parent: Model, runs: Sequence[Path], validate: Sequence[Path], *, kept: bool
 ) -> tuple[LeftOver, str]:
-    """Return what the model as it now is leaves, over the noise floor, and the command that goes on from there."""
+    """Return the error that the resulting model leaves, over the noise floor, and the command that comes next."""
     from fieldsid.results.extensions import LeftOver
 
     fitted, unseen = found.gain.left(kept=kept)
     left = LeftOver(fitted, unseen, not all(is_noise(error) for error in (fitted, unseen)))
     if not left.more_than_noise:
-        return left, used(parent.axis.value, str(model))
+        return left, next_use(parent.axis.value, str(model))
     judged = repeated("--validate", validate)
-    longer = () if kept else ("--thorough",)  # what was named by the usual search has not paid
+    longer = () if kept else ("--thorough",)  # the effect that the usual search named did not pay: search longer
     return left, pasted("diagnose", runs, "--axis", parent.axis.value, "--model", str(model), *judged, *longer)
 
 
@@ -155,7 +159,11 @@ def _coefficients(found: Extension) -> dict[str, AddedCoefficient]:
     }
 
 
-def _undone(path: Path, output: Path | None, *, force: bool) -> Mapping[str, Any]:
+def _restore_parent(path: Path, output: Path | None, *, force: bool) -> Mapping[str, Any]:
+    """Give back the model that one was extended from, copied to the output where that is given; print and return the body.
+
+    Raises UsageError for a model without a parent, ArtifactError where the parent is missing or, unless forced, has changed.
+    """
     from fieldsid.artifacts import replacing
     from fieldsid.extension.lineage import CHANGED, MISSING, history_of, parent_of
     from fieldsid.models.model import load_model
@@ -183,31 +191,31 @@ def _undone(path: Path, output: Path | None, *, force: bool) -> Mapping[str, Any
     return emit(undone, render=page, headline=of_undoing(undone))
 
 
-def _page(told: Extended) -> Page:
+def _page(result: Extended) -> Page:
     from fieldsid.views.extension import errors
 
     found = tuple(
         (name, _value(factor * c.value, factor * c.std_error, at_bound=c.at_bound), unit)
-        for name, c in told.coefficients.items()
+        for name, c in result.coefficients.items()
         for factor, unit in [angles().of(c.unit)]
     )
     coefficients = Block("", found, ("coefficient", "value", "unit"), left=2)
-    says = paragraph([_verdict(told), left_says(told.left)])
-    return Page("", blocks=(errors(told.gain, angles()), coefficients, *says), closing=written(model=told.model))
+    says = paragraph([_verdict(result), left_in_words(result.left)])
+    return Page("", blocks=(errors(result.gain, angles()), coefficients, *says), closing=written(model=result.model))
 
 
-def _verdict(told: Extended) -> str:
-    unseen = told.gain.unseen
-    if told.pays:
+def _verdict(result: Extended) -> str:
+    unseen = result.gain.unseen
+    if result.pays:
         return f"kept: {'it predicts better what it has not seen' if unseen else 'the evidence pays for it'}"
     data = "unseen data" if unseen else "the evidence"
-    if told.kept:
+    if result.kept:
         return f"kept because of --keep: on {data} it does not pay"
     return f"not kept: on {data} it does not pay; nothing was written, --keep overrules"
 
 
 def _value(value: float, error: float, *, at_bound: bool) -> str:
-    """Return a value with its error, or why it has none."""
+    """Return a value with its standard error, or why it has none: it is at its bound, or the data do not determine it."""
     if at_bound:
         return at_its_bound(value)
     known = error < MUCH * max(abs(value), SMALL)

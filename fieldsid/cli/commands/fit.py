@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from fieldsid.cli.console import emit
 from fieldsid.cli.options import Figures, Force, ModelFiles, OutputFile, flag
 from fieldsid.cli.progress import refuse_existing
-from fieldsid.cli.session import drawn_at
+from fieldsid.cli.session import draw_figure
 from fieldsid.page import Page, written
 from fieldsid.views.laws import blocks_of
 
@@ -44,10 +44,10 @@ def command(
     laws = source.fitted(weighted=not unweighted)
     file = None
     if output is not None:
-        there = [p for p in source.paths if p.is_file()]
-        file = str(save_laws(laws, output, models=there if source.models else (), inputs=there, force=force))
-    drawn = drawn_at(figure, laws.plot, force=force)
-    told = FittedLaws(laws=laws, file=file, figure=drawn)
+        inputs = [p for p in source.paths if p.is_file()]
+        file = str(save_laws(laws, output, models=inputs if source.models else (), inputs=inputs, force=force))
+    drawn = draw_figure(figure, laws.plot, force=force)
+    result = FittedLaws(laws=laws, file=file, figure=drawn)
     notes = (*source.notes, *law_notes(laws))
     page = Page("", blocks=tuple(blocks_of(laws)), closing=written(file=file, figure=drawn))
-    return emit(told, render=page, headline=of_fit(told), notes=notes)
+    return emit(result, render=page, headline=of_fit(result), notes=notes)

@@ -37,8 +37,8 @@ def command(
 
     page = pick_page(topic or "index")
     contents = Contents(tuple(Title(p.topic, p.title) for p in all_pages().values()))
-    told = contents if topic is None else Topic(page.topic, page.title, str(page.path), page.text)
-    return emit(told, render=lambda to: _show(to, page))
+    result = contents if topic is None else Topic(page.topic, page.title, str(page.path), page.text)
+    return emit(result, render=lambda to: _show(to, page))
 
 
 def _show(to: Console, page: Page) -> None:

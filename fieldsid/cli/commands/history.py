@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from fieldsid.cli.console import emit, say
 from fieldsid.cli.options import FigureFile, Force, ModelFile
 from fieldsid.cli.progress import refuse_figure
-from fieldsid.cli.session import drawn_at
+from fieldsid.cli.session import draw_figure
 from fieldsid.cli.voice import angles
 from fieldsid.figures.kinds import sketch
 from fieldsid.logs.run import Note
@@ -44,21 +44,22 @@ def command(model: ModelFile, figure: FigureFile = None, force: Force = False) -
     if figure is not None and not steps:
         say("nothing was added yet: there is no figure to draw")
     plot = sketch("history", line, model.name)
-    told = History(
+    result = History(
         model=str(model),
         axis=known.axis,
         generations=line,
         intact=all(g.state == "intact" and not (g.step and g.step.changed_data) for g in line),
-        figure=drawn_at(figure if steps else None, plot, force=force),
+        figure=draw_figure(figure if steps else None, plot, force=force),
     )
     from fieldsid.cli.headlines.models import of_history
     from fieldsid.records.named_inputs import inputs_of
 
-    headline = of_history(told, inputs_of(model))
-    return emit(told, render=_page(told, steps), headline=headline, notes=_notes(line))
+    headline = of_history(result, inputs_of(model))
+    return emit(result, render=_page(result, steps), headline=headline, notes=_notes(line))
 
 
 def _notes(line: Sequence[Generation]) -> list[Note]:
+    """Return a warning for each parent and each log that is missing or has changed since a model was made from it."""
     found: list[Note] = []
     for g in line:
         if g.state == "changed":
@@ -70,23 +71,23 @@ def _notes(line: Sequence[Generation]) -> list[Note]:
     return found
 
 
-def _page(told: History, steps: Sequence[Step]) -> Page:
-    first = told.generations[0]
+def _page(result: History, steps: Sequence[Step]) -> Page:
+    first = result.generations[0]
     added = [row for step in steps for row in _rows(step.gain)]
-    kept = []
+    reasons = []
     for step in steps:
         judged = ("judged on " if step.gain.unseen else "fitted to ") + ", ".join(step.gain.judged_on)
-        kept.append(f"+ {', '.join(step.gain.added)}: {KEPT.get(step.kept_by, step.kept_by)}; {judged}")
+        reasons.append(f"+ {', '.join(step.gain.added)}: {KEPT.get(step.kept_by, step.kept_by)}; {judged}")
     blocks: tuple[Block | str, ...] = (
         Whole(f"starts from {', '.join(first.effects) or 'the plain model'}: {first.path}"),
         Block("", tuple(added), ("added", "error of", "before", "after", "noise", "x floor"), left=2),
-        *paragraph(kept, Whole),
+        *paragraph(reasons, Whole),
     )
-    return Page("", blocks=blocks, closing=written(model=told.model, figure=told.figure))
+    return Page("", blocks=blocks, closing=written(model=result.model, figure=result.figure))
 
 
 def _rows(gain: Gain) -> Iterator[tuple[str, ...]]:
-    """Yield a row for each channel of one addition, the pooled error over the floor on the first."""
+    """Yield a row for each channel of one addition; the first row has the pooled error over the noise floor too."""
     judged = "unseen" if gain.unseen else "fitted"
     channels = [r for r in channels_of(gain) if r["runs"] == judged]
     over = f"{gain.over_floor[0]:.2f} -> {gain.over_floor[1]:.2f}"

@@ -8,7 +8,7 @@ from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from fieldsid.cli.console import alike, emit, progress
+from fieldsid.cli.console import emit, one_of_each_kind, progress
 from fieldsid.cli.options import (
     Bandwidth,
     EffectNames,
@@ -26,7 +26,7 @@ from fieldsid.cli.options import (
     option,
 )
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_closed
-from fieldsid.cli.session import drawn_in
+from fieldsid.cli.session import draw_figures
 from fieldsid.cli.voice import angles
 from fieldsid.figures.kinds import sketch
 from fieldsid.logs.run import Note
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 MOST_DRAWN = 6
-"""Runs of one model that are drawn: two figures each, and nobody looks through sixty."""
+"""Number of runs of one model that are drawn, with two figures each: nobody looks through sixty."""
 
 
 def command(
@@ -95,22 +95,23 @@ def command(
             done=step,
             unfit=skips.skip,
         )
-    used = skips.left_of(known)
+    used = skips.without_skipped(known)
     groups = [used] if joint else [[run] for run in used]
     files = [files_of(group) for group in groups]
-    models = _written(fits, files, mapping, output, force=force)
-    drawn_in(output if figures else None, {k: v for fit in fits for k, v in _plots(fit).items()}, force=force)
+    models = _save_models(fits, files, mapping, output, force=force)
+    draw_figures(output if figures else None, {k: v for fit in fits for k, v in _plots(fit).items()}, force=force)
     entries = tuple(fitted_model(fit, model, of) for fit, model, of in zip(fits, models, groups, strict=True))
-    told = Identified(axis=axis, fits=entries, skipped_runs=tuple(skips.records))
+    result = Identified(axis=axis, fits=entries, skipped_runs=tuple(skips.records))
     from fieldsid.cli.headlines.models import of_identify
 
-    page, headline = _page(entries, figures=figures), of_identify(told, files)
-    return skips.end(emit(told, render=page, headline=headline, notes=_warnings(entries)), len(used))
+    page, headline = _page(entries, figures=figures), of_identify(result, files)
+    return skips.end(emit(result, render=page, headline=headline, notes=_warnings(entries)), len(used))
 
 
-def _written(
+def _save_models(
     fits: Sequence[Fit], sources: Sequence[list[Path]], mapping: Path | None, folder: Path | None, *, force: bool
 ) -> Sequence[Path | None]:
+    """Write the model of each fit to the folder and return the files; None for each where there is no folder."""
     if folder is None:
         return [None] * len(fits)
     from fieldsid.models.model import save_model
@@ -122,9 +123,9 @@ def _written(
 
 
 def _plots(fit: Fit) -> dict[str, Callable[[], Any]]:
-    """Return what draws each figure of a fit, by the figure's name."""
+    """Return a function that draws each figure of a fit, by the figure's name."""
     plots, stem = {}, _stem(fit)
-    for i in _drawn(fit):
+    for i in _runs_to_draw(fit):
         name = stem if len(fit.predictions) == 1 else f"{stem}_{fit.predictions[i].record.name}"
         plots[name] = sketch("identify", fit, i)
         plots[f"{name}_residuals"] = sketch("identify", fit, i, draw="residual_figure")
@@ -133,8 +134,8 @@ def _plots(fit: Fit) -> dict[str, Callable[[], Any]]:
     return plots
 
 
-def _drawn(fit: Fit) -> list[int]:
-    """Return the places of the runs that are drawn: all of a few, of many those that the model follows least."""
+def _runs_to_draw(fit: Fit) -> list[int]:
+    """Return the indices of at most MOST_DRAWN runs: those with the largest error over the noise floor."""
     from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
     from fieldsid.results.fits import over_noise_of
 
@@ -149,12 +150,12 @@ def _stem(fit: Fit) -> str:
 
 
 def _warnings(entries: Sequence[FittedModel]) -> list[Note]:
-    """Return each kind of warning once, with the numbers of the first run that has it."""
-    return alike((w.code, _label(e), w) for e in entries for w in e.warnings)
+    """Return one warning of each kind for a model, with the numbers of the first run that has it."""
+    return one_of_each_kind((w.code, _label(e), w) for e in entries for w in e.warnings)
 
 
 def _reasons(entries: Sequence[FittedModel]) -> Iterator[str]:
-    """Yield why `auto` took each method it had to choose between, with the numbers of the first run it took it for."""
+    """Yield why `auto` chose each of its methods, with the numbers of the first run that it was chosen for."""
     weighed = [e for e in entries if e.method_reason is not None]
     for method in sorted({e.method for e in weighed}):
         first, *others = (e for e in weighed if e.method == method)

@@ -41,7 +41,7 @@ def command(
     Example: sysid import run7.mcap --mapping mapping.yaml -o runs/
     """
     from fieldsid.artifacts import check_output
-    from fieldsid.cli.console import alike, emit, tracked, warn
+    from fieldsid.cli.console import emit, one_of_each_kind, tracked, warn
     from fieldsid.cli.inputs import mapping_of, one_run
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.cli.voice import voice
@@ -60,8 +60,9 @@ def command(
         mapping_of(mapping), tuple(channel or ()), msg_path, part_between(from_s, to_s), max_gap, salvage, whole, tuple(joined)
     )
     limits = vehicle_of(vehicle).signal_limits
-    there = [] if force or importer != Importer(importer.mapping) else _already(importer, logs, output, format_, mapping)
-    logs = [log for log in logs if log not in there]
+    is_usual = not force and importer == Importer(importer.mapping)
+    imported = _already_imported(importer, logs, output, format_, mapping) if is_usual else []
+    logs = [log for log in logs if log not in imported]
     targets = dict(zip(logs, importer.targets(logs, output, format_, force=force), strict=True))
     skips = Skips()
     shown = tracked(logs, "reading")
@@ -72,27 +73,27 @@ def command(
     for _, place in placed:
         check_output(place, force=force)
     done = [importer.write(run, place, force=force) for run, place in placed]
-    told = Import(runs=tuple(done), already_imported=tuple(map(str, there)), skipped_runs=tuple(skips.records))
+    result = Import(runs=tuple(done), already_imported=tuple(map(str, imported)), skipped_runs=tuple(skips.records))
     from fieldsid.cli.headlines.logs import of_import
     from fieldsid.logs.segments import plane_of
 
-    notes = alike(((n.code, n.data.get("signal")), item.run.name, n) for item in done for n in item.warnings)
-    headline = of_import(told, plane_of([d.run for d in done]))
+    notes = one_of_each_kind(((n.code, n.data.get("signal")), item.run.name, n) for item in done for n in item.warnings)
+    headline = of_import(result, plane_of([d.run for d in done]))
     rows = tuple((d.file, str(d.samples), f"{d.duration_s:.2f}", f"{d.rate_hz:.4g}", str(len(d.signals))) for d in done)
     page = Page("", blocks=(Block("", rows, ("run", "samples", "s", "Hz", "signals")),))
-    result = emit(told, render=page, headline=headline, notes=notes)
-    if voice().is_json:  # a run is used for long: what is odd about it is said however it is asked for
+    body = emit(result, render=page, headline=headline, notes=notes)
+    if voice().is_json:  # a run is used for a long time: its warnings go to stderr in JSON mode too
         warn(notes)
-    return skips.end(result, len(done))
+    return skips.end(body, len(done))
 
 
-def _already(importer: Importer, logs: list[Path], output: Path, form: str, mapping: Path | None) -> list[Path]:
-    """Return the logs whose runs are there, made of the same bytes of the log and of its mapping."""
+def _already_imported(importer: Importer, logs: list[Path], output: Path, form: str, mapping: Path | None) -> list[Path]:
+    """Return the logs whose runs exist and were made from the same bytes of the log and of its mapping; say so on stderr."""
     from fieldsid.cli.console import say
     from fieldsid.records.named_inputs import sha256_of_named
     from fieldsid.trial_folder.state import run_head
 
-    def is_there(log: Path, target: Path) -> bool:
+    def is_imported(log: Path, target: Path) -> bool:
         place = target if target.exists() else importer.places(target, 2)[0]
         head = run_head(place) if place.name.endswith(".parquet") and place.is_file() else None
         made_of = {e["path"]: e["sha256"] for e in (head or {}).get("inputs") or ()}
@@ -100,7 +101,7 @@ def _already(importer: Importer, logs: list[Path], output: Path, form: str, mapp
         return given <= made_of.keys() and all(sha256_of_named(Path(p)) == known for p, known in made_of.items())
 
     pairs = zip(logs, importer.targets(logs, output, form, force=True), strict=True)
-    found = [log for log, target in pairs if is_there(log, target)]
+    found = [log for log, target in pairs if is_imported(log, target)]
     if found:
         say(f"already imported: {', '.join(map(str, found))}")
     return found

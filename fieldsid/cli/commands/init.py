@@ -34,5 +34,5 @@ def command(
     verdict = f"a trial folder for a {template} vehicle"
     append(folder, Entry(time, words, 0, 0.0, verdict, (), tuple(hashes.stamp(f) for f in files)))
     files = [*files, folder / JOURNAL]
-    told = Init(name, template, tuple(map(str, files)))
-    emit(told, render=Page("", closing=told.files), headline=of_trial(told))
+    result = Init(name, template, tuple(map(str, files)))
+    emit(result, render=Page("", closing=result.files), headline=of_trial(result))

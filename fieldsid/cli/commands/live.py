@@ -23,12 +23,12 @@ from fieldsid.errors import UsageError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fieldsid.cli.live.beside import Beside
+    from fieldsid.cli.live.background_analysis import BackgroundAnalysis
     from fieldsid.online.identifier import OnlineIdentifier
     from fieldsid.online.progress import Goal, Watch
 
-SOURCE, GOAL, BESIDE = "Where the samples come from", "What is to be reached", "What a second process works out"
-"""The groups of its own options on the page of help."""
+SOURCE, GOAL, SECOND_PROCESS = "Where the samples come from", "What is to be reached", "What a second process works out"
+"""Groups of the options that only this command has, on its page of help."""
 
 
 SAVE_EVERY_S = 1.0
@@ -52,12 +52,12 @@ def command(
     until_enough: Annotated[
         bool, flag("--until-enough", "End at enough data; exit code 1 where that is not reached.", GOAL)
     ] = False,
-    gains: Annotated[bool, flag("--gains", "Design gains for the speed that is flown, once settled.", BESIDE)] = False,
+    gains: Annotated[bool, flag("--gains", "Design gains for the speed that is flown, once settled.", SECOND_PROCESS)] = False,
     schedule: Annotated[
-        Path | None, option("--schedule", "YAML", "The gains loaded, and what they were designed for.", BESIDE)
+        Path | None, option("--schedule", "YAML", "The gains loaded, and what they were designed for.", SECOND_PROCESS)
     ] = None,
-    depth: Annotated[bool, flag("--depth", "With the depth loop above pitch.", BESIDE)] = False,
-    diagnose: Annotated[bool, flag("--diagnose", "Diagnose what was flown whenever a maneuver ends.", BESIDE)] = False,
+    depth: Annotated[bool, flag("--depth", "With the depth loop above pitch.", SECOND_PROCESS)] = False,
+    diagnose: Annotated[bool, flag("--diagnose", "Diagnose what was flown whenever a maneuver ends.", SECOND_PROCESS)] = False,
     vehicle: VehicleFile = None,
     bandwidth: Bandwidth = 4.0,
     forgetting: Annotated[float, option("--forgetting", "", "Forgetting factor; 1 forgets nothing.", min=0.5, max=1.0)] = 1.0,
@@ -76,16 +76,16 @@ def command(
     _check_source(log, udp, follow=follow)
     feed = Feed(axis, log, speed if speed > 0.0 else inf, follow, udp, inf if idle is None else idle, mapping)
     goals, goals_from = _goals(axis, plan, want)
-    beside = _beside(feed, (schedule, vehicle, depth) if gains or schedule else None, diagnose=diagnose)
+    analysis = _analysis(feed, (schedule, vehicle, depth) if gains or schedule else None, diagnose=diagnose)
     from fieldsid.online.progress import Watch
 
     watch = Watch(goals(float("nan")))
-    identifier, skipped = _begun(feed, state, watch, bandwidth, forgetting)
-    live = _Live(feed, identifier, watch, goals, goals_from, state, beside)
+    identifier, known_until = _identifier(feed, state, watch, bandwidth, forgetting)
+    live = _Live(feed, identifier, watch, goals, goals_from, state, analysis)
     body: Mapping[str, Any] = {}
-    with _shown() as show:
+    with _display() as show:
         try:
-            for body in live.looks(every, skipped):
+            for body in live.looks(every, known_until):
                 show(body)
                 if until_enough and body["verdict"] == "enough":
                     break
@@ -93,8 +93,8 @@ def command(
             if not body:
                 raise
         finally:
-            if beside is not None:
-                beside.close()
+            if analysis is not None:
+                analysis.close()
             live.save()
     if not voice().is_json:
         _end(body)
@@ -135,20 +135,28 @@ def _goals(axis: AxisOption, plan: Path | None, want: str | None) -> tuple[Calla
     return (lambda _speed: default_goals(axis)), f"{100.0 * DEFAULT_ACCURACY:.0f} % of each value"
 
 
-def _beside(feed: Feed, gains: tuple[Path | None, Path | None, bool] | None, *, diagnose: bool) -> Beside | None:
-    """Return what works beside the estimate: gains of a schedule, a vehicle, with depth or not, and a diagnosis."""
+def _analysis(feed: Feed, gains: tuple[Path | None, Path | None, bool] | None, *, diagnose: bool) -> BackgroundAnalysis | None:
+    """Return what designs gains and diagnoses in other processes; None where neither is asked for.
+
+    gains: the schedule, the vehicle, and whether to design the depth loop; None for no gains.
+    """
     if gains is None and not diagnose:
         return None
-    from fieldsid.cli.live.beside import Beside, wanted_at
+    from fieldsid.cli.live.background_analysis import BackgroundAnalysis, wanted_at
 
     feed.keeps = True
     waits = feed.is_log and not feed.follow and not isfinite(feed.factor)
     wanted = None if gains is None else wanted_at(feed.axis, *gains)
-    return Beside(feed.axis, feed.flown, wanted, diagnoses=diagnose, waits=waits)
+    return BackgroundAnalysis(feed.axis, feed.flown, wanted, diagnoses=diagnose, waits=waits)
 
 
-def _begun(feed: Feed, state: Path | None, watch: Watch, bandwidth: float, forgetting: float) -> tuple[OnlineIdentifier, float]:
-    """Return the identifier, from its state where there is one, and the time up to which the source is known to it."""
+def _identifier(
+    feed: Feed, state: Path | None, watch: Watch, bandwidth: float, forgetting: float
+) -> tuple[OnlineIdentifier, float]:
+    """Return the identifier, from its state file where there is one, and the time (s) up to which it has used the source.
+
+    The time is -inf where it has used nothing of this source.
+    """
     from fieldsid.online.identifier import OnlineIdentifier
     from fieldsid.online.state_file import load_state
 
@@ -166,7 +174,7 @@ def _begun(feed: Feed, state: Path | None, watch: Watch, bandwidth: float, forge
 
 @dataclass(frozen=True, slots=True)
 class _Live:
-    """What is under way: samples, estimate, goals at a speed and their source, the file of its state, the second process."""
+    """A live identification: its samples, estimate, goals by speed and their source, state file and background analysis."""
 
     feed: Feed
     identifier: OnlineIdentifier
@@ -174,10 +182,13 @@ class _Live:
     goals: Callable[[float], Mapping[str, Goal]]
     goals_from: str
     state: Path | None
-    beside: Beside | None
+    analysis: BackgroundAnalysis | None
 
     def looks(self, every: float, after: float) -> Iterator[Mapping[str, Any]]:
-        """Yield a look every so many seconds of the log, one when it ends, and save the state as time goes on."""
+        """Yield a look after every so many seconds of the log and one at its end; save the state every SAVE_EVERY_S seconds.
+
+        after: the time in s up to which samples are passed over.
+        """
         due, saved, fresh, unreadable = -inf, clock.monotonic(), True, 0
         with closing(self.feed.samples(after)) as samples:  # type: ignore[type-var]
             for sample in samples:
@@ -186,8 +197,8 @@ class _Live:
                 self.identifier.update(*sample[:5], fin_is_held=sample.fin_is_held, fin_line=sample.fin_line)
                 self.watch.excitation.hear(sample.time, sample.fin, sample.rate)
                 fresh = True
-                if self.beside is not None:
-                    self.beside.hear(sample)
+                if self.analysis is not None:
+                    self.analysis.add(sample)
                 if sample.time >= due or sample.time < due - 2.0 * every:
                     due = sample.time + every
                     yield self.look()
@@ -195,25 +206,25 @@ class _Live:
                 if clock.monotonic() - saved >= SAVE_EVERY_S:
                     self.save()
                     saved = clock.monotonic()
-        if fresh or self.feed.unreadable > unreadable or self.beside is not None:
+        if fresh or self.feed.unreadable > unreadable or self.analysis is not None:
             yield self.look(ended=True)
 
     def look(self, *, ended: bool = False) -> Mapping[str, Any]:
-        """Return what there is to say now."""
+        """Return the JSON body of the estimate as it is now; ended: the source has ended."""
         from fieldsid.online.look import look_body
 
         now = self.identifier.estimate()
         self.watch.goals = dict(self.goals(now.speed))
         progress = self.watch.look(now)
-        then = self.feed.then(usable=not progress.contradiction)
-        told: dict[str, Any] = {"source": self.feed.name, "goals_from": self.goals_from, "unreadable": self.feed.unreadable}
-        if self.beside is not None:
-            self.beside.look(now, progress, ended=ended)
-            told |= {"gains": self.beside.gains, "diagnosed": self.beside.diagnosed}
-        return look_body(now, progress, then=then, **told)
+        next_command = self.feed.next_command(usable=not progress.contradiction)
+        details: dict[str, Any] = {"source": self.feed.name, "goals_from": self.goals_from, "unreadable": self.feed.unreadable}
+        if self.analysis is not None:
+            self.analysis.update(now, progress, ended=ended)
+            details |= {"gains": self.analysis.gains, "diagnosed": self.analysis.diagnosed}
+        return look_body(now, progress, then=next_command, **details)
 
     def save(self) -> None:
-        """Write the state, where it is to be kept."""
+        """Write the state to its file, where one is named."""
         from fieldsid.online.state_file import save_state
 
         if self.state is not None:
@@ -221,9 +232,9 @@ class _Live:
 
 
 @contextmanager
-def _shown() -> Iterator[Callable[[Mapping[str, Any]], None]]:
-    """Yield what shows a look: a line of JSON, a screen on a terminal, else a line of text; nothing where it is to be quiet."""
-    from fieldsid.cli.live.screen import line, screen, told_of
+def _display() -> Iterator[Callable[[Mapping[str, Any]], None]]:
+    """Yield a function that shows a look: a line of JSON, a screen on a terminal, else a line of text; nothing with `--quiet`."""
+    from fieldsid.cli.live.screen import event_lines, line, screen
 
     if voice().is_json:
         import json
@@ -239,14 +250,14 @@ def _shown() -> Iterator[Callable[[Mapping[str, Any]], None]]:
         yield lambda _body: None
         return
     if not console.is_terminal:
-        told: list[str] = []
+        printed: list[str] = []
 
         def print_line(body: Mapping[str, Any]) -> None:
             console.print(line(body), soft_wrap=True)
-            for text in told_of(body):
-                if text not in told:
+            for text in event_lines(body):
+                if text not in printed:
                     console.print(f"{'':12}{text}", soft_wrap=True)
-            told[:] = told_of(body)
+            printed[:] = event_lines(body)
 
         yield print_line
         return
@@ -257,11 +268,11 @@ def _shown() -> Iterator[Callable[[Mapping[str, Any]], None]]:
 
 
 def _end(body: Mapping[str, Any]) -> None:
-    from fieldsid.cli.live.screen import Parameters, headline_of, told_of
+    from fieldsid.cli.live.screen import Parameters, event_lines, headline_of
 
     def render(to: Console) -> None:
         to.print(Parameters(body))
-        for text in told_of(body):
+        for text in event_lines(body):
             to.print(text, soft_wrap=True)
 
     if body:

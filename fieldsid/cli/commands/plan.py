@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from fieldsid.cli.console import emit, progress, say
 from fieldsid.cli.options import LIMITS, WRITTEN, Figures, Force, OutputDir, VehicleFile, flag, option
 from fieldsid.cli.progress import compiling, refuse_closed, refuse_existing
-from fieldsid.cli.session import drawn_at
+from fieldsid.cli.session import draw_figure
 from fieldsid.cli.voice import angles
 from fieldsid.figures.kinds import sketch
 from fieldsid.models.axis import Axis
@@ -25,7 +25,7 @@ Text = str | None
 
 
 GOAL, FLOWN, KNOWN = "What to learn", "How it is flown", "What is known before"
-"""The groups of its own options on the page of help."""
+"""Groups of the options that only this command has, on its page of help."""
 
 
 def command(
@@ -104,17 +104,17 @@ def command(
     refuse_closed(output)
     refuse_existing(output / "plan.yaml" if output is not None else None, force=force)
     limiting = EnvelopeLimits(area, depth_band, max_heading, max_track, max_pitch, max_roll, fin_max, fin_rate, risk)
-    asked = PlanRequest(
+    request = PlanRequest(
         axis, speeds, vehicle, model, prior, want, minutes, limiting, window, run_up, rate, radius,
         names_of(separate), diagnosis, seed, open_loop, course,
     )  # fmt: skip
-    with compiling() as warmup, progress("planning", asked.legs) as step:
+    with compiling() as warmup, progress("planning", request.legs) as step:
 
-        def ready() -> None:
+        def compile_kernels() -> None:
             compile_planning()
             warmup.compile_now(SHARED_KERNELS)
 
-        made = planned(asked, step, ready)
+        made = planned(request, step, compile_kernels)
     if model is not None:
         check_effects([(model, made.model)])
     files: list[Path] = []
@@ -131,20 +131,20 @@ def command(
         if figures:
             files.append(output / "plan.png")
             views = [figure_data(made.plan, leg, made.model) for leg in made.plan.legs]
-            drawn_at(files[-1], sketch("plan", views), force=force)
-    told: dict[str, Any] = {}
+            draw_figure(files[-1], sketch("plan", views), force=force)
+    separation: dict[str, Any] = {}
     if made.found:
         best = max(made.found, key=lambda s: s.expected_log_odds)
-        told = {"separation": best, "separations": made.found, "says": tuple(line for s in made.found for line in s.says())}
-    result = Planned(made.plan, tuple(map(str, files)), **told)
+        separation = {"separation": best, "separations": made.found, "says": tuple(line for s in made.found for line in s.says())}
+    result = Planned(made.plan, tuple(map(str, files)), **separation)
     from fieldsid.cli.headlines.trial import of_plan
 
-    page = _page(made.plan, told.get("says", ()))
+    page = _page(made.plan, separation.get("says", ()))
     return emit(result, render=page, headline=of_plan(result, model))
 
 
 def _check_write(write: str | None, output: Path | None) -> None:
-    """Refuse formats before the search and not after it."""
+    """Raise UsageError for an unknown format, or for `--write` without `-o`: before the search, which takes time."""
     from fieldsid.errors import UsageError
     from fieldsid.face.arguments import names_of
     from fieldsid.planning.output.command_files import check_formats
@@ -155,7 +155,7 @@ def _check_write(write: str | None, output: Path | None) -> None:
 
 
 def _page(plan: Plan, says: Iterable[str]) -> Page:
-    times, angle = angles().of("rad")
+    factor, angle = angles().of("rad")
     rows = tuple(
         (
             number(leg.speed, 3),
@@ -164,12 +164,14 @@ def _page(plan: Plan, says: Iterable[str]) -> Page:
             number(leg.duration_s / 60, 2),
             number(leg.distance_m, 3),
             f"{100 * leg.break_probability:.1f}%",
-            *(number(v, 2) for v in _reached(leg.excursions, times)),
+            *(number(v, 2) for v in _largest_excursions(leg.excursions, factor)),
         )
         for leg in plan.legs
     )
     columns = ("speed", "maneuver", "passes", "min", "m", "risk", f"angle {angle}", "side m")
-    errors = tuple((number(leg.speed, 3), name, *_bought(e, leg.passes)) for leg in plan.legs for name, e in leg.expected.items())
+    errors = tuple(
+        (number(leg.speed, 3), name, *_expected_cells(e, leg.passes)) for leg in plan.legs for name, e in leg.expected.items()
+    )
     heads = ("speed", "parameter", "expected", "error", "at worst", "pulses need")
     blocks: tuple[Block | str, ...] = (
         Block(f"{plan.vehicle}, {plan.axis.value}: what to fly", rows, columns, left=2),
@@ -182,15 +184,15 @@ def _page(plan: Plan, says: Iterable[str]) -> Page:
 
 
 def _limits(plan: Plan) -> Iterator[str]:
-    """Yield every limit, and which of them no draw of the prior was tried on."""
+    """Yield every limit, those of a leg where they differ, and which of them are not part of the risk."""
     from fieldsid.models.axis import Axis
     from fieldsid.planning.safety.envelope import NOT_LIMITED, limits_said
 
     limits = limits_said(plan.envelope)
     yield "limits: " + "; ".join(f"{name} {words}" for name, words in limits.items())
     for leg in plan.legs:
-        own = limits_said(leg.envelope_in(plan.envelope))
-        other = [f"{name} {words}" for name, words in own.items() if words != limits[name]]
+        of_leg = limits_said(leg.envelope_in(plan.envelope))
+        other = [f"{name} {words}" for name, words in of_leg.items() if words != limits[name]]
         if other:
             yield f"{leg.candidate.maneuver} at {leg.speed:g} m/s: {'; '.join(other)}"
     unseen = ("pitch", "depth") if plan.axis is Axis.YAW else ("heading", "track", "roll")
@@ -199,25 +201,25 @@ def _limits(plan: Plan) -> Iterator[str]:
         yield f"not in the risk, only to be watched in flight: {', '.join(watched)}"
 
 
-def _reached(excursions: Mapping[str, float], times: float) -> tuple[float, float]:
-    """Return the 95 % quantiles of angle, so many times what it is in rad, and sideways distance, of whichever axis moves."""
-    angle = times * max(excursions.get(k, 0.0) for k in ("heading", "pitch"))
+def _largest_excursions(excursions: Mapping[str, float], factor: float) -> tuple[float, float]:
+    """Return the 95 % quantiles of heading or pitch (rad times the factor) and of the distance from the track or depth (m)."""
+    angle = factor * max(excursions.get(k, 0.0) for k in ("heading", "pitch"))
     return angle, max(excursions.get(k, 0.0) for k in ("track", "depth"))
 
 
-def _bought(e: Expected, passes: int) -> tuple[str, str, str, str]:
-    """Return what is expected of a parameter, its error, that at worst, and what the paper's pulses need for it."""
+def _expected_cells(e: Expected, passes: int) -> tuple[str, str, str, str]:
+    """Return a parameter's expected value, its standard error, that of the worst draws, and the time the paper's pulses need."""
     from fieldsid.planning.design.leg import error_in_words
 
-    if not isfinite(e.std_error):  # the maneuver does not show it
-        return with_error(e.value, e.std_error), "-", "-", _against(e.baseline, e.std_error, passes)
+    if not isfinite(e.std_error):  # the maneuver does not excite it
+        return with_error(e.value, e.std_error), "-", "-", _pulses_need(e.baseline, e.std_error, passes)
     at_worst = error_in_words(e.value, e.std_error_high, e.relative * e.std_error_high / e.std_error)
     error = error_in_words(e.value, e.std_error, e.relative)
-    return with_error(e.value, e.std_error), error, at_worst, _against(e.baseline, e.std_error, passes)
+    return with_error(e.value, e.std_error), error, at_worst, _pulses_need(e.baseline, e.std_error, passes)
 
 
-def _against(baseline: float, std_error: float, passes: int) -> str:
-    """Say how many times the flying time the paper's pulses need for the same error."""
+def _pulses_need(baseline: float, std_error: float, passes: int) -> str:
+    """Return the flying time of the paper's pulses for the same standard error, as a multiple of the maneuver's."""
     if not (isfinite(baseline) and isfinite(std_error) and baseline > 0 and std_error > 0):
         return "-"
     return f"{(baseline / std_error) ** 2 / passes:.1f} x"

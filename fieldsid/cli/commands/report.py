@@ -45,7 +45,7 @@ def command(
     check_report(path, force=force)
     get_ready()
     context, text = written(state, path, force=force)
-    told = Report(
+    result = Report(
         file=str(path),
         bytes=path.stat().st_size,
         verdicts=tuple(ReportVerdict(v["what"], v["says"]) for v in context["verdicts"]),
@@ -56,12 +56,13 @@ def command(
     )
     from fieldsid.cli.headlines.trial import of_report
 
-    notes = [Note("not_in_report", line, {}) for line in told.skipped]
-    page = Page("", closing=tuple(f"{v.what}: {v.says}" for v in told.verdicts[1:]))
-    return emit(told, render=page, headline=of_report(told, state.folder), notes=notes)
+    notes = [Note("not_in_report", line, {}) for line in result.skipped]
+    page = Page("", closing=tuple(f"{v.what}: {v.says}" for v in result.verdicts[1:]))
+    return emit(result, render=page, headline=of_report(result, state.folder), notes=notes)
 
 
 def _state(given: Sequence[Path]) -> FolderState:
+    """Return the state of the given folder, or of the folder above the given files; raises UsageError for anything else."""
     from fieldsid.errors import UsageError
     from fieldsid.trial_folder.state import state_of
 

@@ -13,7 +13,7 @@ from fieldsid.cli.console import emit, print_file, say
 from fieldsid.cli.headlines.gains import caveat, of_design, of_export, of_patch, of_verification
 from fieldsid.cli.options import LIMITS, Force, ModelFiles, OutputFile, OwnLaw, VehicleFile, argument, flag, option
 from fieldsid.cli.progress import refuse_existing, refuse_figure
-from fieldsid.cli.session import drawn_at
+from fieldsid.cli.session import draw_figure
 from fieldsid.cli.voice import angles
 from fieldsid.figures.kinds import sketch
 from fieldsid.page import Page, written
@@ -31,7 +31,7 @@ command = typer.Typer(
     "Example: sysid schedule design models/*.yaml -o gains.yaml"
 )
 
-ANSWERED = "The answer asked"
+RESPONSE = "The answer asked"
 ScheduleFile = Annotated[Path, argument("SCHEDULE", "A schedule written by `sysid schedule design`.")]
 TARGETS = ", ".join(m.name for m in iter_modules([str(Path(__file__).parents[2] / "exports")]) if not m.name.startswith("_"))
 
@@ -44,19 +44,19 @@ def design(
     ] = None,
     settling: Annotated[
         str | None,
-        option("--settling", "TIME", "Settle within this, `4s`, or `quickest`; if not given as the slowest speed can.", ANSWERED),
+        option("--settling", "TIME", "Settle within this, `4s`, or `quickest`; if not given as the slowest speed can.", RESPONSE),
     ] = None,
-    bandwidth: Annotated[str | None, option("--bandwidth", "RATE", "Bandwidth in place of a time, `1rad/s`.", ANSWERED)] = None,
-    overshoot: Annotated[str | None, option("--overshoot", "SHARE", "The most overshoot, `10%`.", ANSWERED)] = None,
+    bandwidth: Annotated[str | None, option("--bandwidth", "RATE", "Bandwidth in place of a time, `1rad/s`.", RESPONSE)] = None,
+    overshoot: Annotated[str | None, option("--overshoot", "SHARE", "The most overshoot, `10%`.", RESPONSE)] = None,
     step: Annotated[
         str | None,
-        option("--step", "ANGLE", "The error that may ask for the whole fin: 20 deg of yaw, 10 of pitch if not given.", ANSWERED),
+        option("--step", "ANGLE", "The error that may ask for the whole fin: 20 deg of yaw, 10 of pitch if not given.", RESPONSE),
     ] = None,
-    fin_use: Annotated[str | None, option("--fin-use", "SHARE", "Of the fin that step may ask for, `80%`.", ANSWERED)] = None,
+    fin_use: Annotated[str | None, option("--fin-use", "SHARE", "Of the fin that step may ask for, `80%`.", RESPONSE)] = None,
     damping: Annotated[
-        float | None, option("--damping", "", "Damping ratio of the loop: that of the overshoot, else 0.7071.", ANSWERED)
+        float | None, option("--damping", "", "Damping ratio of the loop: that of the overshoot, else 0.7071.", RESPONSE)
     ] = None,
-    phase_margin: Annotated[str, option("--phase-margin", "ANGLE", "Phase margin to keep, `45deg`.", ANSWERED)] = "45deg",
+    phase_margin: Annotated[str, option("--phase-margin", "ANGLE", "Phase margin to keep, `45deg`.", RESPONSE)] = "45deg",
     speeds: Annotated[
         str | None, option("--speeds", "LIST", "Speeds of the rows, m/s; those of the models if not given.")
     ] = None,
@@ -99,7 +99,7 @@ def design(
     from fieldsid.angles import FASTEST_FIN, FIN, FIN_RATE, HEADING, TILT, parse_angle, parse_margin
     from fieldsid.cli.inputs import models_among
     from fieldsid.cli.user_effects import read_source
-    from fieldsid.face.arguments import fin_limit_of, fins_of, runs_behind, vehicle_of
+    from fieldsid.face.arguments import fin_limit_of, fins_of, runs_of_models, vehicle_of
     from fieldsid.face.quantities import BANDWIDTH, parse_quantity, parse_share
     from fieldsid.face.speeds import speeds_of
     from fieldsid.results.gains import Design
@@ -132,18 +132,18 @@ def design(
         ),
         limits=FinLimits(_time(fin_lag, "--fin-lag"), _time(delay, "--delay"), fastest, _time(latency, "--latency")),
         depth=depth,
-        runs=runs_behind(source, say),
+        runs=runs_of_models(source, say),
         length=known.length_m,
         fins=fins_of(known, source.axis),
     )
     inputs = [p for p in source.paths if p.is_file()]
     written_to = None if output is None else str(save_schedule(schedule, output, inputs=inputs, force=force))
-    told = Design(schedule, written_to)
-    headline = of_design(told, models, caveat(source.models, models))
+    result = Design(schedule, written_to)
+    headline = of_design(result, models, caveat(source.models, models))
     page = Page(
         "", blocks=tuple(design_blocks(schedule, angles(), ignored_effects(source))), closing=written(schedule=written_to)
     )
-    return emit(told, render=page, headline=headline, notes=schedule.notes)
+    return emit(result, render=page, headline=headline, notes=schedule.notes)
 
 
 @command.command("verify", short_help="Margins and steps over the identified set.")
@@ -176,7 +176,7 @@ def verify(
     """
     from fieldsid.angles import parse_margin
     from fieldsid.cli.user_effects import read_source
-    from fieldsid.face.arguments import designed_from, runs_behind
+    from fieldsid.face.arguments import designed_from, runs_of_models
     from fieldsid.face.quantities import DECIBEL, parse_quantity, parse_share, parse_time
     from fieldsid.results.gains import Verified
     from fieldsid.schedule.record import load_schedule
@@ -187,14 +187,14 @@ def verify(
     least = None if require_phase_margin is None else parse_margin(require_phase_margin, "--require-phase-margin")
     known = load_schedule(schedule)
     source = read_source(models or designed_from(known, str(schedule)))
-    checked = verify_schedule(known, source, runs=runs_behind(source, say))
+    checked = verify_schedule(known, source, runs=runs_of_models(source, say))
     gain = None if require_gain_margin is None else parse_quantity(require_gain_margin, "--require-gain-margin", DECIBEL, "6dB")
     delay = None if require_delay_margin is None else parse_time(require_delay_margin, "--require-delay-margin", "0.3s")
     most = None if max_overshoot is None else 100.0 * parse_share(max_overshoot, "--max-overshoot")
     wanted = (least, gain, delay, most)
     gates = gates_of(checked, dict(zip(checked.worst, wanted, strict=True)))
     verdict, says = verdict_of(checked, known, gates)
-    told = Verified(
+    result = Verified(
         verdict=verdict,
         says=says,
         rests_on=rests_on(checked, known, source),
@@ -206,15 +206,15 @@ def verify(
         scheduled=checked.scheduled,
         constant=checked.constant,
         gates=gates,
-        figure=drawn_at(output, sketch("schedule", known, checked), force=force),
+        figure=draw_figure(output, sketch("schedule", known, checked), force=force),
     )
-    headline = of_verification(told, schedule, models or source.paths)
-    gates_said = (f"passed: {g.name} {g.found:.3g}, wanted {g.wanted:.3g}" for g in gates if g.passed and not told.passed)
-    page = Page("", blocks=(*verify_blocks(checked), *gates_said), closing=written(figure=told.figure))
-    result = emit(told, render=page, headline=headline)
-    if not told.passed:
+    headline = of_verification(result, schedule, models or source.paths)
+    gates_said = (f"passed: {g.name} {g.found:.3g}, wanted {g.wanted:.3g}" for g in gates if g.passed and not result.passed)
+    page = Page("", blocks=(*verify_blocks(checked), *gates_said), closing=written(figure=result.figure))
+    body = emit(result, render=page, headline=headline)
+    if not result.passed:
         raise typer.Exit(1)
-    return result
+    return body
 
 
 @command.command("export", short_help="Write the gains for the vehicle's software.")
@@ -250,13 +250,13 @@ def export(
         return _export_into(known, schedule, into, key, write=write)
     target = pick_target(to)
     text = target.render(known, node or target.node, template)
-    told = Exported(target.name, text, *(() if output is None else _written(output, text, force=force)))
-    headline, is_file = of_export(told, schedule), told.file is None
-    return emit(told, render=lambda out: _render_export(out, told), headline=headline, is_file=is_file)
+    result = Exported(target.name, text, *(() if output is None else _write_export(output, text, force=force)))
+    headline, is_file = of_export(result, schedule), result.file is None
+    return emit(result, render=lambda out: _render_export(out, result), headline=headline, is_file=is_file)
 
 
-def _written(output: Path, text: str, *, force: bool) -> tuple[str, str, str | None]:
-    """Write an export and return its file; of one that it replaces the difference is shown and a backup kept."""
+def _write_export(output: Path, text: str, *, force: bool) -> tuple[str, str, str | None]:
+    """Write an export and return its file; where it replaces one, the difference and the file of the backup too."""
     from fieldsid.artifacts import write_text
     from fieldsid.exports._patch import patch_text, write_patch
 
@@ -274,9 +274,9 @@ def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write
 
     patch = patch_yaml(into, key, columns_of(known))
     backup = str(write_patch(patch)) if write else None
-    told = Patched(patch.difference, str(into), backup)
-    headline = of_patch(told, schedule, key)
-    return emit(told, render=lambda out: print_file(out, patch.difference), headline=headline, is_file=not write)
+    result = Patched(patch.difference, str(into), backup)
+    headline = of_patch(result, schedule, key)
+    return emit(result, render=lambda out: print_file(out, patch.difference), headline=headline, is_file=not write)
 
 
 def _time(text: str | None, option: str, example: str = "0.1s") -> float | None:
@@ -285,8 +285,8 @@ def _time(text: str | None, option: str, example: str = "0.1s") -> float | None:
     return None if text is None else parse_time(text, option, example)
 
 
-def _render_export(to: Console, told: Exported) -> None:
-    """Print the file written, or the text where there is none."""
-    print_file(to, told.difference if told.file else told.text)
-    if told.file:
-        to.print(f"exported: {told.file}" + (f"; as it was: {told.backup}" if told.backup else ""), soft_wrap=True)
+def _render_export(to: Console, result: Exported) -> None:
+    """Print the text of an export; where it was written to a file, how that file has changed, and its name."""
+    print_file(to, result.difference if result.file else result.text)
+    if result.file:
+        to.print(f"exported: {result.file}" + (f"; as it was: {result.backup}" if result.backup else ""), soft_wrap=True)

@@ -51,9 +51,9 @@ def command(
         )
     known = read_model(model)
     if run is None:
-        made = _flown(known, maneuver or "", speed, fin_max, rate)
+        made = _fly_maneuver(known, maneuver or "", speed, fin_max, rate)
     else:
-        made = _replayed(known, read_run(run, mapping=mapping, models=[model]), speed)
+        made = _replay_run(known, read_run(run, mapping=mapping, models=[model]), speed)
     if noise is not None:
         from fieldsid.planning.flight.dry_run import with_noise
 
@@ -68,7 +68,7 @@ def command(
         made = replace(made, name=Path(output.name.removesuffix(".gz")).stem, notes=(*made.notes, note))
         save_run(made, output, force=force)
     signals = {n: SignalRange(float(v.min()), float(v.max()), float(v[-1])) for n, v in made.signals.items()}
-    told = Simulation(
+    result = Simulation(
         model=str(model),
         run=made.name,
         file=None if output is None else str(output),
@@ -76,11 +76,11 @@ def command(
         seconds=float(made.time[-1] - made.time[0]),
         signals=signals,
     )
-    headline = of_simulation(told, known.axis.value, maneuver, run)
-    return emit(told, render=_page(told), headline=headline)
+    headline = of_simulation(result, known.axis.value, maneuver, run)
+    return emit(result, render=_page(result), headline=headline)
 
 
-def _flown(model: Model, spec: str, speed: float | None, fin_max: str, rate: float) -> Run:
+def _fly_maneuver(model: Model, spec: str, speed: float | None, fin_max: str, rate: float) -> Run:
     from fieldsid.angles import FIN, TILT, parse_angle
     from fieldsid.maneuvers import Limits, Schedule, parse_spec
     from fieldsid.planning.flight.dry_run import dry_run
@@ -94,7 +94,8 @@ def _flown(model: Model, spec: str, speed: float | None, fin_max: str, rate: flo
     )
 
 
-def _replayed(model: Model, run: Run, speed: float | None) -> Run:
+def _replay_run(model: Model, run: Run, speed: float | None) -> Run:
+    """Return the model's motion under the fin of a run, at a constant speed in m/s where one is given."""
     from dataclasses import replace
 
     from fieldsid.dynamics.free_run import simulate
@@ -106,12 +107,12 @@ def _replayed(model: Model, run: Run, speed: float | None) -> Run:
     return replayed(model, record, simulate(model, record))
 
 
-def _page(told: Simulation) -> Page:
+def _page(result: Simulation) -> Page:
     from fieldsid.logs.run import COLUMNS
 
     rows = tuple(
-        (name, *(number(factor * end) for end in (v.low, v.high, v.end)), unit)
-        for name, v in told.signals.items()
+        (name, *(number(factor * value) for value in (v.low, v.high, v.end)), unit)
+        for name, v in result.signals.items()
         for factor, unit in [angles().of(COLUMNS[name])]
     )
-    return Page("", blocks=(Block("", rows, ("signal", "low", "high", "end", "unit")),), closing=written(run=told.file))
+    return Page("", blocks=(Block("", rows, ("signal", "low", "high", "end", "unit")),), closing=written(run=result.file))

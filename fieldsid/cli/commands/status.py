@@ -20,14 +20,15 @@ NAMES = {
     "vehicle": "vehicle", "mapping": "mapping", "plan": "plan", "log": "log", "run": "run", "model": "model",
     "diagnosis": "diagnosis", "fit": "laws", "turn-radius": "turning radius", "schedule": "gains", "simulated": "simulated run",
 }  # fmt: skip
-"""Kinds of files in the order they are listed in, and what one is called."""
+"""Kinds of files, in the order of the list, and the name of each."""
 MANY_IN_ONE, SEVERAL = ("laws", "gains"), {"diagnosis": "diagnoses", "turning radius": "turning radii"}
-"""Files that hold several of what they are named after, and words whose plural is their own."""
+"""Names that are plurals already, and irregular plurals."""
 MOST_SOURCES = 2
-"""Files that one was made from, up to which each is named; of more the first is."""
+"""Number of source files up to which each is named; of more only the first is."""
 WIDEST_NAME = 40
-"""Characters up to which a file's name stays in one piece, whatever stands beside it."""
+"""Number of characters up to which a file's name stays on one line, however wide the other columns are."""
 LAST = 3
+"""Number of journal lines that are listed."""
 
 
 def command(
@@ -56,7 +57,7 @@ def command(
     why, line = next_step(state)
     if line and folder.resolve() != Path.cwd():
         line = f"cd {shlex.quote(str(folder))} && {line}"
-    told = Status(
+    result = Status(
         folder=str(folder),
         verdict=_verdict(state),
         files=state.items,
@@ -66,33 +67,36 @@ def command(
         warnings=tuple(notes),
         next=NextStep(why, line),
     )
-    return emit(told, render=_page(state), headline=of_status(told), notes=notes)
+    return emit(result, render=_page(state), headline=of_status(result), notes=notes)
 
 
 def _verdict(state: FolderState) -> str:
     counts = Counter(i.kind for i in state.items)
-    held = ", ".join(_many(counts[k], NAMES[k]) for k in NAMES if counts[k] and k not in ("vehicle", "mapping")) or "nothing yet"
+    contents = (
+        ", ".join(_count_in_words(counts[k], NAMES[k]) for k in NAMES if counts[k] and k not in ("vehicle", "mapping"))
+        or "nothing yet"
+    )
     stale = sum(bool(i.stale) for i in state.items)
     name = state.folder.resolve().name
-    return f"{name}: {held}; " + (f"{stale} stale" if stale else "nothing is stale")
+    return f"{name}: {contents}; " + (f"{stale} stale" if stale else "nothing is stale")
 
 
-def _many(count: int, name: str) -> str:
+def _count_in_words(count: int, name: str) -> str:
     if name in MANY_IN_ONE:
         return name if count == 1 else f"{count} files of {name}"
     return f"1 {name}" if count == 1 else f"{count} {SEVERAL.get(name, name + 's')}"
 
 
 def _page(state: FolderState) -> Page:
-    used = {s.path for i in state.of_kind("run") for s in i.sources}  # a log that has become a run says no more
+    used = {s.path for i in state.of_kind("run") for s in i.sources}  # a log that was imported is not listed
     listed = [i for i in state.items if i.kind in NAMES and not (i.kind == "log" and state.place(i).resolve() in used)]
     shown = sorted(listed, key=lambda i: (list(NAMES).index(i.kind), i.path))
-    told = []
+    journal_lines = []
     for e in [e for e in state.entries if e.verdict][-LAST:]:
         done = "" if e.exit in DONE else "failed: "
-        told.append(f"{e.when}  sysid {e.name}: {done}{e.verdict}")
+        journal_lines.append(f"{e.when}  sysid {e.name}: {done}{e.verdict}")
     files = Block("", tuple(map(_row, shown)), ("file", "what", "made from", ""), left=4, kept=WIDEST_NAME)
-    return Page("", blocks=(files, *paragraph(told, Whole)))
+    return Page("", blocks=(files, *paragraph(journal_lines, Whole)))
 
 
 def _row(item: Item) -> tuple[str, ...]:
@@ -100,5 +104,5 @@ def _row(item: Item) -> tuple[str, ...]:
     said = ", ".join(names) if len(names) <= MOST_SOURCES else f"{names[0]} and {len(names) - 1} more"
     what = NAMES[item.kind]
     effects = len(item.effects) if item.kind == "model" else 0
-    told = f"{what}, {counted(effects, 'effect')}" if effects else what
-    return item.path, told, said.replace("+", " +"), item.standing  # a line ends between effects
+    kind = f"{what}, {counted(effects, 'effect')}" if effects else what
+    return item.path, kind, said.replace("+", " +"), item.standing  # a blank lets a line end between effects

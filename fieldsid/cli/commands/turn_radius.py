@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from fieldsid.cli.console import emit, say
 from fieldsid.cli.options import Figures, Force, MappingFile, ModelFiles, OutputDir, OwnLaw, VehicleFile, option
 from fieldsid.cli.progress import refuse_closed
-from fieldsid.cli.session import drawn_in
+from fieldsid.cli.session import draw_figures
 from fieldsid.cli.skipped_logs import Skips
 from fieldsid.cli.voice import angles
 from fieldsid.display import page_of
@@ -77,23 +77,23 @@ def command(
         source,
         speeds_of(speeds) or source.knots,
         fin_limit_of(known, source, say, "rudder") if given is None else given,
-        runs=_runs(runs, source, mapping, skips),
+        runs=_runs_to_fit(runs, source, mapping, skips),
         measured=read_runs(measured, mapping=mapping, models=source.paths, refused=skips.skip) if measured else (),
         method=method,
         fin_zero=_fin_zero(fin_zero),
         unfit=skips.skip,
         length=known.length_m,
     )
-    found = TurnRadius(prediction=prediction, skipped_runs=tuple(skips.records))
+    result = TurnRadius(prediction=prediction, skipped_runs=tuple(skips.records))
     if output is not None:
-        _save(found, output, source, force=force)
+        _save(result, output, source, force=force)
         plots = {"turn_radius": sketch("turn", prediction)}
         plots |= {f"circle_{m.turn.run}": sketch("turn", m.turn, draw="track_figure") for m in prediction.measured}
-        found = replace(found, figures=tuple(drawn_in(output if figures else None, plots, force=force)))
+        result = replace(result, figures=tuple(draw_figures(output if figures else None, plots, force=force)))
     headline, notes = of_turn(prediction, models, caveat(source.models, models)), prediction.notes
-    page = Page("", blocks=page_of(prediction, angles()).blocks, closing=written(figure=found.figures))
-    result = emit(found, render=page, headline=headline, notes=notes)
-    return skips.end(result, len(runs or []) + len(measured or []) - len(skips.records))
+    page = Page("", blocks=page_of(prediction, angles()).blocks, closing=written(figure=result.figures))
+    body = emit(result, render=page, headline=headline, notes=notes)
+    return skips.end(body, len(runs or []) + len(measured or []) - len(skips.records))
 
 
 def _fin_zero(text: str) -> float:
@@ -107,8 +107,8 @@ def _fin_zero(text: str) -> float:
     return angle
 
 
-def _runs(given: Sequence[Path] | None, source: ParameterSource, mapping: Path | None, skips: Skips) -> Sequence[Run]:
-    """Return the runs the models came from: those given, else the inputs the model files name, where they can still be read."""
+def _runs_to_fit(given: Sequence[Path] | None, source: ParameterSource, mapping: Path | None, skips: Skips) -> Sequence[Run]:
+    """Return the given runs; without them those that the model files name as their inputs, where they can still be read."""
     from fieldsid.cli.inputs import mapping_of, read_runs
     from fieldsid.face.arguments import read_again, run_files
     from fieldsid.logs import Run
@@ -118,17 +118,16 @@ def _runs(given: Sequence[Path] | None, source: ParameterSource, mapping: Path |
         return read_runs(given, mapping=mapping, models=source.paths, refused=skips.skip)
     chosen = mapping_of(mapping)
     outcomes = {log.now: attempt(lambda named: read_again(named, chosen), log) for log in run_files(source, say)}
-    lost = [f"`{path}`" for path, outcome in outcomes.items() if not isinstance(outcome, Run)]
-    if lost:
-        say(
-            f"runs of the models that cannot be read again: {', '.join(lost)}: name them with `--runs`, the turn is fitted to all"
-        )
+    unreadable = [f"`{path}`" for path, outcome in outcomes.items() if not isinstance(outcome, Run)]
+    if unreadable:
+        names = ", ".join(unreadable)
+        say(f"runs of the models that cannot be read again: {names}: name them with `--runs`, the turn is fitted to all")
     return [outcome for outcome in outcomes.values() if isinstance(outcome, Run)]
 
 
-def _save(found: TurnRadius, folder: Path, source: ParameterSource, *, force: bool) -> None:
+def _save(result: TurnRadius, folder: Path, source: ParameterSource, *, force: bool) -> None:
     from fieldsid.artifacts import save_record
 
     inputs = [p for p in source.paths if p.is_file()]
-    rest = {k: v for k, v in body_of(found).items() if k not in ("schema", "figures")}
-    save_record(folder / "turn_radius.yaml", found.SCHEMA, rest, inputs=inputs, force=force)
+    rest = {k: v for k, v in body_of(result).items() if k not in ("schema", "figures")}
+    save_record(folder / "turn_radius.yaml", result.SCHEMA, rest, inputs=inputs, force=force)

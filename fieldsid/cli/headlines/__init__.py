@@ -1,1 +1,1 @@
-"""The first lines of every result: what it comes to, what it rests on, and what comes next, from the record of it."""
+"""The first lines of every result, made from its record: the verdict, what it rests on, and the next command."""

@@ -8,7 +8,7 @@ from typing import Annotated
 from fieldsid.records.keys import Key
 
 LONGEST = 200
-"""Characters of a line that is read at a glance; what a verdict has beyond them is told below it."""
+"""Number of characters of a line that is read at a glance; the rest of a longer verdict is printed below."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,17 +22,17 @@ class Headline:
     @property
     def lines(self) -> tuple[str, ...]:
         """The lines as they are printed."""
-        shown = (begun(self.says)[0], begun(f"rests on {self.rests_on}")[0])
+        shown = (split_line(self.says)[0], split_line(f"rests on {self.rests_on}")[0])
         return (*shown, *([f"next: {self.next}"] if self.next else []))
 
     @property
     def rest(self) -> tuple[str, ...]:
-        """What the first two lines have no room for."""
-        return tuple(rest for text in (self.says, f"rests on {self.rests_on}") if (rest := begun(text)[1]))
+        """The texts that the first two lines have no room for."""
+        return tuple(rest for text in (self.says, f"rests on {self.rests_on}") if (rest := split_line(text)[1]))
 
 
-def begun(text: str) -> tuple[str, str]:
-    """Return a text as far as a line has room, whole clauses where there are any, and the rest of it."""
+def split_line(text: str) -> tuple[str, str]:
+    """Return the part of a text that a line has room for, cut between clauses where possible, and the rest of it."""
     if len(text) <= LONGEST:
         return text, ""
     room = text[: LONGEST - len(" ...")]

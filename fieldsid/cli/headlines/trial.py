@@ -17,24 +17,24 @@ if TYPE_CHECKING:
     from fieldsid.results.trial import Batch, Demo, Init, Report, Status
 
 
-def of_trial(told: Init) -> Headline:
+def of_trial(result: Init) -> Headline:
     """Return the folder that was made."""
     return Headline(
-        f"{told.folder}: a trial folder; fill in its vehicle.yaml and put the logs in {told.folder}/logs",
-        f"the template {told.template}: its limits are not your vehicle's",
-        f"cd {shlex.quote(told.folder)} && {pasted('status')}",
+        f"{result.folder}: a trial folder; fill in its vehicle.yaml and put the logs in {result.folder}/logs",
+        f"the template {result.template}: its limits are not your vehicle's",
+        f"cd {shlex.quote(result.folder)} && {pasted('status')}",
     )
 
 
-def of_plan(told: Planned, model: Path | None) -> Headline:
-    """Return what is to be flown and what it buys."""
+def of_plan(result: Planned, model: Path | None) -> Headline:
+    """Return the legs to fly, their time, and the standard errors that they are expected to give."""
     from fieldsid.planning.design.leg import error_in_words
     from fieldsid.planning.safety.envelope import NOT_LIMITED
 
-    plan, legs = told.plan, told.plan.legs
+    plan, legs = result.plan, result.plan.legs
     shown = [{n: e for n, e in leg.expected.items() if isfinite(e.relative) and e.relative} for leg in legs]
-    at_most = [max((e.relative for e in known.values()), default=0.0) for known in shown]
-    hardest = at_most.index(max(at_most))
+    worst = [max((e.relative for e in known.values()), default=0.0) for known in shown]
+    hardest = worst.index(max(worst))
     bought = ", ".join(f"{n} to {error_in_words(e.value, e.std_error, e.relative)}" for n, e in shown[hardest].items())
     speeds = {leg.speed for leg in legs}
     which = f", the least sure of {len(speeds)} speeds" if len(speeds) > 1 else f", by the least sure of {len(legs)} legs"
@@ -45,52 +45,52 @@ def of_plan(told: Planned, model: Path | None) -> Headline:
     unlimited = [name for name, limit in plan.limits.items() if limit == NOT_LIMITED]
     risk = f"risk of leaving the envelope {100.0 * plan.break_probability:.1f} %"
     rests = f"{known_by}; {risk}, {NOT_LIMITED}: {', '.join(unlimited) or 'nothing'}"
-    file = next((f for f in told.files if Path(f).name == "plan.yaml"), None)
+    file = next((f for f in result.files if Path(f).name == "plan.yaml"), None)
     if file is None:
         return Headline(says, rests, typed_with("-o", "plan"))
     return Headline(says, rests, pasted("live", "--axis", plan.axis.value, "--udp", str(PORT), "--plan", file))
 
 
-def of_status(told: Status) -> Headline:
-    """Return what a folder holds and what to do next."""
-    lines = counted(len(told.journal), "line")
-    rests = f"{counted(len(told.files), 'file')}, {lines} of the journal; {told.next.why}"
-    return Headline(told.verdict, rests, told.next.command)
+def of_status(result: Status) -> Headline:
+    """Return what a folder contains and what to do next."""
+    lines = counted(len(result.journal), "line")
+    rests = f"{counted(len(result.files), 'file')}, {lines} of the journal; {result.next.why}"
+    return Headline(result.verdict, rests, result.next.command)
 
 
-def of_report(told: Report, folder: Path) -> Headline:
-    """Return what the report says first, and how it is opened."""
-    first = next((f"{v.what}: {v.says}" for v in told.verdicts), "nothing was identified yet")
+def of_report(result: Report, folder: Path) -> Headline:
+    """Return the first verdict of the report; the next command opens it."""
+    first = next((f"{v.what}: {v.says}" for v in result.verdicts), "nothing was identified yet")
     rests = (
-        f"{counted(len(told.runs), 'run')} and {counted(len(told.models), 'model')} in {folder.resolve().name}: "
-        f"{told.file}, {told.bytes / 1e6:.2f} MB, {counted(told.figures, 'figure')}"
+        f"{counted(len(result.runs), 'run')} and {counted(len(result.models), 'model')} in {folder.resolve().name}: "
+        f"{result.file}, {result.bytes / 1e6:.2f} MB, {counted(result.figures, 'figure')}"
     )
-    return Headline(first, rests, f"python -m webbrowser {shlex.quote(told.file)}")
+    return Headline(first, rests, f"python -m webbrowser {shlex.quote(result.file)}")
 
 
-def of_batch(told: Batch, *, trend: bool) -> Headline:
+def of_batch(result: Batch, *, trend: bool) -> Headline:
     """Return how many runs were identified and what was found in them."""
-    bad = told.skipped_runs
-    verdicts = ", ".join(f"{count} {name}" for name, count in told.verdicts.items())
-    effects = ", ".join(f"{name} {count}" for name, count in list(told.effects.items())[:4])
+    bad = result.skipped_runs
+    verdicts = ", ".join(f"{count} {name}" for name, count in result.verdicts.items())
+    effects = ", ".join(f"{name} {count}" for name, count in list(result.effects.items())[:4])
     found = (verdicts or "not diagnosed") + (f" ({effects})" if effects else "")
-    known = f", {told.known_logs} of them known" if told.known_logs else ""
+    known = f", {result.known_logs} of them known" if result.known_logs else ""
     return Headline(
-        f"{counted(told.runs, 'run')} identified, {len(bad)} not; {found}",
-        f"{counted(told.logs, 'log')}{known}, took {told.seconds:.1f} s on {told.where}",
-        typed_with("--trend") if told.runs and not trend else pasted("inspect", bad[0].file) if bad else "",
+        f"{counted(result.runs, 'run')} identified, {len(bad)} not; {found}",
+        f"{counted(result.logs, 'log')}{known}, took {result.seconds:.1f} s on {result.where}",
+        typed_with("--trend") if result.runs and not trend else pasted("inspect", bad[0].file) if bad else "",
     )
 
 
-def of_demo(told: Demo) -> Headline:
-    """Return whether the hidden effect was found."""
+def of_demo(result: Demo) -> Headline:
+    """Return the hidden effect and the effects that the diagnosis named."""
     from fieldsid.models.axis import NAMES
 
-    hidden, base = told.hidden, NAMES[told.hidden.axis].base
+    hidden, base = result.hidden, NAMES[result.hidden.axis].base
     values = ", ".join(f"{n} = {v:.3g}" for n, v in hidden.values.items() if n not in base)
-    figures = sum(f.endswith(".png") for f in told.files)
+    files, figures = counted(len(result.files), "file"), sum(f.endswith(".png") for f in result.files)
     return Headline(
-        f"hidden in the trial was {hidden.effect} ({values}); diagnose named {', '.join(told.named) or 'nothing'}",
-        f"{counted(len(told.files), 'file')} in {told.folder}, {figures} of them figures; the tour took {told.seconds:.1f} s",
-        pasted("status", told.folder),
+        f"hidden in the trial was {hidden.effect} ({values}); diagnose named {', '.join(result.named) or 'nothing'}",
+        f"{files} in {result.folder}, {figures} of them figures; the tour took {result.seconds:.1f} s",
+        pasted("status", result.folder),
     )

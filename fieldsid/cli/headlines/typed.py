@@ -11,7 +11,7 @@ from pathlib import Path
 
 from fieldsid.cli.inputs import mapping_behind
 from fieldsid.cli.trial.parsed import parse
-from fieldsid.cli.trial.spared import without_the_filled
+from fieldsid.cli.trial.spared import shortened_in_trial
 from fieldsid.trial_folder.patterns import FEW, pattern_of
 
 _WORDS: ContextVar[tuple[str, ...]] = ContextVar("words", default=())
@@ -39,7 +39,7 @@ def pasted(*words: str | Path | Sequence[str | Path]) -> str:
     flat = [_near(w) for word in words for w in ([word] if isinstance(word, (str, Path)) else word)]
     reading = _reading(flat)
     words, flat = (*words, *reading), [*flat, *reading]
-    if (short := without_the_filled(flat)) != flat:
+    if (short := shortened_in_trial(flat)) != flat:
         return shlex.join(["sysid", *short])
     for word in words:
         parts += [shlex.quote(_near(word))] if isinstance(word, (str, Path)) else pattern_of([Path(_near(p)) for p in word])

@@ -1,4 +1,4 @@
-"""Words that several headlines share: counts, the error over the noise, lists cut short, the step after a model."""
+"""Words that several headlines share: shortened lists of names, and the command that uses a finished model."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from fieldsid.cli.headlines.typed import pasted
 
-USE = {"yaw": ("turn-radius",), "pitch": ("schedule", "design")}
-"""What a model is for once it leaves no more than the noise."""
+USES = {"yaw": ("turn-radius",), "pitch": ("schedule", "design")}
+"""The command that uses a model of each axis once its error is no more than the noise."""
 MOST_NAMED = 3
 
 
@@ -17,6 +17,6 @@ def named(names: Sequence[str]) -> str:
     return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
-def used(axis: str, model: str) -> str:
-    """Return the command that a model is for once it leaves no more than the noise."""
-    return pasted(*USE[axis], model, *(("-o", "gains.yaml") if axis == "pitch" else ()))
+def next_use(axis: str, model: str) -> str:
+    """Return the command that uses a model, once its error is no more than the noise: a turning radius in yaw, gains in pitch."""
+    return pasted(*USES[axis], model, *(("-o", "gains.yaml") if axis == "pitch" else ()))

@@ -1,1 +1,1 @@
-"""The page of help and the manual on a terminal."""
+"""The pages of help, shell completion, and the pages of the guide on a terminal."""

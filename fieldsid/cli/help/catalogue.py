@@ -1,4 +1,4 @@
-"""Which commands there are: read from the first line of each file in `commands/`, so that help needs no heavy import."""
+"""The list of commands, read from the first line of each file in `commands/`, so that help imports none of them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _OPENING = '"""sysid '
 
 
 class Entry(NamedTuple):
-    """One command: its name, its module, and its line on the page of help."""
+    """A command: its name, its module, and its line on the page of help."""
 
     name: str
     module: str

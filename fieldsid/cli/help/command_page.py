@@ -14,10 +14,10 @@ OTHERS = "Options"
 
 
 class CommandPage(TyperCommand):
-    """A command whose page has a list for each group of its options, in the order of GROUPS, its own before them."""
+    """A command whose page lists its options by group: first the groups that only it has, then those of GROUPS in order."""
 
     def format_help_text(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - the parser's own signature
-        """Write the text, each paragraph filled but for an example, which is one line however long."""
+        """Write the text: paragraphs are filled, and each example is one line however long."""
         for paragraph in (self.help or "").split("\n\n"):
             words = " ".join(paragraph.split())
             formatter.write_paragraph()
@@ -32,8 +32,8 @@ class CommandPage(TyperCommand):
         groups: dict[str, list[tuple[str, str]]] = {}
         for param in self.get_params(ctx):
             if (record := param.get_help_record(ctx)) is not None:
-                own = "Arguments" if param.param_type_name == "argument" else ANSWER if param.name == "help" else OTHERS
-                groups.setdefault(getattr(param, "rich_help_panel", None) or own, []).append(record)
+                default_group = "Arguments" if param.param_type_name == "argument" else ANSWER if param.name == "help" else OTHERS
+                groups.setdefault(getattr(param, "rich_help_panel", None) or default_group, []).append(record)
         has_own_v = ctx.info_name in HAS_OWN_V
         first, *others = ((n, says) for n, says in SAYS.items() if not (has_own_v and n == VERBOSE))
         groups[ANSWER] = [first, *groups[ANSWER], *others]

@@ -1,6 +1,6 @@
 """`sysid --install-completion`: commands and options by the tabulator key, for bash, zsh and fish.
 
-The script lists what there is when it is installed, so that a completion does not wait for Python.
+The script contains the list of commands and options, so that a completion does not wait for Python.
 """
 
 from __future__ import annotations
@@ -57,11 +57,15 @@ def options() -> dict[str, tuple[str, ...]]:
     found = {}
     for name in entries():
         command: Any = typer.main.get_command(program_of([name])[0])
-        under = command.commands[name].commands if hasattr(command, "commands") else {}
+        subcommands = command.commands[name].commands if hasattr(command, "commands") else {}
         known = {
-            o for c in under.values() or [command] for p in c.params for o in (*p.opts, *p.secondary_opts) if o.startswith("-")
+            o
+            for c in subcommands.values() or [command]
+            for p in c.params
+            for o in (*p.opts, *p.secondary_opts)
+            if o.startswith("-")
         }
-        found[name] = (*under, *sorted({*known, JSON}), "--help")
+        found[name] = (*subcommands, *sorted({*known, JSON}), "--help")
     return found
 
 

@@ -1,4 +1,4 @@
-"""The front page: `sysid --help`, the commands in the order of the day."""
+"""The front page, `sysid --help`: the commands in the order of an engineer's day."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def front_page(known: dict[str, Entry]) -> str:
 
 
 def command_list(known: dict[str, Entry]) -> str:
-    """Return the commands in the order of the day, each with its line."""
+    """Return the list of commands in the order of an engineer's day, each with its summary."""
     placed = {name for _, names in COMMAND_ORDER for name in names}
     groups = [*COMMAND_ORDER, ("Also", tuple(n for n in known if n not in placed))]
     width = max((len(n) for n in known), default=0)

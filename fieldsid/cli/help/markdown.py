@@ -1,4 +1,4 @@
-"""A page of the guide on a terminal: links become topics, figures the files that hold them, code keeps its columns."""
+"""A page of the guide on a terminal: links become topics, figures become file names, code keeps its columns."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def rendered(page: Page) -> Markdown:
 
 
 class _Code(CodeBlock):
-    """A block of code in its own columns, only lines that are too long broken: what a command prints in 80 fits 80."""
+    """A block of code without an indent, only its long lines broken: what a command prints in 80 columns fits 80."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         yield Text(str(self.text).rstrip(), style="cyan", overflow="fold")
@@ -40,7 +40,7 @@ class _Heading(Heading):
 
 
 class _Paragraph(Paragraph):
-    """A paragraph; the file of a figure stays in one piece however long its path is, so that it can be copied."""
+    """A paragraph; the path of a figure is never broken, so that it can be copied."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         if self.text.plain.startswith(_FIGURE):
@@ -64,12 +64,12 @@ def _without_links(page: Page) -> str:
     """Return a page's text with each link outside a block of code replaced by what a reader at a terminal can use."""
     text, out, at = page.markdown, [], 0
     for fence in _FENCE.finditer(text):
-        out += [_LINK.sub(lambda m: _said(m, page), text[at : fence.start()]), fence.group()]
+        out += [_LINK.sub(lambda m: _link_in_words(m, page), text[at : fence.start()]), fence.group()]
         at = fence.end()
-    return "".join([*out, _LINK.sub(lambda m: _said(m, page), text[at:])])
+    return "".join([*out, _LINK.sub(lambda m: _link_in_words(m, page), text[at:])])
 
 
-def _said(link: re.Match[str], page: Page) -> str:
+def _link_in_words(link: re.Match[str], page: Page) -> str:
     """Return a link in words: a figure as its file, another page as its topic."""
     is_figure, words, target = link.group(1), link.group(2), link.group(3).partition("#")[0]
     if "://" in target:

@@ -1,1 +1,1 @@
-"""What a command that goes on shows meanwhile."""
+"""The parts of `sysid live`: its source of samples, its display, and its analysis in other processes."""

@@ -1,4 +1,4 @@
-"""Where `sysid live` has its samples from: a log that is replayed or followed, standard input, or a port."""
+"""The source of the samples of `sysid live`: a log that is replayed or followed, standard input, or a UDP port."""
 
 from __future__ import annotations
 
@@ -22,7 +22,11 @@ if TYPE_CHECKING:
 
 @dataclass
 class Feed:
-    """Where the samples come from, and what is known of them once the first has come."""
+    """The source of the samples and how it is read; `run` and `reader` are set once it is opened.
+
+    factor: replay speed, as a multiple of real time. idle_s: seconds without a sample after which the source counts as ended.
+    keeps: keep the samples of standard input or of the port, for `flown`.
+    """
 
     axis: AxisOption
     log: Path | None
@@ -37,28 +41,28 @@ class Feed:
 
     @property
     def name(self) -> str:
-        """The source in words, which a saved state is of."""
+        """The name of the source, by which a saved state is recognised as one of it."""
         return f"udp:{self.udp}" if self.log is None else str(self.log)
 
     @property
     def is_log(self) -> bool:
-        """Whether it is a file, whose samples that are known already are passed over."""
+        """Whether the source is a file: samples that a saved state has used already are passed over."""
         return self.log is not None and str(self.log) != "-"
 
     @property
     def unreadable(self) -> int:
-        """Lines that were no JSON objects with a time."""
+        """Number of lines that were no JSON objects with a time."""
         return self.reader.unreadable if self.reader else 0
 
-    def then(self, *, usable: bool) -> str:
-        """Return the command that comes next: to look at a log that cannot be used as it is."""
+    def next_command(self, *, usable: bool) -> str:
+        """Return the command that comes next for a log: `identify`, or `inspect` where it is not usable; none for a stream."""
         if not self.is_log:
             return ""
         words = ["identify", str(self.log), "--axis", self.axis.value, "-o", "models/"] if usable else ["inspect", str(self.log)]
         return shlex.join(["sysid", *words])
 
     def flown(self, since: float, until: float) -> Run | Mapping[str, Any]:
-        """Return what was flown from one time to another, in s: a run, or the columns of what was said."""
+        """Return the data flown between two times in s: a run, or the columns of the lines received."""
         from fieldsid.cli.inputs import read_run
 
         if self.reader is not None:

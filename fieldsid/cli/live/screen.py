@@ -1,4 +1,4 @@
-"""What `sysid live` shows: a table that is drawn again and again on a terminal, a line now and then where there is none."""
+"""The display of `sysid live`: a screen that is redrawn on a terminal, and a line for each look elsewhere."""
 
 from __future__ import annotations
 
@@ -29,34 +29,36 @@ BAR = 20
 
 
 def screen(body: Mapping[str, Any]) -> RenderableType:
-    """Return the whole view of one look: verdict, parameters with bands, excitation, what was met."""
+    """Return the screen of one look: the verdict, parameters with 95 % bands, events, excitation, counts of odd samples."""
     head = words(body["said"], STYLE[body["verdict"]])
-    told = [words(text) for text in told_of(body)]
-    return Group(head, words(f"rests on {rests_on(body)}", "dim"), "", Parameters(body), "", *told, _meters(body), _met(body))
+    events = [words(text) for text in event_lines(body)]
+    return Group(
+        head, words(f"rests on {rests_on(body)}", "dim"), "", Parameters(body), "", *events, _meters(body), _odd_samples(body)
+    )
 
 
-def told_of(body: Mapping[str, Any]) -> list[str]:
-    """Return what else there is to tell of a look: a jump of the authority, gains, a diagnosis, each in a line."""
+def event_lines(body: Mapping[str, Any]) -> list[str]:
+    """Return a line each for a jump of the fin's authority, for the designed gains and for the diagnosis, where there are any."""
     jump, gains, found = body["authority_jump"], body["gains"], body["diagnosed"]
-    told = []
+    lines = []
     if jump is not None:
         factor = with_error(jump["factor"], jump["std_error"])
-        told.append(
+        lines.append(
             f"the fin's authority is {factor} times what it was, since about {jump['since_s']:.0f} s: estimated anew from there"
         )
     if gains is not None:
         at = "" if gains["verdict"] == "refused" else f"gains at {gains['time_s']:.0f} s for {gains['speed_m_s']:.2f} m/s: "
-        told.append(f"{at}{gains['says']}{_of_row(gains)}")
+        lines.append(f"{at}{gains['says']}{_gains_in_words(gains)}")
     if found is not None:
         fly = found.get("next_maneuver")
         then = f"; before coming up fly {fly['maneuver']}, {fly['why']}" if fly else ""
         until = "" if found["verdict"] == "refused" else f"flown up to {found['time_s']:.0f} s: "
-        told.append(f"{until}{found['says']}{then}")
-    return told
+        lines.append(f"{until}{found['says']}{then}")
+    return lines
 
 
-def _of_row(gains: Mapping[str, Any]) -> str:
-    """Return what gains come to, and where they differ from the loaded ones what those do."""
+def _gains_in_words(gains: Mapping[str, Any]) -> str:
+    """Return the phase margin and settling time of the designed gains, and the phase margin with the loaded ones."""
     if gains["verdict"] == "refused":
         return ""
     row, loaded = gains["row"], gains["loaded_phase_margin_deg"]
@@ -67,7 +69,7 @@ def _of_row(gains: Mapping[str, Any]) -> str:
 
 
 def line(body: Mapping[str, Any]) -> str:
-    """Return one look in a line: time, verdict, values with errors."""
+    """Return one look as a line: time, verdict, share of the goal, values with standard errors."""
     known = (
         f"{name} {with_error(p['value'], p['std_error'])}" for name, p in body["parameters"].items() if p["std_error"] is not None
     )
@@ -77,7 +79,7 @@ def line(body: Mapping[str, Any]) -> str:
 
 
 def rests_on(body: Mapping[str, Any]) -> str:
-    """Say what a verdict rests on."""
+    """Return what a verdict rests on: axis, number of samples, speed and the source of the goals."""
     speed = "" if body["speed_m_s"] is None else f" at {body['speed_m_s']:.2f} m/s"
     return f"{body['axis']}, {body['samples']} samples{speed}; goals: {body['goals_from']}{_unread(body)}"
 
@@ -94,7 +96,7 @@ def headline_of(body: Mapping[str, Any]) -> Headline:
 
 @dataclass(frozen=True, slots=True)
 class Parameters:
-    """The table of the parameters; where a terminal is too narrow, without the band, which the value's error says as well."""
+    """The table of the parameters; without the 95 % band where the terminal is too narrow: the standard error implies it."""
 
     body: Mapping[str, Any]
 
@@ -123,7 +125,7 @@ def _parameters(body: Mapping[str, Any], *, with_band: bool) -> Table:
 
 
 def _error(error: float | None, value: float | None) -> str:
-    """Return a standard error in per cent of its value, as it is where that may be zero, and a dash where there is none."""
+    """Return a standard error in per cent of its value; absolute where the value may be zero; a dash where there is none."""
     if error is None:
         return "-"
     if value and error < 0.5 * abs(value):
@@ -147,13 +149,14 @@ def _meters(body: Mapping[str, Any]) -> Table:
 
 
 FULL_FIN_RAD = 10.0 * pi / 180.0
-"""Fin, root mean square, at which the meter of the excitation is full: square pulses of 10 deg."""
+"""Root mean square of the fin angle at which the meter of the excitation is full: square pulses of 10 deg."""
 
 
 def _degrees(value: float | None) -> str:
     return "-" if value is None else f"{value * 180.0 / pi:.1f}"
 
 
-def _met(body: Mapping[str, Any]) -> RenderableType:
+def _odd_samples(body: Mapping[str, Any]) -> RenderableType:
+    """Return the counts of the odd samples met so far, such as gaps and spikes."""
     found = [f"{count} {name}" for name, count in body["counts"].items() if count]
     return words("met: " + ", ".join(found) if found else "", "dim")

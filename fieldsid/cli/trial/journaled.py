@@ -1,4 +1,4 @@
-"""A command run in a trial folder: what it leaves out is taken from there, and what it did becomes a line of the journal."""
+"""A command run in a trial folder: missing arguments are taken from the folder, and a line is added to its journal."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 
 import typer
 
-from fieldsid.cli.console import said, say
+from fieldsid.cli.console import say, take_verdict
 from fieldsid.cli.exit_codes import BAD_INPUT, DONE, OUR_BUG
 from fieldsid.cli.trial.filled import filled, in_words, left_out
 from fieldsid.cli.trial.parsed import Parsed, parse
@@ -22,17 +22,17 @@ from fieldsid.records.named_inputs import is_there
 from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, Stamp, append, read
 from fieldsid.trial_folder.state import state_of
 
-NOT_KEPT = ("guide", "status", "demo", "effects list", "effects show", "init")
-"""Commands that make nothing of a trial: they leave no line. `init` writes its own, into the folder it makes."""
+UNRECORDED = ("guide", "status", "demo", "effects list", "effects show", "init")
+"""Commands without a line in the journal: they make no file of a trial. `init` writes its line itself, in the folder it makes."""
 WRITTEN = ("output", "figure", "write_mapping")
-"""Parameters that name what is written, not what is read."""
+"""Parameters that name output files."""
 LONGEST_VERDICT = 300
 
 
 def run_in_trial(arguments: Sequence[str], run: Callable[[Sequence[str]], Any]) -> Any:
     """Run a command in the working folder, which is a trial's, and add a line to its journal; raises as the command does."""
     parsed = parse(arguments)
-    if parsed is None or parsed.name in NOT_KEPT:
+    if parsed is None or parsed.name in UNRECORDED:
         return run(arguments)
     folder, state = Path(), cache(lambda: state_of(Path()))
     added = filled(parsed, state)
@@ -41,28 +41,28 @@ def run_in_trial(arguments: Sequence[str], run: Callable[[Sequence[str]], Any]) 
         more = f"; {others} more excite the other plane alone" if others else ""
         say(f"taken from the trial folder: {in_words(added)}{more}")
     words = [*arguments, *added]
-    whole = parse(words) or parsed
-    kept = _Kept(folder, words, whole)
-    said()  # of whatever ran before
+    complete = parse(words) or parsed
+    recorder = _Recorder(folder, words, complete)
+    take_verdict()  # clear that of an earlier command
     try:
         result = run(words)
-    except (typer.TyperException, typer.Abort):  # nothing was begun
+    except (typer.TyperException, typer.Abort):  # the command has not started
         raise
-    except BrokenPipeError:  # who read the output went away, as `head` does: the work is done
-        kept.write(DONE, said())
+    except BrokenPipeError:  # the reader of the output has gone away, as `head` does: the work is done
+        recorder.write(DONE, take_verdict())
         raise
     except FieldsidError as error:
-        kept.write(BAD_INPUT, error.what)
+        recorder.write(BAD_INPUT, error.what)
         raise
     except Exception as error:
-        kept.write(OUR_BUG, f"{type(error).__name__}: {error}")
+        recorder.write(OUR_BUG, f"{type(error).__name__}: {error}")
         raise
-    kept.write(result if isinstance(result, int) else DONE, said(), result)
+    recorder.write(result if isinstance(result, int) else DONE, take_verdict(), result)
     return result
 
 
-class _Kept:
-    """What the journal will hold of a command: what was there when it began."""
+class _Recorder:
+    """Makes the journal's line of a command: it stores the files and the time at the start, and compares at the end."""
 
     def __init__(self, folder: Path, words: Sequence[str], parsed: Parsed) -> None:
         self._folder, self._words = folder, tuple(words)
@@ -75,7 +75,7 @@ class _Kept:
         self._before = _snapshot(folder)
 
     def write(self, code: int, verdict: str, result: Any = None) -> None:
-        """Add the line: exit code, verdict, the files that are new or were changed meanwhile."""
+        """Add the line: exit code, verdict, and the files that were made or changed since the start."""
         after = _snapshot(self._folder)
         outputs = self._stamps(Path(p) for p, seen in after.items() if self._before.get(p) != seen)
         body: Mapping[str, Any] = result if isinstance(result, Mapping) else {}
@@ -86,7 +86,7 @@ class _Kept:
         )  # fmt: skip
         try:
             append(self._folder, entry)
-        except OSError as error:  # the command has done its work: that stands without a line
+        except OSError as error:  # the command has done its work: its result is valid without a line
             say(f"warning: `{JOURNAL}` cannot be written: {error.strerror} [journal]")
 
     def _stamps(self, paths: Any) -> tuple[Stamp, ...]:
@@ -94,7 +94,7 @@ class _Kept:
 
 
 def _snapshot(folder: Path) -> dict[str, tuple[int, int]]:
-    """Return size and time of writing of every plain file below a folder, hidden ones, links and the journal left out."""
+    """Return size and modification time (ns) of every regular file below a folder, without hidden ones, links and the journal."""
     found = {}
     for place, folders, files in os.walk(folder):
         folders[:] = [f for f in folders if not f.startswith(".")]

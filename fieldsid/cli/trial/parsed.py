@@ -1,4 +1,4 @@
-"""A command line parsed without being run: which parameters it gives, and which it leaves to the trial folder."""
+"""A command line, parsed without being run: which parameters are given, and which are left to the trial folder."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from fieldsid.cli.programs import program_of
 
 @dataclass(frozen=True, slots=True)
 class Parsed:
-    """A command's whole name, such as `schedule design`, and its parameters by name, None where not given."""
+    """The full name of a command, such as `schedule design`, and its parameters by name, None where not given."""
 
     name: str
     values: Mapping[str, Any]
 
     def paths(self, *names: str) -> list[Path]:
-        """Return the files that some parameters name, those of all parameters without names."""
+        """Return the files that the named parameters give, in the order of the names; without names, those of all parameters."""
         given = [self.values.get(n) for n in names] if names else list(self.values.values())
         flat = [v for value in given for v in (value if isinstance(value, (list, tuple)) else [value])]
         return [v for v in flat if isinstance(v, Path)]
 
 
 def parse(arguments: Sequence[str]) -> Parsed | None:
-    """Return a command line parsed; None where it asks for help, or cannot be parsed: running it says why."""
+    """Return the parsed command line; None where it asks for help or cannot be parsed: running it reports why."""
     if "--help" in arguments:
         return None
     program, words, name = program_of(arguments)

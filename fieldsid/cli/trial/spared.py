@@ -1,4 +1,4 @@
-"""A command line without what its trial folder fills it in with."""
+"""A command line shortened by the words that the trial folder adds to it."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from fieldsid.trial_folder.make import MAPPING
 from fieldsid.trial_folder.state import FolderState, state_of
 
 READ = ("--mapping", "--validate", "--measured", "--plan", "--vehicle")
-"""Options whose file a trial folder may give, as it may give that of `-o`."""
+"""Options whose file a trial folder may supply, as it may supply that of `-o`."""
 DEFAULT = ("--mapping", MAPPING)
-"""What every reading takes in a trial folder, without its being filled in."""
+"""The option that every command that reads logs uses in a trial folder, without its being added to the line."""
 
 
-def without_the_filled(words: Sequence[str]) -> list[str]:
-    """Return a command line, `sysid` left out, without the files that it takes from the working folder; elsewhere as it is.
+def shortened_in_trial(words: Sequence[str]) -> list[str]:
+    """Return a command line, without `sysid`, less the files that the trial folder would add; unchanged in any other folder.
 
-    What is left is filled in to the same words, in whatever order, but for runs that excite the other plane alone.
+    The short line is completed to the same words, in any order, except for runs that excite the other plane only.
     """
     words = list(words)
     if not is_trial(Path()):
@@ -32,32 +32,33 @@ def without_the_filled(words: Sequence[str]) -> list[str]:
         return words
     name, state = len(parsed.name.split()), cache(lambda: state_of(Path()))
     shorter = ([*words[:name], *_without_files(words[name:], options)] for options in ((*READ, "-o"), READ))
-    return next((bare for bare in shorter if bare != words and _is_filled_to(bare, words, state)), words)
+    return next((short for short in shorter if short != words and _completes_to(short, words, state)), words)
 
 
-def _is_filled_to(bare: Sequence[str], words: Sequence[str], state: Callable[[], FolderState]) -> bool:
-    parsed = parse(bare)
+def _completes_to(short: Sequence[str], words: Sequence[str], state: Callable[[], FolderState]) -> bool:
+    """Whether the trial folder completes a short command line to the given words."""
+    parsed = parse(short)
     if parsed is None:
         return False
     others = set(left_out(parsed, state()))
     needed = [w for w in words if w not in others] if others <= set(words) else words
-    return _whole(bare, state) == _whole(needed, state)
+    return _completed(short, state) == _completed(needed, state)
 
 
 def _without_files(words: Sequence[str], options: Sequence[str]) -> list[str]:
-    """Return words without files, and without options that name one; the file of another option stays with it."""
-    kept, before = list[str](), ""
+    """Return words without files and without the given options and their values; other options keep their files."""
+    remaining, before = list[str](), ""
     for word in words:
         is_value = before.startswith("-")
         is_file = not is_value and not word.startswith("-") and Path(word).exists()
         if before not in options and word not in options and not is_file:
-            kept.append(word)
+            remaining.append(word)
         before = "" if is_value else word
-    return kept
+    return remaining
 
 
-def _whole(words: Sequence[str], state: Callable[[], FolderState]) -> Counter[str]:
-    """Return the words of a command line and those that the folder fills in, each as often as it is there."""
+def _completed(words: Sequence[str], state: Callable[[], FolderState]) -> Counter[str]:
+    """Return the words of a command line and those that the folder adds, each with its count."""
     parsed = parse(words)
     added = [] if parsed is None else filled(parsed, state)
     default = Counter(DEFAULT) if set(DEFAULT) <= set(words) else Counter[str]()

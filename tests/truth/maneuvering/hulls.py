@@ -19,7 +19,7 @@ MAX_TRIES = 4000
 
 
 class Coefficients(NamedTuple):
-    """One hull, SI: masses with added mass, hull lift, cross-flow, fins and rudder, drag and propeller, fin path."""
+    """Coefficients of one hull, SI: rigid-body and added mass, hull lift, cross-flow, fins and rudder, drag, propeller, servo."""
 
     length: float
     mass_surge: float
@@ -49,7 +49,11 @@ class Coefficients(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """Ranges that a kind's hulls are drawn from: length m, length over height, width over height, rudder over Munk moment."""
+    """Ranges that the hulls of a kind are drawn from.
+
+    Length (m), length over height, width over height, moment of the rudder and of the fixed fins over the Munk moment, whether
+    straight running is stable (None: either), lowest speed (m/s).
+    """
 
     length: tuple[float, float]
     slenderness: tuple[float, float]
@@ -73,7 +77,7 @@ KINDS = {
 
 @dataclass(frozen=True, slots=True)
 class Hull:
-    """A drawn hull: its kind, coefficients, rudder limit (rad) and the five speeds (m/s) it is flown at."""
+    """A random hull: its kind, coefficients, rudder limit (rad) and the five speeds (m/s) at which it is flown."""
 
     kind: str
     of: Coefficients
@@ -82,19 +86,19 @@ class Hull:
 
     @property
     def stable(self) -> bool:
-        """Whether it keeps a straight course with the rudder at rest."""
+        """Whether the hull keeps a straight course with the rudder at rest."""
         return growth_rate(self.of) < 0.0
 
 
 def draw_hull(number: int, seed: int) -> Hull:
-    """Return hull `number` of an ensemble; its kind is that of the number, so that every kind comes as often."""
+    """Return hull `number` of an ensemble; the kinds take turns, so that each is equally frequent."""
     kind = list(KINDS)[number % len(KINDS)]
     rng = np.random.default_rng([seed, number])
     wanted = KINDS[kind].stable
     for _ in range(MAX_TRIES):
         drawn = _coefficients(KINDS[kind], rng)
         growth = growth_rate(drawn)
-        # flown by nobody: a vehicle that leaves its course within half its length, and one that needs 15 lengths to turn
+        # left out: hulls that leave their course within half a length, and hulls that need 15 lengths to turn
         gentle = growth < 0.0 and linear_radius(drawn, 0.4) > 15.0 * drawn.length
         if (wanted is None or wanted == (growth < 0.0)) and growth * drawn.length < 2.0 and not gentle:
             low = rng.uniform(*KINDS[kind].speed)
@@ -153,12 +157,12 @@ def _coefficients(kind: Kind, rng: np.random.Generator) -> Coefficients:
 
 
 def _profile(station: np.ndarray, power: float) -> np.ndarray:
-    """Return the height over the greatest, of stations over the length."""
+    """Return the height of the hull over its greatest height, at stations -1/2 .. 1/2 of the length."""
     return np.sqrt(np.maximum(1.0 - np.abs(2.0 * station) ** power, 0.0))
 
 
 def _lamb_axial(length: float, diameter: float) -> float:
-    """Return Lamb's factor of the axial added mass of a spheroid."""
+    """Return the axial added mass of a spheroid over its displaced mass (Lamb)."""
     e = np.sqrt(1.0 - min(diameter / length, 0.95) ** 2)
     alpha = 2.0 * (1.0 - e**2) / e**3 * (np.arctanh(e) - e)
     return float(alpha / (2.0 - alpha))
@@ -169,19 +173,19 @@ def _log_uniform(rng: np.random.Generator, between: tuple[float, float]) -> floa
 
 
 def growth_rate(h: Coefficients) -> float:
-    """Return the largest real part of the straight run's two lateral modes at 1 m/s, 1/s."""
+    """Return the largest real part (1/s) of the two sway-yaw eigenvalues of straight running at 1 m/s."""
     mass = np.array([[h.mass_sway, h.coupling], [h.coupling, h.inertia_yaw]])
     return float(np.max(np.linalg.eigvals(np.linalg.solve(mass, _lateral(h))).real))
 
 
 def linear_radius(h: Coefficients, rudder: float) -> float:
-    """Return the radius (m) of the settled turn that a rudder (rad) gives without stall, cross-flow drag and lost speed."""
+    """Return the radius (m) of the steady turn at a rudder angle (rad), without stall, cross-flow drag and loss of speed."""
     rate = np.linalg.solve(_lateral(h), -h.rudder * rudder * np.array([1.0, h.fin_arm]))[1]
     return float(1.0 / abs(rate))
 
 
 def _lateral(h: Coefficients) -> np.ndarray:
-    """Return the matrix (2, 2) of force and moment by sway and rate at 1 m/s."""
+    """Return the matrix (2, 2) of lateral force and yaw moment on sway velocity and yaw rate at 1 m/s."""
     fin = h.fixed_fin + h.rudder
     return np.array(
         [

@@ -1,4 +1,4 @@
-"""A hull in surge, sway and yaw: fourth-order Runge-Kutta, fine steps, compiled; who steers, and what the sensors log."""
+"""The motion of a hull in surge, sway and yaw, with its pilot: fourth-order Runge-Kutta in fine steps, compiled."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ OPEN, HOLD, ZIGZAG = 0, 1, 2
 
 @nb.njit(cache=True)
 def _fin_force(slope, stall, angle, u, side):
-    """Force of a fin across its chord at an angle of its own, flow u ahead and `side` across; it fades at the stall."""
+    """Return the normal force of a fin at an angle, in a flow u ahead and `side` across; it saturates at the stall angle."""
     attack = angle - math.atan2(side, u)
     size = abs(attack) / stall
     return slope * (u * u + side * side) * attack / (1.0 + size**4) ** 0.25
@@ -23,7 +23,7 @@ def _fin_force(slope, stall, angle, u, side):
 
 @nb.njit(cache=True)
 def slope(u, v, r, fin, thrust, gust, h, out):
-    """Accelerations (3,) in surge, sway, yaw."""
+    """Write the accelerations (3,) in surge, sway and yaw to `out`."""
     x, y, n = thrust - h.drag * u * abs(u), 0.0, gust
     x += h.centripetal_surge * v * r + h.coupling * r * r
     y -= h.centripetal_sway * u * r
@@ -62,10 +62,10 @@ def whole(s, fin, push, straight, gust, h, out):
 
 @nb.njit(cache=True)
 def fly(h, straight, command, mode, settings, sample, gust):
-    """States (n, 6) surge, sway, rate, heading, x, y, and the commands given (n,) at samples of `sample` s.
+    """Return the states (n, 6) surge, sway, rate, heading, x, y, and the fin commands (n,), at samples of `sample` s.
 
-    `mode` (n,) says whether the command holds, the course is held, or the fin goes over whenever the heading is off by
-    settings[1]; settings: zig-zag fin, zig-zag heading, limit, gains of the pilot.
+    mode (n,): the open-loop command (OPEN), a pilot who keeps the course (HOLD), or the zig-zag rule (ZIGZAG), which reverses
+    the fin when the heading reaches settings[1]. settings: zig-zag fin, zig-zag heading, limit, the pilot's two gains.
     """
     count = command.size
     states, given = np.zeros((count, 6)), np.zeros(count)
@@ -103,9 +103,9 @@ def fly(h, straight, command, mode, settings, sample, gust):
 
 
 def true_turn(hull: Hull, speed: float, side: float) -> tuple[float, float, float, float]:
-    """Return radius (m), rate (rad/s), surge and sway (m/s) of the settled circle at the rudder's limit.
+    """Return radius (m), yaw rate (rad/s), surge and sway (m/s) of the steady circle at the rudder's limit.
 
-    NaN where it does not settle within 400 lengths.
+    All are NaN where the motion does not settle within 400 lengths.
     """
     h: Coefficients = hull.of
     count = round(max(400.0 * h.length / speed, 200.0) / 0.2)

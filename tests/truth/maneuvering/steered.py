@@ -1,4 +1,4 @@
-"""A hull steered by a schedule: its law of fin, gains over the measured speed, written apart from the program's own."""
+"""A hull steered by a schedule, with a control law written independently of the package: gains interpolated over speed."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from truth.maneuvering.hulls import Hull
 from truth.maneuvering.motion import FINE_S, whole
 
 LEAD_S = 30.0
-"""The straight leg before the step."""
+"""Duration of the straight leg before the step."""
 
 
 def steered(hull: Hull, speed: float, table: np.ndarray, step: float, seconds: float, latency: float = 0.0) -> np.ndarray:
-    """Return time (s after the step), heading (rad), fin command (rad) and surge (m/s), (n, 4), of a step of the course (rad).
+    """Return time (s after the step), heading (rad), fin command (rad) and surge (m/s), (n, 4), of a course step (rad).
 
-    table (k, 7): speed, kp, ki, kd, feed-forward, reference gain, limit. The hull starts straight at `speed` under it.
+    table (k, 7): speed, kp, ki, kd, feed-forward, reference gain, fin limit. The hull starts on a straight course at `speed`.
     """
     count = round((LEAD_S + seconds) / FINE_S)
     out = np.zeros((count, 4))

@@ -1,4 +1,4 @@
-"""Training sets of a hull: pulses, with zig-zags, with one circle, u-turn or half circle; a run at each speed, with noise."""
+"""Training sets of a hull: pulses at each speed, alone or with zig-zags, a circle or a u-turn; logged with noise."""
 
 from __future__ import annotations
 
@@ -12,19 +12,18 @@ from truth.maneuvering.motion import HOLD, OPEN, ZIGZAG, fly
 SAMPLE_S = 0.1
 SETS = ("pulses", "pulses+zigzag", "pulses+circle")
 MORE_SETS = ("pulses+uturn", "pulses+half", "pulses+zigzag by rpm")
-"""One u-turn, one circle at half the rudder, both at the middle speed; zig-zags of which only the propeller's turns tell the
-speed."""
+"""One u-turn, or one circle at half rudder, at the middle speed; zig-zags whose speed is known by the propeller's turns only."""
 TURNS = ("circle", "uturn", "half")
 RPM_PER_M_S = 420.0
 GYRO, COMPASS, DVL, FIX = 0.003, 0.005, 0.02, 0.1
 """Standard deviations: rad/s, rad, m/s, m."""
 GUST_SHARE, GUST_TIME_S = 0.01, 2.0
-"""A moment of the water, as a share of the full rudder's, and its correlation time."""
+"""Standard deviation of the disturbance moment, as a share of the moment of full rudder, and its correlation time."""
 
 
 @dataclass(frozen=True, slots=True)
 class Log:
-    """What was logged, (n,) each by canonical name, and the speed it was flown at."""
+    """A log: its columns (n,) by canonical name, and the speed (m/s) at which it was flown."""
 
     name: str
     speed: float
@@ -33,7 +32,7 @@ class Log:
 
 
 def training(hull: Hull, which: str, rng: np.random.Generator, *, sway: bool) -> list[Log]:
-    """Return the logs of a training set, in the order of speed; a circle is flown at the middle speed only."""
+    """Return the logs of a training set by rising speed; a circle or u-turn is flown at the middle speed only."""
     logs = []
     for index, speed in enumerate(hull.speeds):
         logs.append(_log(hull, f"pulses{index}", speed, *_pulses(hull, speed), rng, sway=sway))
@@ -46,7 +45,7 @@ def training(hull: Hull, which: str, rng: np.random.Generator, *, sway: bool) ->
 
 
 def _by_rpm(log: Log) -> Log:
-    """Return a log with the propeller's turns; one of a zig-zag has nothing else that tells a speed."""
+    """Return a log with the propeller's turns added; that of a zig-zag loses its other signals of speed."""
     columns = log.columns | {"propeller_rpm": np.full(log.time.size, RPM_PER_M_S * log.speed)}
     if log.name.startswith("zigzag"):
         columns = {k: v for k, v in columns.items() if k not in ("surge_m_s", "sway_m_s", "x_m", "y_m")}
@@ -54,12 +53,12 @@ def _by_rpm(log: Log) -> Log:
 
 
 def _passage(hull: Hull, speed: float) -> float:
-    """Return the time the hull takes over its own length, s."""
+    """Return the time (s) in which the hull travels its own length."""
     return hull.of.length / speed
 
 
 def _pulses(hull: Hull, speed: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return command and mode of four pairs of pulses, as long as the hull needs to answer, the course held between."""
+    """Return command and mode of four pairs of pulses, of a width by the passage time, the course kept between them."""
     width = max(2.0, 0.8 * _passage(hull, speed))
     rest = 6.0 * width
     time = np.arange(0.0, 4.0 + 4.0 * (2.0 * width + rest), SAMPLE_S)
@@ -84,7 +83,7 @@ def _turn(hull: Hull, speed: float, which: str) -> tuple[np.ndarray, np.ndarray]
     if which == "uturn":
         settings = np.array([0.0, 0.0, hull.rudder_limit, 1.0, 1.2 * _passage(hull, speed)])
         heading = fly(hull.of, speed, command, mode, settings, SAMPLE_S, np.zeros(time.size))[0][:, 3]
-        mode[np.abs(heading) > np.pi - 0.3] = HOLD  # the pilot meets her
+        mode[np.abs(heading) > np.pi - 0.3] = HOLD  # the pilot ends the turn
     return command, mode
 
 

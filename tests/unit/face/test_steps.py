@@ -148,7 +148,7 @@ def test_an_extension_pays_and_its_model_goes_on(inside):
 
 
 def test_runs_to_learn_from_and_runs_to_judge_by_have_different_names(made):
-    learned, unseen = steps._both([made.run("a")], [made.run("a")], None, None)
+    learned, unseen = steps._training_and_unseen([made.run("a")], [made.run("a")], None, None)
     assert [run.name for run in (*learned, *unseen)] == ["a", "a_2"]
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from fieldsid.cli.console import emit
 from fieldsid.cli.inputs import fitted_to
 from fieldsid.cli.progress import get_ready
-from fieldsid.cli.session import drawn_in
+from fieldsid.cli.session import draw_figures
 from fieldsid.cli.voice import angles
 from fieldsid.comparison.sufficient import pooled
 from fieldsid.errors import UsageError
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 MOST_PLACES = 3
 
 
-def several_models(
+def compare_several(
     paths: Sequence[Path],
     runs: Sequence[Path],
     skips: Skips,
@@ -37,9 +37,9 @@ def several_models(
     output: Path | None,
     force: bool,
 ) -> Mapping[str, Any]:
-    """Compare several models with the same runs and print which follows them best; return the body.
+    """Compare several models of one axis with the same runs, print which follows them best, and return the JSON body.
 
-    reading is what `read_runs` takes: mapping, start and end.
+    reading: the keyword arguments of `read_runs` (mapping, start, end). Raises UsageError for models of several axes.
     """
     from fieldsid.cli.inputs import read_runs
     from fieldsid.cli.user_effects import check_effects
@@ -63,7 +63,7 @@ def several_models(
     plots = {} if loop is None else {"loop": sketch("loop", loop)}
     of_runs = zip(*found_of, strict=True)
     plots |= {f"models_on_{of_run[0].run}": sketch("several", of_run, names) for of_run in of_runs}
-    figures = tuple(drawn_in(output, plots, force=force))
+    figures = tuple(draw_figures(output, plots, force=force))
     least = min(range(len(paths)), key=lambda i: pooled(c.over_noise for c in found_of[i]))
     several = tuple(
         OneOfSeveral(
@@ -74,7 +74,7 @@ def several_models(
         )
         for p, found, fitted in zip(paths, found_of, fitted_of, strict=True)
     )
-    told = ComparedSeveral(
+    result = ComparedSeveral(
         axis=models[0].axis,
         models=several,
         best=str(paths[least]),
@@ -86,28 +86,31 @@ def several_models(
     from fieldsid.cli.inputs import files_of
     from fieldsid.records.named_inputs import inputs_of
 
-    headline = of_several(told, names, models[least], files_of(logs), inputs_of(paths[least]))
+    headline = of_several(result, names, models[least], files_of(logs), inputs_of(paths[least]))
     notes = left_out(logs, models[0].axis)
-    result = emit(told, render=_page(told, found_of, names), headline=headline, notes=notes)
-    return skips.end(result, len(found_of[0]))
+    body = emit(result, render=_page(result, found_of, names), headline=headline, notes=notes)
+    return skips.end(body, len(found_of[0]))
 
 
 def _loop(paths: Sequence[Path], found_of: Sequence[Sequence[Comparison]]) -> Loop | None:
-    """Return the loop from one of the models to another that was extended from it, over the longest line of any."""
+    """Return the additions that lead from one of the models to a descendant among them; None where none descends from another.
+
+    The model with the most ancestors is the last of the loop, its oldest ancestor among the models the first.
+    """
     from fieldsid.extension.lineage import history_of, loop_of
 
-    lines = {i: history_of(path) for i, path in enumerate(paths)}
-    last = max(lines, key=lambda i: len(lines[i]))
+    ancestries = {i: history_of(path) for i, path in enumerate(paths)}
+    last = max(ancestries, key=lambda i: len(ancestries[i]))
     places = [path.resolve() for path in paths]
-    first = next((i for i, g in enumerate(lines[last]) if g.path.resolve() in places and i < len(lines[last]) - 1), None)
+    first = next((i for i, g in enumerate(ancestries[last][:-1]) if g.path.resolve() in places), None)
     if first is None:
         return None
-    line = lines[last][first:]
+    line = ancestries[last][first:]
     return loop_of((replace(line[0], step=None), *line[1:]), found_of[places.index(line[0].path.resolve())], found_of[last])
 
 
 def _loop_blocks(loop: Loop) -> tuple[Block | str, ...]:
-    """Return where the first model fails, and the error on fitted and unseen runs after each addition."""
+    """Return the conditions where the first model fails most, and the error on fitted and unseen runs after each addition."""
     places = [f"{angles().words(p.condition)} (rms {p.rms_ratio:.2f} x)" for p in loop.where[:MOST_PLACES]]
     fails = Whole(f"{loop.before.run}: the {loop.start} fails most at {', '.join(places)}" if places else "")
     of = "" if loop.is_noiseless else ", over the noise floor"
@@ -120,9 +123,9 @@ def _names(paths: Sequence[Path]) -> list[str]:
     return [s if stems.count(s) == 1 else str(p) for s, p in zip(stems, paths, strict=True)]
 
 
-def _page(told: ComparedSeveral, found_of: Sequence[Sequence[Comparison]], names: Sequence[str]) -> Page:
+def _page(result: ComparedSeveral, found_of: Sequence[Sequence[Comparison]], names: Sequence[str]) -> Page:
     short = short_names([c.run for c in found_of[0]])
     rows = tuple((short.of(of_run[0].run), *(f"{c.over_noise:.2f}" for c in of_run)) for of_run in zip(*found_of, strict=True))
     errors = Block("error over the noise", rows, ("run", *names))
-    loop = () if told.loop is None else _loop_blocks(told.loop)
-    return Page("", blocks=(*loop, errors, Whole(short.says)), closing=written(figure=told.figures))
+    loop = () if result.loop is None else _loop_blocks(result.loop)
+    return Page("", blocks=(*loop, errors, Whole(short.says)), closing=written(figure=result.figures))

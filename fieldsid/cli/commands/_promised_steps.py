@@ -1,4 +1,4 @@
-"""`sysid compare GAINS RUN...`: the steps that were flown with a schedule against what its verification says of them."""
+"""`sysid compare GAINS RUN...`: the steps that were flown with a schedule against the bounds that its verification predicts."""
 
 from __future__ import annotations
 
@@ -18,13 +18,17 @@ if TYPE_CHECKING:
     from fieldsid.change.promise import KeptStep
 
 
-def as_promised(gains: Path, runs: Sequence[Path], reading: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Compare the steps flown in runs with what was promised of them and print it; return the body."""
+def compare_steps(gains: Path, runs: Sequence[Path], reading: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Compare each step flown in the runs with the bounds that `schedule verify` gives, print that and return the JSON body.
+
+    reading: the keyword arguments of `read_runs` (mapping, start, end). A run without a usable step is skipped, except where it
+    is the only one: then raises DataError.
+    """
     from fieldsid.change.promise import kept_steps
     from fieldsid.cli.console import say
     from fieldsid.cli.inputs import read_runs
     from fieldsid.cli.skipped_logs import Skips
-    from fieldsid.face.arguments import designed_from, runs_behind
+    from fieldsid.face.arguments import designed_from, runs_of_models
     from fieldsid.plant.parameter_source import load_parameter_source
     from fieldsid.results.comparisons import AsPromised
     from fieldsid.schedule.record import load_schedule
@@ -33,20 +37,20 @@ def as_promised(gains: Path, runs: Sequence[Path], reading: Mapping[str, Any]) -
     schedule, skips = load_schedule(gains), Skips()
     source = load_parameter_source(designed_from(schedule, str(gains)))
     logs = read_runs(runs, models=source.paths, refused=skips.skip, **reading)
-    of, flown = plants_behind(schedule, source, runs_behind(source, say)), 0
+    plants, compared_runs = plants_behind(schedule, source, runs_of_models(source, say)), 0
     steps: list[KeptStep] = []
     for run in logs:
         try:
-            steps += kept_steps(schedule, of, run)
+            steps += kept_steps(schedule, plants, run)
         except DataError as error:
             if len(logs) == 1:
                 raise
             skips.skip(run, error)
         else:
-            flown += 1
-    told = AsPromised(gains=str(gains), axis=schedule.axis, steps=tuple(steps), skipped_runs=tuple(skips.records))
+            compared_runs += 1
+    result = AsPromised(gains=str(gains), axis=schedule.axis, steps=tuple(steps), skipped_runs=tuple(skips.records))
     headline = _headline(gains, source.paths, runs, steps)
-    return skips.end(emit(told, render=_page(steps), headline=headline), flown)
+    return skips.end(emit(result, render=_page(steps), headline=headline), compared_runs)
 
 
 def _headline(gains: Path, models: Sequence[Path], runs: Sequence[Path], steps: Sequence[KeptStep]) -> Headline:
