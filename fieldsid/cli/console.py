@@ -131,7 +131,7 @@ def print_file(to: Console, text: str) -> None:
 
 
 def print_page(to: Console, page: Page) -> None:
-    """Print the blocks and sentences of a page, without its title and warnings: the headline has taken their place."""
+    """Print the blocks and sentences of a page: the first lines of the result stand for its title and warnings."""
     for i, block in enumerate(filter(has_content, page.blocks)):
         if i and (isinstance(block, Block) or block.startswith("\n")):
             to.print()

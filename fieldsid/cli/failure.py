@@ -1,4 +1,4 @@
-"""What the user reads after an error: its three parts on stderr, or, for a bug of ours, where the trace is."""
+"""The message of an error: its three parts on stderr or, for a bug of the program, the file with the trace."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from fieldsid.cli.help.command_page import EXAMPLE
 from fieldsid.errors import FULL, MAKE_ROOM, FieldsidError, UsageError
 
 CLOSED = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EISDIR, errno.EIO)
-"""Error numbers of the system where a path cannot be read or written."""
+"""Error numbers for a path that cannot be read or written."""
 
 
 def explain(error: Exception, arguments: Sequence[str]) -> int:
@@ -46,7 +46,7 @@ def explain(error: Exception, arguments: Sequence[str]) -> int:
 
 
 def tell_refused(errors: Sequence[FieldsidError], raised: Exception | None) -> None:
-    """Print on stderr why parts that are not built in took none, but for the one that an error was raised for."""
+    """Print on stderr which effects and plug-ins were not used and why, without the one whose error was raised already."""
     printed = _with_causes(raised)
     for error in errors:
         if not any(error is one for one in printed):
@@ -56,7 +56,7 @@ def tell_refused(errors: Sequence[FieldsidError], raised: Exception | None) -> N
 
 
 def _with_causes(error: BaseException | None) -> list[BaseException]:
-    """Return an error and what it was raised from, each once: of errors raised from one another there is no end."""
+    """Return an error and its causes, each once: errors raised from one another form a cycle."""
     found: list[BaseException] = []
     while error is not None and not any(error is one for one in found):
         found.append(error)
@@ -65,13 +65,13 @@ def _with_causes(error: BaseException | None) -> list[BaseException]:
 
 
 def _print_json(arguments: Sequence[str], code: int, what: str, found: str, hint: str = "") -> None:
-    """Print an error on stdout as one JSON object where the command was asked for JSON: who reads that always gets an object."""
+    """Print an error on stdout as one JSON object, with `--json`: its reader always gets an object."""
     if "--json" in arguments:
         body = {"schema": "fieldsid/error/1", "exit_code": code, "what": what, "found": found, "hint": hint}
         try:
             sys.stdout.write(json.dumps(body) + "\n")
             sys.stdout.flush()
-        except OSError:  # standard output itself is what is wrong, and stderr has said so
+        except OSError:  # standard output is the cause of the error, which stderr has reported
             return
 
 
@@ -99,13 +99,13 @@ def _as_usage(error: typer.TyperException, arguments: Sequence[str]) -> UsageErr
 
 
 def _example(context: typer.Context | None) -> str:
-    """Return the example of a command's page of help, to begin a hint with."""
+    """Return the example on a command's page of help, as the beginning of a hint."""
     _, is_there, line = ("" if context is None else context.command.help or "").partition(EXAMPLE)
     return f"`{line.splitlines()[0]}`, or " if is_there else ""
 
 
 def _not_given(words: str, arguments: Sequence[str], command: str) -> UsageError:
-    """Say of what the trial folder, which is the working folder, was to give and does not have what comes before it there."""
+    """Return the error for an argument that the trial folder should supply and lacks; the hint is the command that makes it."""
     from fieldsid.trial_folder.next_step import step_before
     from fieldsid.trial_folder.state import state_of
 
@@ -115,7 +115,7 @@ def _not_given(words: str, arguments: Sequence[str], command: str) -> UsageError
 
 
 def _as_full(error: OSError) -> UsageError:
-    """Say where nothing more could be written; a file of ours that was being written there is not left behind."""
+    """Return the error for a full disk; the file that was being written is not left behind."""
     where = f"`{error.filename}`" if error.filename else "standard output, or the folder for temporary files"
     return UsageError("there is no room left to write", found=f"{where}: {error.strerror}", hint=MAKE_ROOM)
 

@@ -1,4 +1,4 @@
-"""Runs as commands take them: files of any known format, and `-` for a CSV on standard input."""
+"""Reading the runs of a command: files of any known format, and `-` for CSV on standard input."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 STDIN = Path("-")
 AXIS_OPTION = "`--axis {axis}`"
-"""How an axis is stated on a command line."""
+"""How an axis is stated on a command line, for hints."""
 READING = ("pandas", "pyarrow")
-"""Libraries whose import takes most of the time of reading the first log; once they are loaded, a worker saves nothing."""
+"""Libraries whose import takes most of the time of reading the first log; once they are loaded, a worker saves no time."""
 
 
 def read_runs(paths: Sequence[Path], **how: Any) -> list[Run]:
-    """Return the runs of files as `read_groups` does, of which they are the only group."""
+    """Return the runs of one group of files; options, errors and messages as those of `read_groups`."""
     (runs,) = read_groups([paths], **how)
     return runs
 
@@ -46,13 +46,13 @@ def read_groups(
     meanwhile: Callable[[], None] | None = None,
     refused: Refused[Path] | None = None,
 ) -> list[list[Run]]:
-    """Return the runs of each group of files, each with a name no other has, cut to `start` .. `end` s where given.
+    """Return the runs of each group of files, each with a unique name, cut to `start` .. `end` s where given.
 
-    Without a mapping a log whose own names are not enough is read as the logs of the `models` were. check validates all other
-    arguments; its errors come before those of a file. meanwhile is what this process does while a forked worker reads the files,
-    where it can be forked and has not read any before. refused is called with each of several files that cannot be read, and the
-    error; without it, and where no file of a group can be read, raises LogError, MappingError, and DataError where the cut leaves
-    nothing. Raises UsageError where two files hold the same data.
+    Without a mapping, a log whose column names are not sufficient is read with the mapping of the logs of the `models`.
+    check: validates all other arguments; its errors come before those of a file. meanwhile: runs in this process while a forked
+    worker reads the files; without a fork, or once READING is loaded, the files are read here. refused: called with each file
+    that cannot be read, and the error. Raises LogError, MappingError or DataError (the cut leaves nothing) without `refused`, and
+    where no file of a group can be read; raises UsageError where two files have the same data.
     """
     from fieldsid.logs.several.run_names import refuse_twice
     from fieldsid.logs.several.sifting import attempt, sifted
@@ -77,7 +77,7 @@ def read_groups(
 
 
 def _say_how_read(runs: Sequence[Run], *, several: bool) -> None:
-    """Say how logs that came without a mapping were read."""
+    """Print on stderr how logs without a mapping were read."""
     from fieldsid.cli.console import say
     from fieldsid.logs.run import READ_AS
 
@@ -88,7 +88,7 @@ def _say_how_read(runs: Sequence[Run], *, several: bool) -> None:
 
 
 def _apart(runs: Sequence[Run], used: Sequence[Path], paths: Sequence[Path]) -> list[Run]:
-    """Return the runs with names that no two share, the same whichever of the files can be read."""
+    """Return the runs with unique names, which do not depend on which of the files can be read."""
     from fieldsid.logs.several.run_names import names_apart, stem_of
 
     own = dict(zip(paths, names_apart([stem_of(path) for path in paths], paths), strict=True))
@@ -110,7 +110,7 @@ def mapping_of(path: Path | None) -> ChannelMap | None:
 
 
 def one_run(command: str, logs: Sequence[Path], *, join: bool) -> list[Path]:
-    """Return the log, and the other tables of its run where they are to be joined; raises UsageError for several logs or none."""
+    """Return the log and, with `join`, the other tables of its run; raises UsageError for several logs without `join`."""
     files = shlex.join(map(str, logs))
     if join and len(logs) == 1 and not logs[0].is_dir():
         raise UsageError("one table is nothing to join", found=f"`{logs[0]}`", hint="name the other tables of its run too")
@@ -125,7 +125,7 @@ def one_run(command: str, logs: Sequence[Path], *, join: bool) -> list[Path]:
 
 
 def model_first(model: Path, runs: Sequence[Path]) -> tuple[Path, list[Path]]:
-    """Return the model and the runs of a line, whichever of them comes first in it."""
+    """Return the model and the runs of a command line, in whichever order they were typed."""
     from fieldsid.logs.unknown_file import own_kind
 
     given = [model, *runs]
@@ -134,7 +134,7 @@ def model_first(model: Path, runs: Sequence[Path]) -> tuple[Path, list[Path]]:
 
 
 def models_among(paths: Sequence[Path]) -> list[Path]:
-    """Return the models among the files of a pattern, saying which of this program's others are passed over; all without one."""
+    """Return the models among several files, and name on stderr the program's other files; all files where none is a model."""
     from fieldsid.cli.console import say
     from fieldsid.logs.unknown_file import own_kind
 
@@ -148,7 +148,7 @@ def models_among(paths: Sequence[Path]) -> list[Path]:
 
 
 def files_of(runs: Sequence[Run]) -> list[Path]:
-    """Return the files the runs came from, for the hashes in what is written; standard input has none."""
+    """Return the existing files that the runs were read from, for the hashes in an output; standard input has none."""
     return [run.source for run in runs if run.source is not None and run.source.exists()]
 
 
@@ -173,7 +173,7 @@ def _read(
 def _read_in_worker(
     read: Callable[[Path], Run], paths: Sequence[Path], check: Callable[[], None], meanwhile: Callable[[], None]
 ) -> list[Run | FieldsidError] | None:
-    """Return the runs, or errors, that a forked worker read; None where it gave no answer: the files are then read here."""
+    """Return the runs or errors that a forked worker read; None without an answer: the caller then reads the files itself."""
     from fieldsid.logs.several.sifting import attempt
 
     worker = fork_worker(lambda: dumps([attempt(read, path) for path in paths]))
@@ -187,9 +187,9 @@ def _read_in_worker(
 
 
 def fitted_to(path: Path, model: Model, runs: Iterable[Run]) -> frozenset[str]:
-    """Return the names of the runs that the model of a file was fitted to, without those whose log is only called the same.
+    """Return the names of the runs that a model was fitted to, without those of a different log of the same name.
 
-    By their hashes. Where the model's own log is gone, or of another format, its name is all there is to go by.
+    Logs are compared by their hashes; where the model's log no longer exists, or has another format, by name only.
     """
     from fieldsid.logs.several.run_names import stem_of
 

@@ -1,4 +1,4 @@
-"""Runs from whatever a user holds: files, patterns, pandas tables, runs."""
+"""Runs from what a user passes: files, patterns, pandas tables, runs."""
 
 from __future__ import annotations
 
@@ -73,12 +73,12 @@ def load(
 ) -> Several[Run]:
     """Return the runs of logs, as `sysid import` reads them: files, patterns as `runs/*.parquet`, pandas tables.
 
-    A table has a row per sample; a dictionary of tables names their runs. channel: `SIGNAL=COLUMN:UNIT`, as the option. vehicle:
-    its fin limits are for the finding of saturation. start, end: the part of every run, in s. max_gap: the longest gap, in s.
-    salvage: take what is left of a damaged log. whole: keep what of a file is not under way, as one run; without it the stretches
-    under way are runs of their own. join: the files are the tables of one run, as with `--join`. Raises LogError for a file that
-    is missing or cannot be read and for a pattern without a file, MappingError where no column is known, DataError where the
-    part is empty, UsageError for what is no log.
+    A table has one row per sample; a dictionary of tables names their runs. channel: `SIGNAL=COLUMN:UNIT`, as with `--channel`.
+    vehicle: gives the fin limits by which saturation is found. start, end: the part of every run, in s. max_gap: the longest gap,
+    in s. salvage: read the intact part of a damaged log. whole: return one run for each file; without it each stretch under way
+    is a run. join: the files are the tables of one run, as with `--join`. Raises LogError for a file that is missing or cannot
+    be read and for a pattern without a file, MappingError where no column is known, DataError where the part is empty,
+    UsageError for an object that is no log.
     """
     files = _tables_of_one_run(logs) if join else []
     importer = Importer(
@@ -95,7 +95,7 @@ def load(
 
 
 def _tables_of_one_run(logs: Logs) -> list[Path]:
-    """Return the files of one run, in their order; raises UsageError for anything else, LogError for a pattern without one."""
+    """Return the table files of one run in order; raises UsageError for anything but files, LogError for an unmatched pattern."""
     named = [logs] if isinstance(logs, (str, PathLike)) else list(cast("Iterable[Log]", logs))
     other = next((item for item in named if not isinstance(item, (str, PathLike))), None)
     if other is not None:
@@ -129,7 +129,7 @@ def runs_mapped(
 
 
 def files_of(name: File, what: str = "log") -> list[Path]:
-    """Return the files that a path or a pattern names, in the order of their names; raises LogError where a pattern has none."""
+    """Return the files that a path or a pattern names, sorted by name; raises LogError where a pattern matches none."""
     path = Path(name).expanduser()
     if path.exists() or not has_magic(str(path)):
         return [path]
@@ -156,7 +156,7 @@ def _read(logs: Logs, reading: Reading) -> Iterator[Run]:
 
 
 def is_table(item: object) -> TypeGuard[DataFrame]:
-    """Whether something is a pandas table: who holds one has loaded pandas."""
+    """Whether an object is a pandas table; pandas is not imported: the owner of a table has loaded it."""
     return "pandas" in sys.modules and isinstance(item, sys.modules["pandas"].DataFrame)
 
 
@@ -180,7 +180,7 @@ def _mapping(mapping: ChannelMap | File | None) -> ChannelMap | None:
 
 
 def _plain(pattern: Path) -> Path:
-    """Return a pattern up to the first part that is one: what stands before it is a folder."""
+    """Return a pattern up to its first part with a wildcard; the parts before that are a folder."""
     parts = pattern.parts
     first = next(i for i, part in enumerate(parts) if has_magic(part))
     return Path(*parts[: first + 1])

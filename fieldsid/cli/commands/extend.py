@@ -53,7 +53,7 @@ def command(
     if undo:
         if runs or add or validate or keep:
             raise UsageError(
-                "`--undo` takes the model alone", found="runs or options beside it", hint=f"sysid extend {model} --undo"
+                "`--undo` takes the model alone", found="runs or other options with it", hint=f"sysid extend {model} --undo"
             )
         return _restore_parent(model, output, force=force)
     from fieldsid.cli.inputs import files_of, mapping_behind, model_first, read_groups
@@ -173,7 +173,7 @@ def _restore_parent(path: Path, output: Path | None, *, force: bool) -> Mapping[
     if parent is None:
         raise UsageError(f"`{path}` was not extended from another model", found="no parent", hint="there is nothing to undo")
     if parent.state == MISSING:
-        raise ArtifactError(f"the parent of `{path}` is gone", found=str(parent.path), hint="put it back beside the model")
+        raise ArtifactError(f"the parent of `{path}` is gone", found=str(parent.path), hint="put it back next to the model")
     if parent.state == CHANGED and not force:
         raise ArtifactError(
             f"the parent of `{path}` has changed since", found=str(parent.path), hint="add `--force` to take it as it is now"

@@ -1,4 +1,4 @@
-"""The command line under way, and lines made ready to paste: quoted, several files of one folder as a pattern."""
+"""The running command line, and command lines ready to paste: quoted, several files of one folder as a pattern."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _WORDS: ContextVar[tuple[str, ...]] = ContextVar("words", default=())
 
 
 def remember(words: Sequence[str]) -> None:
-    """Keep the words of the command that is about to run, `sysid` left out."""
+    """Store the words of the command that is about to run, without `sysid`."""
     _WORDS.set(tuple(words))
 
 
 def typed_with(*more: str) -> str:
-    """Return the command line under way with more words behind it; `--json` is left out."""
+    """Return the running command line with more words added, without `--json`."""
     words = [w for w in _WORDS.get() if w != "--json"]
     groups = [list(group) for _, group in groupby(words, key=lambda w: not w.startswith("-") and isfile(w))]  # noqa: PTH113 - says no
     parts = [part for g in groups for part in ([g] if len(g) > FEW and isfile(g[0]) else g)]  # noqa: PTH113 - of what cannot be reached
@@ -31,9 +31,9 @@ def typed_with(*more: str) -> str:
 
 
 def pasted(*words: str | Path | Sequence[str | Path]) -> str:
-    """Return a command line of `sysid`; a word may be a list of files, all of them or the pattern that stands for them.
+    """Return a command line of `sysid`; a list of files becomes its names, or the pattern that matches exactly them.
 
-    In a trial folder, without what it is filled in with there.
+    In a trial folder the words that the folder supplies are left out.
     """
     parts: list[str] = ["sysid"]
     flat = [_near(w) for word in words for w in ([word] if isinstance(word, (str, Path)) else word)]
@@ -47,9 +47,9 @@ def pasted(*words: str | Path | Sequence[str | Path]) -> str:
 
 
 def _reading(words: Sequence[str]) -> list[str]:
-    """Return the mapping of the command under way, for a line of files that are read as that command has read them.
+    """Return the `--mapping` of the running command, for a command line that reads the same files.
 
-    Where it was not typed it is that of a model, for logs whose own names are not enough and a line without that model.
+    Where none was typed it is that of a typed model, if the logs need one and the line does not name that model.
     """
     typed, taken = parse(_WORDS.get()), set(map(Path, words))
     if typed is None:
@@ -66,11 +66,11 @@ def _reading(words: Sequence[str]) -> list[str]:
 
 
 def repeated(option: str, files: Sequence[str | Path]) -> list[str]:
-    """Return an option that takes one file, once for each of them."""
+    """Return the words of an option repeated for each file."""
     return [word for file in files for word in (option, str(file))]
 
 
 def _near(word: str | Path) -> str:
-    """Return a path below the working folder without what leads to that."""
+    """Return a path relative to the working folder where it is below it, else unchanged."""
     here = Path.cwd()
     return str(word.relative_to(here)) if isinstance(word, Path) and word.is_relative_to(here) else str(word)
