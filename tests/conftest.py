@@ -1,4 +1,4 @@
-"""What all tests share: the data beside the repository, a quiet drawing backend, and the program run in this process."""
+"""Settings and fixtures of all tests: environment, distribution over processes, and the program run in this process."""
 
 from __future__ import annotations
 
@@ -37,36 +37,36 @@ def _stamp_of_kernels() -> str:
     return digest.hexdigest()[:16]
 
 
-# numba looks at a kernel's own file only: one compiled with an older kernel of another file inside would be taken for new.
-# Nothing imported above loads numba, which reads this once.
+# numba checks only the file of a kernel: it would reuse one that was compiled with an older kernel of another file.
+# Nothing imported above loads numba, which reads this variable once.
 os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".pytest_cache" / "numba" / _stamp_of_kernels()))
 
-# The same examples on every machine, and no verdict that depends on how busy it is; more of them: --hypothesis-profile=many
+# The same examples on every machine, without a deadline, which would depend on its load; more: --hypothesis-profile=many
 settings.register_profile("steady", derandomize=True, deadline=None, max_examples=30)
 settings.register_profile("many", deadline=None, max_examples=1000)
 settings.load_profile("steady")
 
 MOST_WORKERS = 4
-"""Largest number of processes that share the whole suite: each holds half a GiB and makes what files share again."""
+"""Largest number of processes for the whole suite: each needs half a GiB and makes the shared fixtures anew."""
 SHARE = "FIELDSID_TEST_SHARE"
-"""Names in the environment which part of the tests to run, as 1/2: other processors share them."""
+"""Environment variable for the part of the tests to run, as 1/2, where several machines share them."""
 FORKS = pytest.StashKey[list[str]]()
-"""The files of the tests that fork, which a worker of the suite leaves to a process of their own."""
+"""Files with tests that fork, which the processes of the suite leave to a separate one."""
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """Return how many processes share the whole suite, one for each core; 0 for a part of it, which this process runs."""
+    """Return the number of processes for the whole suite, one per core; 0 for a part of it, which this process runs."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
     return min(cores, MOST_WORKERS) if whole and cores > 1 else 0
 
 
 OF_THE_GUIDE = ("tests/contract/test_schemas.py", "tests/cli/test_demo.py")
-"""Files elsewhere that look at what the guide's command lines gave."""
+"""Files outside `tests/guide` that use `guide_session`."""
 
 
 class FilesTogether(LoadScopeScheduling):
-    """Gives out a file at a time, for its fixtures; those that compare with what the guide's command lines gave are one."""
+    """Scheduler that gives a whole file to a process, for its fixtures; the files that use `guide_session` go together."""
 
     def _split_scope(self, nodeid: str) -> str:
         file = nodeid.partition("::")[0]
@@ -78,7 +78,10 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> FilesTogethe
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave the tests that fork to test_forks.py in a worker of the suite, which has threads, and to nobody where none can."""
+    """Deselect or skip the tests that fork where they cannot, and the tests outside of SHARE.
+
+    A process of the suite has threads and leaves them to test_forks.py; on a machine that cannot fork they are skipped.
+    """
     forking = [item for item in items if item.get_closest_marker("forks")]
     if hasattr(config, "workerinput"):
         config.stash[FORKS] = sorted({str(item.path) for item in forking})
@@ -97,13 +100,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture
 def files_that_fork(pytestconfig: pytest.Config) -> list[str]:
-    """Return the files whose tests that fork are left out of this worker."""
+    """Return the files whose forking tests are left out of this process."""
     return pytestconfig.stash[FORKS]
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What a command line gave: exit code, stdout and stderr."""
+    """The exit code, stdout and stderr of a command line."""
 
     code: int
     out: str
@@ -111,7 +114,7 @@ class Answer:
 
     @property
     def json(self) -> Mapping[str, Any]:
-        """Stdout as one JSON object; the command must have ended well."""
+        """Stdout as one JSON object; the exit code must be 0."""
         assert self.code == 0, self.err
         body = json.loads(self.out)
         assert isinstance(body, dict)
@@ -155,7 +158,7 @@ def batch_here() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def guide_session(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Return what the command lines of the guide gave, each run once: its pages are compared with it, its schemas check it."""
+    """Return the answers of the guide's command lines, each run once, to compare with its pages and check by its schemas."""
     from guide.make import everything_run
 
     return everything_run(tmp_path_factory.mktemp("guide"))
@@ -163,7 +166,7 @@ def guide_session(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """Return the folder of third-party data; skips, saying why, where it is absent."""
+    """Return the folder of third-party data; skips the test where it is absent."""
     folder = ROOT.parent / "shared" / "data"
     if not folder.is_dir():
         pytest.skip(f"third-party data are not part of the project and absent here: {folder}")
