@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fieldsid.cli.headlines.missing import Searched, of_diagnosis, of_extension
+from fieldsid.cli.headlines.missing import Searched, headline_of_diagnosis, headline_of_extension
 from fieldsid.diagnosis.records import Candidate, Diagnosis, Errors, NextManeuver, Pair
 from fieldsid.extension.extend import Gain
 from fieldsid.logs.run import Note
@@ -41,20 +41,22 @@ def told(verdict: str, **more: object) -> Diagnosed:
     [("", "sysid plan --separate servo_lag,delay --axis yaw -o plan"), ("d.yaml", "sysid plan --from d.yaml -o plan")],
 )
 def test_rivals_are_told_apart_first(file, says):
-    assert of_diagnosis(told("undecided", file=file), SEARCHED).next == says
+    assert headline_of_diagnosis(told("undecided", file=file), SEARCHED).next == says
 
 
 def test_the_first_line_says_how_far_the_next_best_is_behind():
-    assert of_diagnosis(told("effect"), SEARCHED).says == "effect: servo_lag or delay; next best: delay, 14 nats behind"
+    assert headline_of_diagnosis(told("effect"), SEARCHED).says == "effect: servo_lag or delay; next best: delay, 14 nats behind"
 
 
 def test_what_was_added_already_is_used():
     added = Applied(None, "servo_lag", "models/m+servo_lag.yaml", pays=True)
-    assert of_diagnosis(told("effect", applied=(added,)), SEARCHED).next == "sysid turn-radius models/m+servo_lag.yaml"
+    assert headline_of_diagnosis(told("effect", applied=(added,)), SEARCHED).next == "sysid turn-radius models/m+servo_lag.yaml"
 
 
 def test_an_effect_that_is_named_is_added():
-    assert of_diagnosis(told("effect"), SEARCHED).next == "sysid extend m.yaml a.csv b.csv --add servo_lag --validate c.csv"
+    assert (
+        headline_of_diagnosis(told("effect"), SEARCHED).next == "sysid extend m.yaml a.csv b.csv --add servo_lag --validate c.csv"
+    )
 
 
 @pytest.mark.parametrize(
@@ -68,7 +70,7 @@ def test_an_effect_that_is_named_is_added():
 )
 def test_it_says_what_judged_where_no_run_was_given_for_it(runs, codes, says):
     alone = told("effect", runs=tuple(runs), validation_runs=(), codes=codes)
-    assert of_diagnosis(alone, SEARCHED).rests_on.startswith(says)
+    assert headline_of_diagnosis(alone, SEARCHED).rests_on.startswith(says)
 
 
 def test_an_extension_of_a_log_without_noise_is_told_in_units_as_its_diagnosis_was():
@@ -76,9 +78,9 @@ def test_an_extension_of_a_log_without_noise_is_told_in_units_as_its_diagnosis_w
     before, after = (Pair(none, Errors(angle, rate)) for angle, rate in ((0.11, 0.0051), (0.026, 0.0033)))
     quiet = Gain(("current",), before, after, Noise(0.11 / 25650.0, 0.0051 / 25650.0), True, ("a", "b"), ("c",))
     left = "current kept: the error on unseen data goes from 0.11 rad and 0.0051 rad/s to 0.026 rad and 0.0033 rad/s"
-    assert of_extension(extended(quiet)).says == left
+    assert headline_of_extension(extended(quiet)).says == left
     noisy = replace(quiet, noise_floor=Noise(0.11 / 3.2, 0.0051 / 3.2))
-    assert of_extension(extended(noisy)).says.endswith("goes from 3.20 to 1.56 x the noise floor")
+    assert headline_of_extension(extended(noisy)).says.endswith("goes from 3.20 to 1.56 x the noise floor")
 
 
 @pytest.mark.parametrize(
@@ -88,7 +90,7 @@ def test_an_extension_of_a_log_without_noise_is_told_in_units_as_its_diagnosis_w
 def test_an_extension_says_what_judged_it_where_that_are_the_runs_it_was_fitted_to(judged_on, unseen, says):
     errors = Pair(Errors(0.02, 0.02), Errors(0.02, 0.02))
     gain = Gain(("current",), errors, errors, Noise(0.01, 0.01), unseen, ("a", "b"), judged_on)
-    assert of_extension(extended(gain)).rests_on == f"2 runs fitted to (a, b), judged by {says}"
+    assert headline_of_extension(extended(gain)).rests_on == f"2 runs fitted to (a, b), judged by {says}"
 
 
 def extended(gain: Gain) -> Extended:

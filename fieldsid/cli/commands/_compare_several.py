@@ -82,11 +82,11 @@ def compare_several(
         figures=figures,
         skipped_runs=tuple(skips.records),
     )
-    from fieldsid.cli.headlines.models import of_several
+    from fieldsid.cli.headlines.models import headline_of_several
     from fieldsid.cli.inputs import files_of
     from fieldsid.records.named_inputs import inputs_of
 
-    headline = of_several(result, names, models[least], files_of(logs), inputs_of(paths[least]))
+    headline = headline_of_several(result, names, models[least], files_of(logs), inputs_of(paths[least]))
     notes = left_out(logs, models[0].axis)
     body = emit(result, render=_page(result, found_of, names), headline=headline, notes=notes)
     return skips.end(body, len(found_of[0]))

@@ -97,9 +97,9 @@ def command(
         trend=trends,
         figure=drawn,
     )
-    from fieldsid.cli.headlines.trial import of_batch
+    from fieldsid.cli.headlines.trial import headline_of_batch
 
-    body = emit(result, render=_page(result), headline=of_batch(result, trend=trend))
+    body = emit(result, render=_page(result), headline=headline_of_batch(result, trend=trend))
     if (trend or figure is not None) and not trends:
         say(f"no trend: fewer than 6 runs of different dates know a parameter of {axis.value}")
     if trends and (dated := sum(row.get("time_from") == "file" for row in rows)):

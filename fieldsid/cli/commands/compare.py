@@ -108,11 +108,11 @@ def command(
     compared = tuple(compared_run(c, file, fitted) for c, file in zip(found, drawn, strict=True))
     notes = left_out(logs, known.axis)
     result = Compared(model=str(model), axis=known.axis, runs=compared, warnings=notes, skipped_runs=tuple(skips.records))
-    from fieldsid.cli.headlines.models import of_compare
+    from fieldsid.cli.headlines.models import headline_of_compare
     from fieldsid.cli.inputs import files_of
     from fieldsid.records.named_inputs import inputs_of
 
-    headline = of_compare(result, known, files_of(logs), inputs_of(model))
+    headline = headline_of_compare(result, known, files_of(logs), inputs_of(model))
     body = emit(result, render=_page(found, compared, top), headline=headline, notes=notes)
     _gate(body["runs"], min_fit)
     return skips.end(body, len(compared))

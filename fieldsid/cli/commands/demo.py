@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from fieldsid.cli.app import run
 from fieldsid.cli.console import WIDTH, emit
-from fieldsid.cli.headlines.trial import of_demo
+from fieldsid.cli.headlines.trial import headline_of_demo
 from fieldsid.cli.options import Force, OutputDir, flag, option
 from fieldsid.cli.progress import compiling
 from fieldsid.cli.session import Session
@@ -66,7 +66,7 @@ def command(
         sys.stdout.write("\n")
     figures = written(figure=[f for f in tour.files if verbose and f.endswith(".png")])
     page = Page("", closing=(*figures, "`sysid --help` lists every command."))
-    return emit(tour, render=page, headline=of_demo(tour))
+    return emit(tour, render=page, headline=headline_of_demo(tour))
 
 
 def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, force: bool, detail: str) -> Demo:

@@ -100,9 +100,9 @@ def command(
     if apply:
         used = mapping or mapping_behind(models, logs)
         result = replace(result, applied=_add_effects(found, (known, model), training, unseen, used, force=force))
-    from fieldsid.cli.headlines.missing import Searched, of_diagnosis
+    from fieldsid.cli.headlines.missing import Searched, headline_of_diagnosis
 
-    headline = of_diagnosis(result, Searched(files_of(training), files_of(unseen), model, thorough))
+    headline = headline_of_diagnosis(result, Searched(files_of(training), files_of(unseen), model, thorough))
     body = emit(result, render=_page(result), headline=headline, notes=found.notes)
     return skips.end(body, len(training) + len(unseen))
 

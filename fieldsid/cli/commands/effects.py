@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fieldsid.cli.console import emit
-from fieldsid.cli.headlines.missing import of_catalogue, of_effect, of_new_effect
+from fieldsid.cli.headlines.missing import headline_of_catalogue, headline_of_effect, headline_of_new_effect
 from fieldsid.cli.headlines.typed import pasted
 from fieldsid.cli.options import Force, argument, option
 from fieldsid.cli.progress import refuse_existing
@@ -38,7 +38,7 @@ def list_(axis: Annotated[Axis | None, option("--axis", "", "Only the effects of
 
     known = tuple(all_effects(axis).values())
     result = Catalogue(axis, tuple(map(Described, known)))
-    return emit(result, render=_list_page(known), headline=of_catalogue(known))
+    return emit(result, render=_list_page(known), headline=headline_of_catalogue(known))
 
 
 @command.command("show", short_help="Show all that is known of one effect.")
@@ -51,7 +51,7 @@ def show(name: Annotated[str, argument("NAME", "Name of an effect, as in `sysid 
     from fieldsid.results.effects import Described, ShownEffect
 
     effect = pick_effect(name)
-    return emit(ShownEffect(Described(effect)), render=_page(effect), headline=of_effect(effect))
+    return emit(ShownEffect(Described(effect)), render=_page(effect), headline=headline_of_effect(effect))
 
 
 @command.command("new", short_help="Start an effect of your own.")
@@ -77,7 +77,7 @@ def new(
     load_own_effects()  # a replaced file may have been broken: register the new one
     result = NewEffect(name, axis, str(path))
     page = Page("", closing=written(effect=result.file))
-    return emit(result, render=page, headline=of_new_effect(result, _command_to_show(path, name)))
+    return emit(result, render=page, headline=headline_of_new_effect(result, _command_to_show(path, name)))
 
 
 def _refuse_name(name: str, path: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from fieldsid.cli.console import emit
-from fieldsid.cli.headlines.missing import left_in_words, of_extension, of_undoing
+from fieldsid.cli.headlines.missing import headline_of_extension, headline_of_undoing, left_in_words
 from fieldsid.cli.headlines.typed import pasted, repeated
 from fieldsid.cli.headlines.words import next_use
 from fieldsid.cli.options import Force, MappingFile, ModelFile, OutputFile, ValidateRuns, argument, flag, option
@@ -103,7 +103,7 @@ def command(
         next=next_,
         skipped_runs=tuple(skips.records),
     )
-    body = emit(result, render=_page(result), headline=of_extension(result), notes=result.notes)
+    body = emit(result, render=_page(result), headline=headline_of_extension(result), notes=result.notes)
     return skips.end(body, len(runs) + len(validate) - len(skips.records))
 
 
@@ -188,7 +188,7 @@ def _restore_parent(path: Path, output: Path | None, *, force: bool) -> Mapping[
         gain=step.gain if step else None, undone=str(path), model=str(back), effects=load_model(back).effects, parent=parent
     )
     page = Page("", closing=(f"model: {back}; {path} stays where it is",))
-    return emit(undone, render=page, headline=of_undoing(undone))
+    return emit(undone, render=page, headline=headline_of_undoing(undone))
 
 
 def _page(result: Extended) -> Page:

@@ -28,7 +28,7 @@ def command(
 
     Example: sysid fit models/*.yaml -o law.yaml
     """
-    from fieldsid.cli.headlines.gains import of_fit
+    from fieldsid.cli.headlines.gains import headline_of_fit
     from fieldsid.cli.inputs import models_among
     from fieldsid.errors import UsageError
     from fieldsid.plant.laws.axis_laws import law_notes, save_laws
@@ -50,4 +50,4 @@ def command(
     result = FittedLaws(laws=laws, file=file, figure=drawn)
     notes = (*source.notes, *law_notes(laws))
     page = Page("", blocks=tuple(blocks_of(laws)), closing=written(file=file, figure=drawn))
-    return emit(result, render=page, headline=of_fit(result), notes=notes)
+    return emit(result, render=page, headline=headline_of_fit(result), notes=notes)

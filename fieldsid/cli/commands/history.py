@@ -51,10 +51,10 @@ def command(model: ModelFile, figure: FigureFile = None, force: Force = False) -
         intact=all(g.state == "intact" and not (g.step and g.step.changed_data) for g in line),
         figure=draw_figure(figure if steps else None, plot, force=force),
     )
-    from fieldsid.cli.headlines.models import of_history
+    from fieldsid.cli.headlines.models import headline_of_history
     from fieldsid.records.named_inputs import inputs_of
 
-    headline = of_history(result, inputs_of(model))
+    headline = headline_of_history(result, inputs_of(model))
     return emit(result, render=_page(result, steps), headline=headline, notes=_notes(line))
 
 

@@ -102,9 +102,9 @@ def command(
     draw_figures(output if figures else None, {k: v for fit in fits for k, v in _plots(fit).items()}, force=force)
     entries = tuple(fitted_model(fit, model, of) for fit, model, of in zip(fits, models, groups, strict=True))
     result = Identified(axis=axis, fits=entries, skipped_runs=tuple(skips.records))
-    from fieldsid.cli.headlines.models import of_identify
+    from fieldsid.cli.headlines.models import headline_of_identify
 
-    page, headline = _page(entries, figures=figures), of_identify(result, files)
+    page, headline = _page(entries, figures=figures), headline_of_identify(result, files)
     return skips.end(emit(result, render=page, headline=headline, notes=_warnings(entries)), len(used))
 
 

@@ -74,11 +74,11 @@ def command(
         check_output(place, force=force)
     done = [importer.write(run, place, force=force) for run, place in placed]
     result = Import(runs=tuple(done), already_imported=tuple(map(str, imported)), skipped_runs=tuple(skips.records))
-    from fieldsid.cli.headlines.logs import of_import
+    from fieldsid.cli.headlines.logs import headline_of_import
     from fieldsid.logs.segments import plane_of
 
     notes = one_of_each_kind(((n.code, n.data.get("signal")), item.run.name, n) for item in done for n in item.warnings)
-    headline = of_import(result, plane_of([d.run for d in done]))
+    headline = headline_of_import(result, plane_of([d.run for d in done]))
     rows = tuple((d.file, str(d.samples), f"{d.duration_s:.2f}", f"{d.rate_hz:.4g}", str(len(d.signals))) for d in done)
     page = Page("", blocks=(Block("", rows, ("run", "samples", "s", "Hz", "signals")),))
     body = emit(result, render=page, headline=headline, notes=notes)

@@ -21,7 +21,7 @@ def command(
     Example: sysid init pandan --template torpedo
     """
     from fieldsid.cli.console import emit
-    from fieldsid.cli.headlines.trial import of_trial
+    from fieldsid.cli.headlines.trial import headline_of_trial
     from fieldsid.page import Page
     from fieldsid.results.trial import Init
     from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, append
@@ -35,4 +35,4 @@ def command(
     append(folder, Entry(time, words, 0, 0.0, verdict, (), tuple(hashes.stamp(f) for f in files)))
     files = [*files, folder / JOURNAL]
     result = Init(name, template, tuple(map(str, files)))
-    emit(result, render=Page("", closing=result.files), headline=of_trial(result))
+    emit(result, render=Page("", closing=result.files), headline=headline_of_trial(result))

@@ -30,7 +30,7 @@ def command(
     Example: sysid inspect run7.mcap --write-mapping mapping.yaml
     """
     from fieldsid.cli.console import emit, tracked
-    from fieldsid.cli.headlines.logs import of_inspection
+    from fieldsid.cli.headlines.logs import headline_of_inspection
     from fieldsid.cli.inputs import one_run
     from fieldsid.logs.inspection import inspect_log, write_proposal
     from fieldsid.results.logs import inspected
@@ -40,7 +40,7 @@ def command(
         found = inspect_log(path, mapping=mapping, msg_path=msg_path, joined=joined, progress=on_share)
     written = write_proposal(found, write_mapping, force=force) if write_mapping is not None else None
     result = inspected(found, written)
-    headline = of_inspection(result, mapping)
+    headline = headline_of_inspection(result, mapping)
     emit(result, render=lambda to: _render(found, result, to), headline=headline)
 
 

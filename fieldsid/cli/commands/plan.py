@@ -137,10 +137,10 @@ def command(
         best = max(made.found, key=lambda s: s.expected_log_odds)
         separation = {"separation": best, "separations": made.found, "says": tuple(line for s in made.found for line in s.says())}
     result = Planned(made.plan, tuple(map(str, files)), **separation)
-    from fieldsid.cli.headlines.trial import of_plan
+    from fieldsid.cli.headlines.trial import headline_of_plan
 
     page = _page(made.plan, separation.get("says", ()))
-    return emit(result, render=page, headline=of_plan(result, model))
+    return emit(result, render=page, headline=headline_of_plan(result, model))
 
 
 def _check_write(write: str | None, output: Path | None) -> None:

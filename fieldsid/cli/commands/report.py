@@ -54,11 +54,11 @@ def command(
         figures=text.count('<svg class="chart"') + text.count('<svg class="bars"'),
         skipped=tuple(context["skipped"]),
     )
-    from fieldsid.cli.headlines.trial import of_report
+    from fieldsid.cli.headlines.trial import headline_of_report
 
     notes = [Note("not_in_report", line, {}) for line in result.skipped]
     page = Page("", closing=tuple(f"{v.what}: {v.says}" for v in result.verdicts[1:]))
-    return emit(result, render=page, headline=of_report(result, state.folder), notes=notes)
+    return emit(result, render=page, headline=headline_of_report(result, state.folder), notes=notes)
 
 
 def _state(given: Sequence[Path]) -> FolderState:

@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fieldsid.cli.console import emit, print_file, say
-from fieldsid.cli.headlines.gains import caveat, of_design, of_export, of_patch, of_verification
+from fieldsid.cli.headlines.gains import (
+    caveat,
+    headline_of_design,
+    headline_of_export,
+    headline_of_patch,
+    headline_of_verification,
+)
 from fieldsid.cli.options import LIMITS, Force, ModelFiles, OutputFile, OwnLaw, VehicleFile, argument, flag, option
 from fieldsid.cli.progress import refuse_existing, refuse_figure
 from fieldsid.cli.session import draw_figure
@@ -139,7 +145,7 @@ def design(
     inputs = [p for p in source.paths if p.is_file()]
     written_to = None if output is None else str(save_schedule(schedule, output, inputs=inputs, force=force))
     result = Design(schedule, written_to)
-    headline = of_design(result, models, caveat(source.models, models))
+    headline = headline_of_design(result, models, caveat(source.models, models))
     page = Page(
         "", blocks=tuple(design_blocks(schedule, angles(), ignored_effects(source))), closing=written(schedule=written_to)
     )
@@ -208,7 +214,7 @@ def verify(
         gates=gates,
         figure=draw_figure(output, sketch("schedule", known, checked), force=force),
     )
-    headline = of_verification(result, schedule, models or source.paths)
+    headline = headline_of_verification(result, schedule, models or source.paths)
     gates_said = (f"passed: {g.name} {g.found:.3g}, wanted {g.wanted:.3g}" for g in gates if g.passed and not result.passed)
     page = Page("", blocks=(*verify_blocks(checked), *gates_said), closing=written(figure=result.figure))
     body = emit(result, render=page, headline=headline)
@@ -251,7 +257,7 @@ def export(
     target = pick_target(to)
     text = target.render(known, node or target.node, template)
     result = Exported(target.name, text, *(() if output is None else _write_export(output, text, force=force)))
-    headline, is_file = of_export(result, schedule), result.file is None
+    headline, is_file = headline_of_export(result, schedule), result.file is None
     return emit(result, render=lambda out: _render_export(out, result), headline=headline, is_file=is_file)
 
 
@@ -275,7 +281,7 @@ def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write
     patch = patch_yaml(into, key, columns_of(known))
     backup = str(write_patch(patch)) if write else None
     result = Patched(patch.difference, str(into), backup)
-    headline = of_patch(result, schedule, key)
+    headline = headline_of_patch(result, schedule, key)
     return emit(result, render=lambda out: print_file(out, patch.difference), headline=headline, is_file=not write)
 
 

@@ -38,7 +38,7 @@ def command(
 
     Example: sysid simulate model.yaml --maneuver zigzag:amplitude=15deg --speed 1.4 -o zigzag.csv
     """
-    from fieldsid.cli.headlines.models import of_simulation
+    from fieldsid.cli.headlines.models import headline_of_simulation
     from fieldsid.cli.inputs import read_run
     from fieldsid.cli.user_effects import read_model
     from fieldsid.results.logs import SignalRange, Simulation
@@ -76,7 +76,7 @@ def command(
         seconds=float(made.time[-1] - made.time[0]),
         signals=signals,
     )
-    headline = of_simulation(result, known.axis.value, maneuver, run)
+    headline = headline_of_simulation(result, known.axis.value, maneuver, run)
     return emit(result, render=_page(result), headline=headline)
 
 

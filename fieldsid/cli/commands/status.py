@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from fieldsid.cli.console import emit
-from fieldsid.cli.headlines.trial import of_status
+from fieldsid.cli.headlines.trial import headline_of_status
 from fieldsid.cli.options import argument
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import stem_of
@@ -67,7 +67,7 @@ def command(
         warnings=tuple(notes),
         next=NextStep(why, line),
     )
-    return emit(result, render=_page(state), headline=of_status(result), notes=notes)
+    return emit(result, render=_page(state), headline=headline_of_status(result), notes=notes)
 
 
 def _verdict(state: FolderState) -> str:

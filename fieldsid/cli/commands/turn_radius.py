@@ -61,7 +61,7 @@ def command(
     Example: sysid turn-radius models/*.yaml --fin-max 0.35 --measured circle.parquet -o turning/
     """
     from fieldsid.angles import FIN, parse_angle
-    from fieldsid.cli.headlines.gains import caveat, of_turn
+    from fieldsid.cli.headlines.gains import caveat, headline_of_turn
     from fieldsid.cli.inputs import models_among, read_runs
     from fieldsid.cli.user_effects import read_source
     from fieldsid.face.arguments import fin_limit_of, vehicle_of
@@ -90,7 +90,7 @@ def command(
         plots = {"turn_radius": sketch("turn", prediction)}
         plots |= {f"circle_{m.turn.run}": sketch("turn", m.turn, draw="track_figure") for m in prediction.measured}
         result = replace(result, figures=tuple(draw_figures(output if figures else None, plots, force=force)))
-    headline, notes = of_turn(prediction, models, caveat(source.models, models)), prediction.notes
+    headline, notes = headline_of_turn(prediction, models, caveat(source.models, models)), prediction.notes
     page = Page("", blocks=page_of(prediction, angles()).blocks, closing=written(figure=result.figures))
     body = emit(result, render=page, headline=headline, notes=notes)
     return skips.end(body, len(runs or []) + len(measured or []) - len(skips.records))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, typed_with
-from fieldsid.cli.headlines.words import named, next_use
+from fieldsid.cli.headlines.words import first_names, next_use
 from fieldsid.cli.voice import angles
 from fieldsid.page import counted
 from fieldsid.rounding import MANY, number, with_error
@@ -27,7 +27,7 @@ WIDE_MARGIN = 60.0
 """Phase margin (deg) to design for after a smaller one has failed: the upper end of 30 to 60 (Franklin et al., 6.4)."""
 
 
-def of_fit(result: FittedLaws) -> Headline:
+def headline_of_fit(result: FittedLaws) -> Headline:
     """Return the exponent of speed by which each authority grows, and the points that do not fit its law."""
     laws, by_name = result.laws, result.laws.by_name
     exponents = ((name, law.exponent) for name, law in by_name.items())
@@ -35,7 +35,7 @@ def of_fit(result: FittedLaws) -> Headline:
     outliers = [p.name for law in by_name.values() for p in law.points if not p.belongs]
     says = ", ".join(powers) or f"{counted(len(by_name), 'law')} over speed, too few speeds to test an exponent"
     rests = f"{counted(len(laws.points), 'point')}, {number(laws.speed_low, 3)} .. {number(laws.speed_high, 3)} m/s"
-    rests += f"; does not belong: {named(list(dict.fromkeys(outliers)))}" if outliers else ""
+    rests += f"; does not belong: {first_names(list(dict.fromkeys(outliers)))}" if outliers else ""
     if result.file is None:
         return Headline(says, rests, typed_with("-o", f"law_{laws.axis.value}.yaml"))
     return Headline(says, rests, next_use(laws.axis.value, result.file))
@@ -57,7 +57,7 @@ def caveat(models: Iterable[Model], files: Sequence[Path]) -> str:
     return f"from a model that lacks something ({left}{first}): "
 
 
-def of_turn(found: TurnPrediction, models: Sequence[Path], caveat: str = "") -> Headline:
+def headline_of_turn(found: TurnPrediction, models: Sequence[Path], caveat: str = "") -> Headline:
     """Return the tightest turn of both sides with its 95 % band; where only the band is known, how to measure the radius."""
     from fieldsid.turning.prediction import found_by, turn_words
 
@@ -70,12 +70,12 @@ def of_turn(found: TurnPrediction, models: Sequence[Path], caveat: str = "") -> 
     circles = f"{of}, {use}" if found.measured else "no circle given by `--measured`"
     factor, unit = angles().of("rad")
     rudder, speeds = f"rudder {number(factor * found.rudder_max, 3)} {unit}", counted(len({r.speed for r in rows}), "speed")
-    rests = f"{named([str(m) for m in models])}, {rudder}; {found_by(methods)}, {speeds}; {circles}"
+    rests = f"{first_names([str(m) for m in models])}, {rudder}; {found_by(methods)}, {speeds}; {circles}"
     says += ": one and a half circles tell it" if tightest.band_only else ""
     return Headline(caveat + says, rests, pasted("schedule", "design", models, "-o", "gains.yaml"))
 
 
-def of_design(result: Design, models: Sequence[Path], caveat: str = "") -> Headline:
+def headline_of_design(result: Design, models: Sequence[Path], caveat: str = "") -> Headline:
     """Return the range of the gain kp over speed, and the least phase margin."""
     schedule, rows = result.schedule, result.schedule.rows
     kp = " to ".join(f"{number(r.gains.kp, 3)} at {number(r.speed, 3)} m/s" for r in dict.fromkeys((rows[0], rows[-1])))
@@ -83,12 +83,13 @@ def of_design(result: Design, models: Sequence[Path], caveat: str = "") -> Headl
     margin = f"least phase margin {least:.0f} deg" if isfinite(least) else "no loop crosses unity"
     beyond, known = sum(not r.supported for r in rows), schedule.provenance
     drawn = f"{counted(int(known['draws']), 'draw')} of {known['draws_of']}"
-    rests = f"{named([str(m) for m in models])}, {drawn}" + (f"; {beyond} of {len(rows)} rows without data" if beyond else "")
+    without_data = f"; {beyond} of {len(rows)} rows without data" if beyond else ""
+    rests = f"{first_names([str(m) for m in models])}, {drawn}{without_data}"
     next_ = pasted("schedule", "verify", result.file) if result.file else typed_with("-o", "gains.yaml")
     return Headline(f"{caveat}kp {kp}, {schedule.kind}; {margin}", rests, next_)
 
 
-def of_verification(result: Verified, schedule: Path, models: Sequence[Path]) -> Headline:
+def headline_of_verification(result: Verified, schedule: Path, models: Sequence[Path]) -> Headline:
     """Return the verdict on the gains; gains that fail need more data where their margin is wide, else a wider margin."""
     says, rests = f"{result.verdict}: {result.says}", result.rests_on.removeprefix("rests on ")
     if result.verdict in ("holds", "passed") and result.passed:
@@ -103,7 +104,7 @@ def of_verification(result: Verified, schedule: Path, models: Sequence[Path]) ->
     return Headline(says, rests, pasted("schedule", "design", models, "--phase-margin", f"{margin:g}", "-o", redesigned))
 
 
-def of_export(result: Exported, schedule: Path) -> Headline:
+def headline_of_export(result: Exported, schedule: Path) -> Headline:
     """Return what was written for the vehicle, to a file or to standard output."""
     rests = "the gains as they were designed; an export verifies nothing"
     if result.file is None:
@@ -115,7 +116,7 @@ def of_export(result: Exported, schedule: Path) -> Headline:
     return Headline(f"{schedule} written as {result.target}: {result.file}", rests, report)
 
 
-def of_patch(result: Patched, schedule: Path, key: str) -> Headline:
+def headline_of_patch(result: Patched, schedule: Path, key: str) -> Headline:
     """Return how many lines of an existing file the gains change, or have changed."""
     changes = [line for line in result.difference.splitlines() if line[:1] == "+" and line[:3] != "+++"]
     rests = f"{schedule}, its gains as they were designed; an export verifies nothing"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, typed_with
-from fieldsid.cli.headlines.words import named
+from fieldsid.cli.headlines.words import first_names
 from fieldsid.page import counted
 from fieldsid.trial_folder.journal import is_trial
 from fieldsid.trial_folder.make import LOGS, MAPPING
@@ -19,7 +19,7 @@ PROOF = "evidence"
 """Code of a finding that only says why a column was taken for a signal: it is no fault of the log."""
 
 
-def of_inspection(result: Inspected, mapping: Path | None) -> Headline:
+def headline_of_inspection(result: Inspected, mapping: Path | None) -> Headline:
     """Return what a log contains, what would spoil an identification, and how it becomes a run."""
     log, findings = " + ".join([result.path, *result.joined]), sum(f.code != PROOF for f in result.findings)
     faults = counted(findings, "finding") if findings else "nothing found that would spoil an identification"
@@ -53,17 +53,19 @@ def _is_in_trial(log: Path, mapping: str | Path | None) -> bool:
     return is_here and (mapping is None or Path(mapping).resolve() == Path(MAPPING).resolve())
 
 
-def of_import(result: Import, axis: str) -> Headline:
+def headline_of_import(result: Import, axis: str) -> Headline:
     """Return how many runs were made; the next command identifies them in the given axis, which they excite."""
     runs, imported = result.runs, result.already_imported
     if not runs and imported:
-        return Headline(f"already imported: {counted(len(imported), 'log')}, as they are", named(imported), pasted("status"))
+        return Headline(
+            f"already imported: {counted(len(imported), 'log')}, as they are", first_names(imported), pasted("status")
+        )
     files, noted = [r.file for r in runs], sum(len(r.warnings) for r in runs)
     joint = ("--joint",) if len(files) > 1 else ()
     says = f"{counted(len(runs), 'run')}, {sum(r.duration_s for r in runs):.0f} s, "
     logs = list(dict.fromkeys(Path(r.log).resolve().name for r in runs if r.log is not None))
     return Headline(
         says + (counted(noted, "note") if noted else "nothing to note"),
-        f"{named(logs) or 'standard input'}: SI and radians, one clock, gaps left as gaps",
+        f"{first_names(logs) or 'standard input'}: SI and radians, one clock, gaps left as gaps",
         pasted("identify", files, "--axis", axis, *joint, "-o", "models/") if files else "",
     )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import named, next_use
+from fieldsid.cli.headlines.words import first_names, next_use
 from fieldsid.cli.voice import angles
 from fieldsid.page import counted
 from fieldsid.rounding import MANY, noise_fall, times_noise
@@ -38,9 +38,9 @@ class Searched:
     thorough: bool
 
 
-def of_diagnosis(result: Diagnosed, searched: Searched) -> Headline:
+def headline_of_diagnosis(result: Diagnosed, searched: Searched) -> Headline:
     """Return the verdict with its numbers, and how far the next best effect lies behind."""
-    rests = f"{_judged(result)}; {counted(len(result.found.candidates), 'hypothesis', 'hypotheses')} compared"
+    rests = f"{_judged_by(result)}; {counted(len(result.found.candidates), 'hypothesis', 'hypotheses')} compared"
     return Headline(first_line(result.found), rests, _next_command(result, searched))
 
 
@@ -50,15 +50,15 @@ def first_line(found: Diagnosis) -> str:
     return f"{found.verdict}: {found.short}{margin}"
 
 
-def _judged(result: Diagnosed) -> str:
+def _judged_by(result: Diagnosed) -> str:
     """Return the runs fitted to and the data that judged: the given runs, or what was held out of the others.
 
     Of LEAST_TO_HOLD_OUT runs or more a whole one is held out, of fewer the last part of each.
     """
-    runs, names = result.runs, named(result.runs)
+    runs, names = result.runs, first_names(result.runs)
     fitted = f"{counted(len(runs), 'run')} fitted to ({names}), judged by"
     if result.validation_runs:
-        return f"{fitted} {named(result.validation_runs)}"
+        return f"{fitted} {first_names(result.validation_runs)}"
     if any(note.code == "nothing_held_back" for note in result.found.notes):
         return f"{fitted} the same: too short to hold a part back"
     held_out = "one of them" if len(runs) >= LEAST_TO_HOLD_OUT else "the last part of each" if len(runs) > 1 else "its last part"
@@ -88,7 +88,7 @@ def _next_command(result: Diagnosed, of: Searched) -> str:
         return next_use(axis, result.applied[-1].model)
     if found.effects:
         adds = repeated("--add", found.effects)
-        return _on_model(of, axis, lambda model: pasted("extend", model, of.runs, *adds, *judged))
+        return _command_on_model(of, axis, lambda model: pasted("extend", model, of.runs, *adds, *judged))
     if found.verdict == "unexplained":
         longer = ("--thorough", *(("--force",) if result.file or result.figure else ()))
         return pasted("effects", "new", "unexplained", "--axis", axis) if of.thorough else typed_with(*longer)
@@ -96,7 +96,7 @@ def _next_command(result: Diagnosed, of: Searched) -> str:
         known = ("--effects", ",".join(result.known)) if result.known else ()
         joint = ("--joint",) if len(of.runs) > 1 else ()
         return pasted("identify", of.runs, "--axis", axis, *joint, *known, "--method", "pem", "-o", "models_pem/")
-    return _on_model(of, axis, lambda model: next_use(axis, model))
+    return _command_on_model(of, axis, lambda model: next_use(axis, model))
 
 
 def _plan_to_decide(result: Diagnosed, axis: str) -> str:
@@ -107,9 +107,9 @@ def _plan_to_decide(result: Diagnosed, axis: str) -> str:
     return f"{fly.command} --axis {axis} -o plan" if fly and fly.command else typed_with("-o", "diagnosis.yaml")
 
 
-def _on_model(of: Searched, axis: str, then: Callable[[str], str]) -> str:
+def _command_on_model(of: Searched, axis: str, then: Callable[[str], str]) -> str:
     """Return a command on the diagnosed model: the given one, one identified from the same runs, or one still to identify."""
-    if (model := of.model or _identified(of.runs, axis)) is not None:
+    if (model := of.model or _identified_model(of.runs, axis)) is not None:
         return then(str(model))
     joint = ("--joint",) if len(of.runs) > 1 else ()
     stem = "joint" if joint else _stem(of.runs[0])
@@ -123,7 +123,7 @@ def _stem(log: Path) -> str:
     return stem_of(log)
 
 
-def _identified(runs: Sequence[Path], axis: str) -> Path | None:
+def _identified_model(runs: Sequence[Path], axis: str) -> Path | None:
     """Return the file of a model without effects that was fitted to exactly these runs, from `models` here or next to them."""
     from fieldsid.logs.unknown_file import own_kind
     from fieldsid.records.named_inputs import inputs_of
@@ -139,15 +139,15 @@ def _identified(runs: Sequence[Path], axis: str) -> Path | None:
     return None
 
 
-def of_extension(result: Extended) -> Headline:
+def headline_of_extension(result: Extended) -> Headline:
     """Return whether the addition is kept, and how the error fell."""
     gain = result.gain
     word = "kept" if result.pays else "kept because of --keep" if result.kept else "not kept"
     where = "unseen data" if gain.unseen else "the runs fitted to"
     says = f"{'+'.join(gain.added)} {word}: the error on {where} goes from {_before_to_after(gain)}"
-    fitted = f"{counted(len(gain.learned_on), 'run')} fitted to ({named(gain.learned_on)})"
+    fitted = f"{counted(len(gain.learned_on), 'run')} fitted to ({first_names(gain.learned_on)})"
     is_split = gain.unseen and set(gain.judged_on) <= set(gain.learned_on)
-    judged = "what was held back of them" if is_split else named(gain.judged_on) if gain.unseen else "the same"
+    judged = "what was held back of them" if is_split else first_names(gain.judged_on) if gain.unseen else "the same"
     return Headline(says, f"{fitted}, judged by {judged}", result.next)
 
 
@@ -160,7 +160,7 @@ def _before_to_after(gain: Gain) -> str:
     return " to ".join(errors.sized(angle, factor) for errors in gain.judged)
 
 
-def of_undoing(result: Undone) -> Headline:
+def headline_of_undoing(result: Undone) -> Headline:
     """Return the model that is valid again."""
     return Headline(
         f"undone: {result.model} counts again, with {', '.join(result.effects) or 'no effects'}",
@@ -169,7 +169,7 @@ def of_undoing(result: Undone) -> Headline:
     )
 
 
-def of_catalogue(effects: Sequence[Effect]) -> Headline:
+def headline_of_catalogue(effects: Sequence[Effect]) -> Headline:
     """Return how many effects there are."""
     stages = [e.stage for e in effects]
     shares = ", ".join(f"{stages.count(s)} {s}" for s in dict.fromkeys(stages))
@@ -181,13 +181,13 @@ def of_catalogue(effects: Sequence[Effect]) -> Headline:
     )
 
 
-def of_effect(effect: Effect) -> Headline:
+def headline_of_effect(effect: Effect) -> Headline:
     """Return what an effect is; the next command plans the maneuver that shows it."""
     plan = pasted("plan", "--axis", effect.axes[0], "--separate", f"none,{effect.name}", "-o", "plan")
     return Headline(f"{effect.name}: {effect.says}", effect.source, plan)
 
 
-def of_new_effect(result: NewEffect, look: str) -> Headline:
+def headline_of_new_effect(result: NewEffect, look: str) -> Headline:
     """Return the file that was written; look: the command that shows the effect."""
     says, rests = f"wrote {result.file}: edit its moment and coefficients", f"the template of an effect, for {result.axis}"
     return Headline(says, rests, look)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import MOST_NAMED, named, next_use
+from fieldsid.cli.headlines.words import MOST_NAMED, first_names, next_use
 from fieldsid.cli.voice import angles
 from fieldsid.comparison.left_by import left_by_addition
 from fieldsid.comparison.sufficient import is_noise, pooled
@@ -30,7 +30,7 @@ NO_NOISE, WHOLE_FIT = "filtered_sensor", 99.0
 """Code of the warning that a log shows no white noise, and the fit (per cent) above which nothing is missing in such a log."""
 
 
-def of_identify(result: Identified, files: Sequence[Sequence[Path]]) -> Headline:
+def headline_of_identify(result: Identified, files: Sequence[Sequence[Path]]) -> Headline:
     """Return the parameters and the error over the noise; files: the logs of each fit."""
     fits, over = result.fits, [f.over_noise for f in result.fits]
     most = max(range(len(fits)), key=lambda i: over[i])
@@ -42,8 +42,8 @@ def of_identify(result: Identified, files: Sequence[Sequence[Path]]) -> Headline
     runs = [r for f in fits for r in f.runs]
     seconds = sum(r.segment_s[1] - r.segment_s[0] for r in runs)
     methods = ", ".join(sorted({f.method for f in fits}))
-    rests = f"{counted(len(runs), 'run')} fitted to, {seconds:.0f} s of {named([r.run for r in runs])}; {methods}"
-    return Headline(says, rests, _after_fit(result, over, files))
+    rests = f"{counted(len(runs), 'run')} fitted to, {seconds:.0f} s of {first_names([r.run for r in runs])}; {methods}"
+    return Headline(says, rests, _next_command(result, over, files))
 
 
 def _error_in_words(over: float, fit: FittedModel) -> str:
@@ -69,7 +69,7 @@ def _range_in_words(fits: Sequence[FittedModel]) -> str:
     return f"{name} {number(values[0], 3)} .. {number(values[-1], 3)}"
 
 
-def _after_fit(result: Identified, over: Sequence[float], files: Sequence[Sequence[Path]]) -> str:
+def _next_command(result: Identified, over: Sequence[float], files: Sequence[Sequence[Path]]) -> str:
     fits, axis = result.fits, result.axis.value
     written = [f.model for f in fits if f.model]
     if not written:
@@ -83,7 +83,7 @@ def _after_fit(result: Identified, over: Sequence[float], files: Sequence[Sequen
     return next_use(axis, written[0])
 
 
-def of_compare(result: Compared, model: Model, runs: Sequence[Path], inputs: Sequence[Path]) -> Headline:
+def headline_of_compare(result: Compared, model: Model, runs: Sequence[Path], inputs: Sequence[Path]) -> Headline:
     """Return the error of the worst run and over all runs; inputs: the logs that the model was fitted to."""
     entries, worst = result.runs, max(result.runs, key=lambda r: r.badness)
     over = pooled(r.over_noise for r in entries)
@@ -101,13 +101,13 @@ def of_compare(result: Compared, model: Model, runs: Sequence[Path], inputs: Seq
         if not seen
         else "which it was fitted to: no fair judge"
         if len(seen) == len(entries)
-        else (f"{named(seen)} of them it was fitted to")
+        else (f"{first_names(seen)} of them it was fitted to")
     )
     rests = f"a free run over {counted(len(entries), 'run')}, {judged}"
-    return Headline(says, rests, after_compare(result.model, model, not is_noise(over), runs, inputs))
+    return Headline(says, rests, command_after_compare(result.model, model, not is_noise(over), runs, inputs))
 
 
-def after_compare(path: str, model: Model, fails: bool, runs: Sequence[Path], inputs: Sequence[Path]) -> str:
+def command_after_compare(path: str, model: Model, fails: bool, runs: Sequence[Path], inputs: Sequence[Path]) -> str:
     """Return the next command for a compared model: its use, or a diagnosis where it fails.
 
     fails: its error on the compared runs exceeds the noise. A model that left more than the noise when it was extended fails too.
@@ -146,7 +146,7 @@ def is_diagnosed(model: Path) -> bool:
     )
 
 
-def of_several(
+def headline_of_several(
     result: ComparedSeveral, names: Sequence[str], best: Model, runs: Sequence[Path], inputs: Sequence[Path]
 ) -> Headline:
     """Return which of several models follows the runs best, if any; inputs: the logs that the best was fitted to."""
@@ -154,16 +154,16 @@ def of_several(
     (least, first), (second, _) = scores[:2]
     others = ", ".join(f"{n} at {f'{s:.2f} x' if s < MANY else times_noise(s)}" for s, n in scores[1:])
     word = "follows no better than the next" if second <= CLOSE * least else "follows best"
-    fitted = [(n, named(m.fitted_to)) for n, m in zip(names, result.models, strict=True) if m.fitted_to]
+    fitted = [(n, first_names(m.fitted_to)) for n, m in zip(names, result.models, strict=True) if m.fitted_to]
     seen = [f"{n} was fitted to {to}: no fair judge of it" for n, to in fitted]
     if len(fitted) == len(names) and len({to for _, to in fitted}) == 1:
         seen = [f"every one was fitted to {fitted[0][1]}: no fair judge"]
     rests = "; ".join([f"{counted(len(result.models[0].runs), 'run')}, angle and rate pooled", *seen])
-    then = after_compare(result.best, best, not is_noise(least), runs, inputs)
+    then = command_after_compare(result.best, best, not is_noise(least), runs, inputs)
     return Headline(f"{first} {word}: {times_noise(least)}; {others}", rests, then)
 
 
-def of_simulation(result: Simulation, axis: str, maneuver: str | None, run: Path | None) -> Headline:
+def headline_of_simulation(result: Simulation, axis: str, maneuver: str | None, run: Path | None) -> Headline:
     """Return the duration of a simulated motion and the range of its angle."""
     reach = result.signals["yaw_rad" if axis == "yaw" else "pitch_rad"]
     how = f"the maneuver {maneuver}" if maneuver else f"the fin of {run}"
@@ -178,7 +178,7 @@ def of_simulation(result: Simulation, axis: str, maneuver: str | None, run: Path
     return Headline(says, rests, pasted("compare", result.model, run))
 
 
-def of_history(result: History, inputs: Sequence[Path]) -> Headline:
+def headline_of_history(result: History, inputs: Sequence[Path]) -> Headline:
     """Return how the error fell with each added effect; inputs: the logs that the model was fitted to."""
     gains = [g.step.gain for g in result.generations if g.step]
     axis, model = result.axis.value, result.model

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from fieldsid.results.trial import Batch, Demo, Init, Report, Status
 
 
-def of_trial(result: Init) -> Headline:
+def headline_of_trial(result: Init) -> Headline:
     """Return the folder that was made."""
     return Headline(
         f"{result.folder}: a trial folder; fill in its vehicle.yaml and put the logs in {result.folder}/logs",
@@ -26,7 +26,7 @@ def of_trial(result: Init) -> Headline:
     )
 
 
-def of_plan(result: Planned, model: Path | None) -> Headline:
+def headline_of_plan(result: Planned, model: Path | None) -> Headline:
     """Return the legs to fly, their time, and the standard errors that they are expected to give."""
     from fieldsid.planning.design.leg import error_in_words
     from fieldsid.planning.safety.envelope import NOT_LIMITED
@@ -51,14 +51,14 @@ def of_plan(result: Planned, model: Path | None) -> Headline:
     return Headline(says, rests, pasted("live", "--axis", plan.axis.value, "--udp", str(PORT), "--plan", file))
 
 
-def of_status(result: Status) -> Headline:
+def headline_of_status(result: Status) -> Headline:
     """Return what a folder contains and what to do next."""
     lines = counted(len(result.journal), "line")
     rests = f"{counted(len(result.files), 'file')}, {lines} of the journal; {result.next.why}"
     return Headline(result.verdict, rests, result.next.command)
 
 
-def of_report(result: Report, folder: Path) -> Headline:
+def headline_of_report(result: Report, folder: Path) -> Headline:
     """Return the first verdict of the report; the next command opens it."""
     first = next((f"{v.what}: {v.says}" for v in result.verdicts), "nothing was identified yet")
     rests = (
@@ -68,7 +68,7 @@ def of_report(result: Report, folder: Path) -> Headline:
     return Headline(first, rests, f"python -m webbrowser {shlex.quote(result.file)}")
 
 
-def of_batch(result: Batch, *, trend: bool) -> Headline:
+def headline_of_batch(result: Batch, *, trend: bool) -> Headline:
     """Return how many runs were identified and what was found in them."""
     bad = result.skipped_runs
     verdicts = ", ".join(f"{count} {name}" for name, count in result.verdicts.items())
@@ -82,7 +82,7 @@ def of_batch(result: Batch, *, trend: bool) -> Headline:
     )
 
 
-def of_demo(result: Demo) -> Headline:
+def headline_of_demo(result: Demo) -> Headline:
     """Return the hidden effect and the effects that the diagnosis named."""
     from fieldsid.models.axis import NAMES
 

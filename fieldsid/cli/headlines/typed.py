@@ -11,7 +11,7 @@ from pathlib import Path
 
 from fieldsid.cli.inputs import mapping_behind
 from fieldsid.cli.trial.parsed import parse
-from fieldsid.cli.trial.spared import shortened_in_trial
+from fieldsid.cli.trial.shortened import shortened_in_trial
 from fieldsid.trial_folder.patterns import FEW, pattern_of
 
 _WORDS: ContextVar[tuple[str, ...]] = ContextVar("words", default=())

@@ -11,7 +11,7 @@ USES = {"yaw": ("turn-radius",), "pitch": ("schedule", "design")}
 MOST_NAMED = 3
 
 
-def named(names: Sequence[str]) -> str:
+def first_names(names: Sequence[str]) -> str:
     """Return the first few names, and how many more there are."""
     more = len(names) - MOST_NAMED
     return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -22,7 +22,7 @@ from fieldsid.trial_folder.state import LOG, MODEL, RUN, FolderState, Item
 Fill = Callable[[Parsed, FolderState], list[str]]
 
 
-def filled(parsed: Parsed, state: Callable[[], FolderState]) -> list[str]:
+def words_from_folder(parsed: Parsed, state: Callable[[], FolderState]) -> list[str]:
     """Return the words that a trial folder adds to a command line; none for a command that takes nothing from it."""
     fill = FILLS.get(parsed.name)
     return [] if fill is None else fill(parsed, state())
@@ -60,7 +60,7 @@ def _may_show(place: Path, _written_ns: int, mapping: Path | None, axis: Axis) -
         return True
 
 
-def left_out(parsed: Parsed, state: FolderState) -> list[str]:
+def runs_of_other_plane(parsed: Parsed, state: FolderState) -> list[str]:
     """Return the folder's runs that a command does not take because they excite the other plane only."""
     if parsed.name not in ("identify", "diagnose") or parsed.values.get("runs"):
         return []

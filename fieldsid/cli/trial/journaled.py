@@ -15,7 +15,7 @@ import typer
 
 from fieldsid.cli.console import say, take_verdict
 from fieldsid.cli.exit_codes import BAD_INPUT, DONE, OUR_BUG
-from fieldsid.cli.trial.filled import filled, in_words, left_out
+from fieldsid.cli.trial.filled import in_words, runs_of_other_plane, words_from_folder
 from fieldsid.cli.trial.parsed import Parsed, parse
 from fieldsid.errors import FieldsidError
 from fieldsid.records.named_inputs import is_there
@@ -35,9 +35,9 @@ def run_in_trial(arguments: Sequence[str], run: Callable[[Sequence[str]], Any]) 
     if parsed is None or parsed.name in UNRECORDED:
         return run(arguments)
     folder, state = Path(), cache(lambda: state_of(Path()))
-    added = filled(parsed, state)
+    added = words_from_folder(parsed, state)
     if added:
-        others = len(left_out(parsed, state()))
+        others = len(runs_of_other_plane(parsed, state()))
         more = f"; {others} more excite the other plane alone" if others else ""
         say(f"taken from the trial folder: {in_words(added)}{more}")
     words = [*arguments, *added]

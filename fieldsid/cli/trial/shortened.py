@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 
-from fieldsid.cli.trial.filled import FILLS, filled, left_out
+from fieldsid.cli.trial.filled import FILLS, runs_of_other_plane, words_from_folder
 from fieldsid.cli.trial.parsed import parse
 from fieldsid.trial_folder.journal import is_trial
 from fieldsid.trial_folder.make import MAPPING
@@ -40,7 +40,7 @@ def _completes_to(short: Sequence[str], words: Sequence[str], state: Callable[[]
     parsed = parse(short)
     if parsed is None:
         return False
-    others = set(left_out(parsed, state()))
+    others = set(runs_of_other_plane(parsed, state()))
     needed = [w for w in words if w not in others] if others <= set(words) else words
     return _completed(short, state) == _completed(needed, state)
 
@@ -60,6 +60,6 @@ def _without_files(words: Sequence[str], options: Sequence[str]) -> list[str]:
 def _completed(words: Sequence[str], state: Callable[[], FolderState]) -> Counter[str]:
     """Return the words of a command line and those that the folder adds, each with its count."""
     parsed = parse(words)
-    added = [] if parsed is None else filled(parsed, state)
+    added = [] if parsed is None else words_from_folder(parsed, state)
     default = Counter(DEFAULT) if set(DEFAULT) <= set(words) else Counter[str]()
     return Counter(w.rstrip("/") for w in (*words, *added)) - default
