@@ -51,8 +51,8 @@ class Coefficients(NamedTuple):
 class Kind:
     """Ranges that the hulls of a kind are drawn from.
 
-    Length (m), length over height, width over height, moment of the rudder and of the fixed fins over the Munk moment, whether
-    straight running is stable (None: either), lowest speed (m/s).
+    Length (m), length over height, width over height, moment of the rudder over the inviscid Munk moment, that of the fixed fins
+    over the reduced one, whether straight running is stable (None: either), lowest speed (m/s).
     """
 
     length: tuple[float, float]
