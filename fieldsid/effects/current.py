@@ -87,7 +87,6 @@ EFFECT = Effect(
             ),
             needs=("surge",),
             without=("current_sin", "current_cos"),
-            only_with=("speed_varying",),
         ),
         Variant(
             "its direction turns",

@@ -77,8 +77,7 @@ class Variant:
     The effect's hooks compute the textbook equation where the values lack these coefficients. `initial_guesses` returns start
     values of the shared coefficients, from the residuals of the textbook variant, in place of their scan grids. `axes` are the
     axes of the variant and `needs` the signals it requires in addition to the effect's. `without` names coefficients of the
-    effect that the variant does not have, `only_with` the effects without which the variant cannot be observed. `extra_states`
-    replaces the effect's; None leaves them.
+    effect that the variant does not have. `extra_states` replaces the effect's; None leaves them.
     """
 
     says: str
@@ -87,7 +86,6 @@ class Variant:
     axes: tuple[Axis, ...] = tuple(Axis)
     needs: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
-    only_with: tuple[str, ...] = ()
     extra_states: tuple[str, ...] | None = None
 
 

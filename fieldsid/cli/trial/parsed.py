@@ -27,8 +27,8 @@ class Parsed:
 
 
 def parse(arguments: Sequence[str]) -> Parsed | None:
-    """Return the parsed command line; None where it asks for help or cannot be parsed: running it reports why."""
-    if "--help" in arguments:
+    """Return the parsed command line; None where there is none, it asks for help or cannot be parsed: running it reports why."""
+    if not arguments or "--help" in arguments:
         return None
     program, words, name = program_of(arguments)
     command: Any = typer.main.get_command(program)
