@@ -112,6 +112,20 @@ def run_files(source: ParameterSource, say: Callable[[str], None]) -> list[Named
     return present
 
 
+def readable_runs(source: ParameterSource, say: Callable[[str], None], mapping: ChannelMap | None = None) -> list[Run]:
+    """Return the runs that the model files of a source name and that can still be read; say names the others.
+
+    They are read by a mapping, else each by that of then.
+    """
+    from fieldsid.logs.several.sifting import attempt
+
+    outcomes = {str(log.now): attempt(lambda named: read_again(named, mapping), log) for log in run_files(source, say)}
+    if unreadable := [f"`{path}`" for path, outcome in outcomes.items() if isinstance(outcome, FieldsidError)]:
+        names = ", ".join(unreadable)
+        say(f"runs of the models that cannot be read again: {names}: name them with `--runs`, the turn is fitted to all")
+    return [outcome for outcome in outcomes.values() if not isinstance(outcome, FieldsidError)]
+
+
 def runs_of_models(source: ParameterSource, say: Callable[[str], None]) -> list[Run]:
     """Return the runs that the models of a yaw source were fitted to, where they still exist: they show the speed lost in turns.
 

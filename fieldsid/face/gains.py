@@ -13,18 +13,17 @@ from fieldsid.face.arguments import (
     fin_limit_of,
     fins_of,
     load_user_effects,
-    run_files,
+    readable_runs,
     runs_of_models,
     vehicle_of,
 )
 from fieldsid.face.models import Models, source_of
-from fieldsid.face.runs import Logs, runs_mapped
+from fieldsid.face.runs import Logs, loaded_mapping, runs_mapped
 from fieldsid.face.speeds import speeds_of
 
 if TYPE_CHECKING:
     from fieldsid.logs import ChannelMap, Run
     from fieldsid.plant.laws.axis_laws import Laws
-    from fieldsid.plant.parameter_source import ParameterSource
     from fieldsid.schedule.record import Schedule
     from fieldsid.schedule.verify import Verification
     from fieldsid.turning.prediction import TurnPrediction
@@ -69,22 +68,20 @@ def turn_radius(
 
     load_user_effects()
     source, known = source_of(models, law), vehicle_of(vehicle)
+    if runs is None:
+        fitted: Sequence[Run] = readable_runs(source, _say, loaded_mapping(mapping))
+    else:
+        fitted = runs_mapped(runs, mapping, models=source.paths)
     return radius_over_speed(
         source,
         speeds_of(speeds) or source.knots,
         fin_limit_of(known, source, _say, "rudder") if rudder_max is None else rudder_max,
-        runs=_runs_named(source, mapping) if runs is None else runs_mapped(runs, mapping, models=source.paths),
+        runs=fitted,
         measured=runs_mapped(measured, mapping, models=source.paths),
         method=method,
         fin_zero=fin_zero,
         length=known.length_m,
     )
-
-
-def _runs_named(source: ParameterSource, mapping: ChannelMap | File | None) -> list[Run]:
-    """Return the runs that the models name, each read with the given mapping, else with its former one."""
-    named = run_files(source, _say)
-    return [run for log in named for run in runs_mapped(str(log.now), log.mapping if mapping is None else mapping)]
 
 
 def design_schedule(

@@ -82,7 +82,7 @@ def load(
     """
     files = _tables_of_one_run(logs) if join else []
     importer = Importer(
-        _mapping(mapping),
+        loaded_mapping(mapping),
         tuple(channel),
         None if msg_path is None else Path(msg_path),
         part_between(start, end),
@@ -125,7 +125,8 @@ def runs_mapped(
     """
     behind = mapping_of(Path(model) for model in models if isinstance(model, (str, PathLike)))
     part = part_between(start, end)
-    return runs_of(logs, Reading(Importer(_mapping(mapping), part=part, whole=True, recognise=True, otherwise=_mapping(behind))))
+    chosen, otherwise = loaded_mapping(mapping), loaded_mapping(behind)
+    return runs_of(logs, Reading(Importer(chosen, part=part, whole=True, recognise=True, otherwise=otherwise)))
 
 
 def files_of(name: File, what: str = "log") -> list[Path]:
@@ -173,7 +174,8 @@ def _no_log(item: Any) -> UsageError:
     )
 
 
-def _mapping(mapping: ChannelMap | File | None) -> ChannelMap | None:
+def loaded_mapping(mapping: ChannelMap | File | None) -> ChannelMap | None:
+    """Return a mapping, that of a file, or None for none; raises MappingError."""
     from fieldsid.logs.mapping.mapping_file import load_mapping
 
     return mapping if mapping is None or isinstance(mapping, ChannelMap) else load_mapping(Path(mapping))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from cli import trial
 
+import fieldsid
 from fieldsid.fitting.identify import identify
 from fieldsid.logs import load_run, save_run
 from fieldsid.models.axis import Axis
@@ -148,7 +149,7 @@ def test_turn_radius_goes_on_without_the_circle_and_the_run_it_cannot_use(run_cl
     assert run_cli(*asked, "--measured", good[0]).code == 2
 
 
-def test_a_run_of_a_model_that_cannot_be_read_again_does_not_end_its_turn_radius(run_cli, tmp_path):
+def test_a_run_of_a_model_that_cannot_be_read_again_does_not_end_its_turn_radius(run_cli, tmp_path, caplog):
     log = trial.flown(tmp_path)
     asked = ["identify", log, "--axis", "yaw", "--effects", "servo_lag", "-o", tmp_path, "--no-figures"]
     assert run_cli(*asked).code == 0
@@ -156,4 +157,8 @@ def test_a_run_of_a_model_that_cannot_be_read_again_does_not_end_its_turn_radius
     answer = run_cli("turn-radius", tmp_path / "run7_yaw.yaml", "--rudder-max", 0.3, "--json")
     assert answer.code == 0
     assert json.loads(answer.out)["skipped_runs"] == []
-    assert f"cannot be read again: `{log}`: name them with `--runs`" in answer.err
+    unread = f"cannot be read again: `{log}`: name them with `--runs`"
+    assert unread in answer.err
+    with caplog.at_level("INFO", "fieldsid"):
+        fieldsid.turn_radius(tmp_path / "run7_yaw.yaml", rudder_max=0.3)
+    assert unread in caplog.text

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,7 +19,6 @@ from fieldsid.page import Page, written
 from fieldsid.records.keys import body_of
 
 if TYPE_CHECKING:
-    from fieldsid.logs.run import Run
     from fieldsid.plant.parameter_source import ParameterSource
     from fieldsid.results.turning import TurnRadius
 
@@ -62,9 +61,9 @@ def command(
     """
     from fieldsid.angles import FIN, parse_angle
     from fieldsid.cli.headlines.gains import caveat, headline_of_turn
-    from fieldsid.cli.inputs import models_among, read_runs
+    from fieldsid.cli.inputs import mapping_of, models_among, read_runs
     from fieldsid.cli.user_effects import read_source
-    from fieldsid.face.arguments import fin_limit_of, vehicle_of
+    from fieldsid.face.arguments import fin_limit_of, readable_runs, vehicle_of
     from fieldsid.face.speeds import speeds_of
     from fieldsid.results.turning import TurnRadius
     from fieldsid.turning.radius import turn_radius
@@ -73,12 +72,15 @@ def command(
     given = None if rudder_max is None else parse_angle(rudder_max, "--fin-max", FIN)
     models, known = models_among(models), vehicle_of(vehicle)
     source, skips = read_source(models, law or ()), Skips()
+    fitted, circles = (
+        read_runs(logs, mapping=mapping, models=source.paths, refused=skips.skip) if logs else () for logs in (runs, measured)
+    )
     prediction = turn_radius(
         source,
         speeds_of(speeds) or source.knots,
         fin_limit_of(known, source, say, "rudder") if given is None else given,
-        runs=_runs_to_fit(runs, source, mapping, skips),
-        measured=read_runs(measured, mapping=mapping, models=source.paths, refused=skips.skip) if measured else (),
+        runs=fitted if runs else readable_runs(source, say, mapping_of(mapping)),
+        measured=circles,
         method=method,
         fin_zero=_fin_zero(fin_zero),
         unfit=skips.skip,
@@ -105,24 +107,6 @@ def _fin_zero(text: str) -> float:
         words = "the tolerance of a fin's zero lies in 0 .. 45 deg"
         raise UsageError(words, found=f"--fin-zero {text}", hint="`--fin-zero 0` counts every offset")
     return angle
-
-
-def _runs_to_fit(given: Sequence[Path] | None, source: ParameterSource, mapping: Path | None, skips: Skips) -> Sequence[Run]:
-    """Return the given runs; without them those that the model files name as their inputs, where they can still be read."""
-    from fieldsid.cli.inputs import mapping_of, read_runs
-    from fieldsid.face.arguments import read_again, run_files
-    from fieldsid.logs import Run
-    from fieldsid.logs.several.sifting import attempt
-
-    if given:
-        return read_runs(given, mapping=mapping, models=source.paths, refused=skips.skip)
-    chosen = mapping_of(mapping)
-    outcomes = {log.now: attempt(lambda named: read_again(named, chosen), log) for log in run_files(source, say)}
-    unreadable = [f"`{path}`" for path, outcome in outcomes.items() if not isinstance(outcome, Run)]
-    if unreadable:
-        names = ", ".join(unreadable)
-        say(f"runs of the models that cannot be read again: {names}: name them with `--runs`, the turn is fitted to all")
-    return [outcome for outcome in outcomes.values() if isinstance(outcome, Run)]
 
 
 def _save(result: TurnRadius, folder: Path, source: ParameterSource, *, force: bool) -> None:
