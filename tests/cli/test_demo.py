@@ -14,6 +14,7 @@ from fieldsid.demo.steps import PLAN, STEPS, Step
 from fieldsid.demo.vehicle import SPEED, SPEED_NOISE
 from fieldsid.logs import load_run
 from fieldsid.maneuvers import pick_maneuver
+from fieldsid.planning import request
 from fieldsid.planning.design.leg import commands_of
 from fieldsid.planning.output.plan_file import load_plan
 from fieldsid.rounding import number
@@ -40,16 +41,32 @@ def test_the_tour_is_told_on_one_screen_and_ends_with_the_report(tour, folder):
     assert "servo_lag, probability 0.99" in told
 
 
-def test_briefly_each_command_is_a_line_and_verbosely_all_that_it_says(run_cli, tmp_path, monkeypatch):
+@pytest.fixture
+def planned(folder, monkeypatch):
+    """Let `sysid plan` answer with the tour's own plan: the search for it is nothing that is told here."""
+    plan = load_plan(folder / "plan" / "plan.yaml")
+    monkeypatch.setattr(request, "make_plan", lambda *_asked: plan)
+
+
+def test_briefly_each_command_is_a_line_and_verbosely_all_that_it_says(run_cli, tmp_path, monkeypatch, planned, guide_session):
     few = tuple(s for s in STEPS if s.line.split()[0] in {"inspect", "import"})
     monkeypatch.setattr(steps, "STEPS", few)
     brief = run_cli("demo", "-o", tmp_path / "a")
     assert brief.code == 0
     assert " 3. From log to run: 5 runs: SI and radians, one clock\n" in brief.out
     assert "$ sysid" not in brief.out
-    verbose = run_cli("demo", "-o", tmp_path / "b", "--verbose")
-    assert f"\n3. From log to run\n$ sysid import {tmp_path}/b/trial/*.csv" in verbose.out
-    assert "=> Each log is now a run" in verbose.out
+    verbose = guide_session.run(TOUR)
+    assert "\n3. From log to run\n$ sysid import demo/trial/*.csv" in verbose
+    assert "=> Each log is now a run" in verbose
+
+
+def test_a_quiet_tour_ends_with_its_headline_alone(run_cli, tmp_path, monkeypatch, planned):
+    monkeypatch.setattr(steps, "STEPS", ())
+    answer = run_cli("demo", "-o", tmp_path / "tour", "--quiet")
+    verdict, rests_on, then = answer.out.splitlines()
+    assert verdict.startswith("hidden in the trial was servo_lag")
+    assert rests_on.startswith("rests on ")
+    assert then.startswith("next: sysid ")
 
 
 def results_of(tour, command):

@@ -57,15 +57,6 @@ def test_why_the_exit_code_is_not_0_is_said_however_quiet_it_is(run_cli, tmp_pat
     assert "skipped `" in answer.err
 
 
-def test_a_quiet_tour_ends_with_its_headline_alone(run_cli, tmp_path, monkeypatch):
-    monkeypatch.setattr("fieldsid.demo.steps.STEPS", ())
-    answer = run_cli("demo", "-o", tmp_path / "tour", "--quiet")
-    verdict, rests_on, then = answer.out.splitlines()
-    assert verdict.startswith("hidden in the trial was servo_lag")
-    assert rests_on.startswith("rests on ")
-    assert then.startswith("next: sysid ")
-
-
 def test_a_bar_is_drawn_on_a_terminal_unless_it_is_to_be_quiet():
     on_terminal = Console(force_terminal=True)
     take(["identify"])

@@ -21,6 +21,7 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+from batches import in_this_process
 
 from fieldsid.artifacts import plain
 from fieldsid.cli import progress
@@ -61,7 +62,8 @@ class Session:
     def _ours(self, line: str, words: list[str]) -> str:
         out = StringIO()
         # a line of progress now and then is what a busy machine says
-        with chdir(self.folder), redirect_stdout(out), redirect_stderr(out), patch.object(progress, "LINE_EVERY_S", inf):
+        quietly = patch.object(progress, "LINE_EVERY_S", inf)
+        with chdir(self.folder), redirect_stdout(out), redirect_stderr(out), quietly, in_this_process():
             body = run_command(expanded(words))
         if body is not None:
             self.bodies[line] = json.loads(json.dumps(plain(body), allow_nan=False))
