@@ -176,7 +176,7 @@ def test_gains_and_a_diagnosis_are_said_beside_the_estimate(run_cli, tmp_path):
 
 def test_gains_are_those_of_the_design_once_a_maneuver_has_ended(run_cli, tmp_path):
     run = trial.flown(tmp_path)
-    last = looks(run_cli("live", run, "--axis", "yaw", "--speed", "0", "--json", "--every", "5", "--gains"))[-1]["gains"]
+    last = looks(run_cli("live", run, "--axis", "yaw", "--speed", "0", "--json", "--every", "15", "--gains"))[-1]["gains"]
     log = load_run(run)
     (fit,) = identify([log], Axis.YAW)
     row = gains_of_one(fit.model, last["speed_m_s"], usual(float(np.abs(log["rudder_rad"]).max()), by_rate=True)).row
@@ -190,7 +190,7 @@ def test_gains_of_lines_on_standard_input_are_of_all_that_was_sent(run_cli, tmp_
     rows = zip(log.time, *(log[n] for n in names), strict=True)
     lines = [json.dumps(dict(zip(("time_s", *names, "surge_m_s"), (*row, 1.4), strict=True))) for row in rows]
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO("\n".join(lines).encode())))
-    piped = looks(run_cli("live", "-", "--axis", "yaw", "--json", "--every", "5", "--gains"))[-1]["gains"]
+    piped = looks(run_cli("live", "-", "--axis", "yaw", "--json", "--every", "15", "--gains"))[-1]["gains"]
     assert piped["method"] == "output_error"
     assert piped["time_s"] == pytest.approx(log.time[-1])
 

@@ -30,12 +30,13 @@ NUMBERLESS = {"init", "effects", "history"}
 """Commands that may come to something without a number."""
 TOLD_AS_IT_GOES = {"demo"}
 """Commands whose headline comes at the end of what they tell meanwhile: the tour's own test reads it."""
-SPEEDS = (1.0, 1.4, 1.8)
+SPEEDS = (1.0, 1.4)
 RUNS = " ".join(f"runs/pulses_{s}.parquet" for s in SPEEDS)
+SINGLE = " ".join(f"single/pulses_{s}_yaw.yaml" for s in SPEEDS)
 LAGGED = "models/joint_yaw+servo_lag.yaml"
 LINES = (
     "init pandan",
-    "plan --axis yaw --speeds 1.4 --prior torpedo --no-figures -o plan",
+    "plan --axis yaw --speeds 1.4 --window 22 --prior torpedo --no-figures -o plan",
     "inspect runs/pulses_1.4.parquet",
     f"import {RUNS} -o again",
     "identify runs/pulses_1.4.parquet --axis yaw",
@@ -49,8 +50,8 @@ LINES = (
     f"history {LAGGED}",
     "history models/joint_yaw.yaml",
     f"extend {LAGGED} --undo",
-    "fit single/pulses_1.0_yaw.yaml single/pulses_1.4_yaw.yaml single/pulses_1.8_yaw.yaml -o law_yaw.yaml --no-figures",
-    "turn-radius single/pulses_1.0_yaw.yaml single/pulses_1.4_yaw.yaml single/pulses_1.8_yaw.yaml",
+    f"fit {SINGLE} -o law_yaw.yaml --no-figures",
+    f"turn-radius {SINGLE}",
     f"schedule design {LAGGED} -o gains.yaml",
     "schedule verify gains.yaml",
     "schedule export gains.yaml --to ros2 -o gains_ros2.yaml",

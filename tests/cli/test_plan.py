@@ -11,6 +11,7 @@ import pytest
 from moos_helm import script
 
 from fieldsid.cli.app import main
+from fieldsid.planning import request
 from fieldsid.planning.design.leg import error_in_words
 from fieldsid.planning.output.plan_file import load_plan
 from fieldsid.rounding import number
@@ -41,13 +42,27 @@ def written(limited):
 
 
 @pytest.fixture(scope="module")
-def printed():
-    return said()
+def told():
+    """What is said of one plan in words and as JSON; it is searched for once."""
+    search, found = request.make_plan, []
+
+    def make_plan(*asked):
+        found[:] = found or [search(*asked)]
+        return found[0]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(request, "make_plan", make_plan)
+        return said(), json.loads(said("--json"))
 
 
 @pytest.fixture(scope="module")
-def as_json():
-    return json.loads(said("--json"))
+def printed(told):
+    return told[0]
+
+
+@pytest.fixture(scope="module")
+def as_json(told):
+    return told[1]
 
 
 def test_a_plan_is_printed_with_errors_minutes_metres_and_risk(printed):
@@ -144,7 +159,7 @@ def test_every_leg_is_written_as_fins_in_every_format_rules_and_circles_too(run_
 
 
 def test_what_a_maneuver_does_not_show_is_no_number(run_cli):
-    out = run_cli("plan", "--separate", "current,trim_drift", "--max-heading", "none").out
+    out = run_cli(*QUICK, "--separate", "current,trim_drift", "--max-heading", "none").out
     assert "inf" not in out
     assert "nan" not in out
     assert "heading NOT LIMITED" in out

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 import several_fins as made
@@ -20,6 +22,18 @@ def imported(run_cli, log, folder):
     return load_run(folder / "run.parquet"), inspected.json
 
 
+@pytest.fixture(scope="module")
+def brought(run_shared, tmp_path_factory):
+    """Return a function that gives the folder of a log with its run in it, and the same as `imported`; each once."""
+
+    @cache
+    def once(log):
+        folder = tmp_path_factory.mktemp(log.__name__)
+        return folder, *imported(run_shared, log(folder), folder)
+
+    return once
+
+
 def signs(item):
     return [round(entry["scale"] / abs(item["sum"][0]["scale"])) for entry in item["sum"]]
 
@@ -31,9 +45,9 @@ def evidence(record, signal):
 
 
 @pytest.mark.parametrize("log", LOGS, ids=lambda f: f.__name__)
-def test_the_truth_comes_back_within_a_hundredth(run_cli, tmp_path, log):
-    _, record = imported(run_cli, log(tmp_path), tmp_path)
-    done = run_cli("identify", str(tmp_path / "run.parquet"), "--axis", "yaw", "--no-figures", "--json")
+def test_the_truth_comes_back_within_a_hundredth(run_cli, brought, log):
+    folder, _, record = brought(log)
+    done = run_cli("identify", str(folder / "run.parquet"), "--axis", "yaw", "--no-figures", "--json")
     values = {name: p["value"] for name, p in done.json["fits"][0]["parameters"].items()}
     scale = 1.0
     if log is made.differential_thrust:
@@ -42,8 +56,8 @@ def test_the_truth_comes_back_within_a_hundredth(run_cli, tmp_path, log):
     assert abs(values["b2"]) == pytest.approx(made.B2 / scale, rel=0.01)
 
 
-def test_an_x_tail_is_told_apart_in_both_planes_and_says_why(run_cli, tmp_path):
-    run, record = imported(run_cli, made.x_tail(tmp_path), tmp_path)
+def test_an_x_tail_is_told_apart_in_both_planes_and_says_why(brought):
+    _, run, record = brought(made.x_tail)
     signals = record["mapping"]["signals"]
     assert signs(signals["rudder_rad"]) == [1, 1, -1, -1]
     assert signs(signals["elevator_rad"]) == [1, -1, 1, -1]
@@ -63,8 +77,8 @@ def test_fins_that_only_moved_together_are_said_to(run_cli, tmp_path):
     assert "together only" in evidence(record, "rudder_rad")["message"]
 
 
-def test_thrusters_make_the_yaw_command_and_the_thrust(run_cli, tmp_path):
-    _, record = imported(run_cli, made.differential_thrust(tmp_path), tmp_path)
+def test_thrusters_make_the_yaw_command_and_the_thrust(brought):
+    _, _, record = brought(made.differential_thrust)
     signals = record["mapping"]["signals"]
     assert [(e["column"], np.sign(e["scale"])) for e in signals["rudder_rad"]["sum"]] == [
         ("thruster_port", -1),
@@ -73,8 +87,8 @@ def test_thrusters_make_the_yaw_command_and_the_thrust(run_cli, tmp_path):
     assert [e["scale"] for e in signals["thrust"]["sum"]] == [0.5, 0.5]
 
 
-def test_of_many_outputs_the_one_that_turns_the_vehicle_is_named(run_cli, tmp_path):
-    _, record = imported(run_cli, made.ulog_tables(tmp_path), tmp_path)
+def test_of_many_outputs_the_one_that_turns_the_vehicle_is_named(brought):
+    _, _, record = brought(made.ulog_tables)
     assert record["mapping"]["signals"]["rudder_rad"] == {"topic": "actuator_outputs_0", "field": "output[2]", "unit": "rad"}
 
 

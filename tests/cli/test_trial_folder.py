@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import shlex
+import shutil
 import subprocess
 import sys
+from contextlib import chdir
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -29,15 +31,22 @@ from fieldsid.trial_folder.state import state_of
 BOTH_RUNS = ("runs/pulses_1.0.parquet", "runs/pulses_1.4.parquet")
 
 
-@pytest.fixture
-def folder(run_cli, tmp_path, monkeypatch):
-    """A trial folder with two runs and one log that is no run yet, as the working folder."""
-    monkeypatch.chdir(tmp_path)
-    assert run_cli("init", "pandan").code == 0
-    place = tmp_path / "pandan"
-    monkeypatch.chdir(place)
+@pytest.fixture(scope="module")
+def prepared(run_shared, tmp_path_factory):
+    """A trial folder with two runs."""
+    folder = tmp_path_factory.mktemp("prepared")
+    with chdir(folder):
+        assert run_shared("init", "pandan").code == 0
     for speed in (1.0, 1.4):
-        trial.flown(place / "runs", speed=speed, name=f"pulses_{speed}")
+        trial.flown(folder / "pandan" / "runs", speed=speed, name=f"pulses_{speed}")
+    return folder / "pandan"
+
+
+@pytest.fixture
+def folder(prepared, tmp_path, monkeypatch):
+    """A copy of it as the working folder."""
+    place = shutil.copytree(prepared, tmp_path / "pandan")
+    monkeypatch.chdir(place)
     return place
 
 
@@ -105,6 +114,7 @@ def test_a_command_that_comes_too_early_is_told_what_it_needs_itself(run_cli, fo
     assert "hint: there is no model of the yaw, and no run with a rudder: `sysid status`" in run_cli("turn-radius").err
 
 
+@pytest.mark.usefixtures("batch_here")
 def test_a_batch_that_could_use_nothing_leads_to_its_logs_and_not_to_a_trend(run_cli, folder):
     for run in (folder / "runs").iterdir():
         run.unlink()
@@ -335,7 +345,7 @@ def test_what_was_beyond_a_limit_that_is_corrected_is_no_longer_said(run_cli, fo
     for run in sorted((folder / "runs").iterdir()):
         save_run(load_run(run), folder / "logs" / f"{run.stem}.csv")
     assert "[saturated]" in run_cli("import", "logs/pulses_1.0.csv", "-o", "runs", "--force").err
-    identify = ("identify", "runs/pulses_1.0.parquet", "--axis", "yaw", "--json", "--force")
+    identify = ("identify", "runs/pulses_1.0.parquet", "--axis", "yaw", "--no-figures", "--json", "--force")
 
     def told(*words):
         body = run_cli(*words).json
@@ -366,7 +376,7 @@ def test_turn_radius_takes_the_circles_that_were_flown_and_counts_each_once(run_
     with_track(trial.flown(folder / "runs", spec="turning_circle", name="circle"))
     with_track(folder / "runs/pulses_1.0.parquet")  # a track alone is no circle
     assert run_cli("identify", "--axis", "yaw", "--joint", "--effects", "servo_lag", "--no-figures").code == 0
-    asked = ("turn-radius", "--speeds", "1.4", "--rudder-max", "0.35", "--method", "steady", "--json")
+    asked = ("turn-radius", "--speeds", "1.4", "--rudder-max", "0.35", "--method", "steady", "--no-figures", "--json")
     answer = run_cli(*asked)
     assert "joint_yaw.yaml -o turning --measured runs/circle.parquet\n" in answer.err
     (circle,) = answer.json["measured"]
@@ -387,6 +397,7 @@ def test_live_takes_the_newest_run_and_what_the_plan_of_its_axis_promised(run_cl
     assert "taken from" not in stated.err
 
 
+@pytest.mark.usefixtures("batch_here")
 def test_batch_takes_the_logs_and_the_vehicle(run_cli, folder):
     body = run_cli("batch", "--axis", "yaw", "--no-diagnose", "--workers", "1", "--json")
     assert body.json["runs"] == 2
