@@ -6,7 +6,7 @@ import io
 import json
 import re
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 
@@ -85,9 +85,9 @@ def timeless(text: str) -> str:
     return re.sub(r"[\d.]+ (s|min)\b", "", text)
 
 
-def fly(folder: Path) -> None:
+def fly(folder: Path, speeds: Sequence[float]) -> None:
     hidden = ("servo_lag", {"lag": 0.35})
-    for i, speed in enumerate(SPEEDS):
+    for i, speed in enumerate(speeds):
         trial.flown(folder, speed=speed, seed=i, name=f"pulses_{speed}", hidden=hidden)
     trial.flown(folder, spec="zigzag", speed=1.2, seed=9, name="zigzag", hidden=hidden)
 
@@ -96,7 +96,7 @@ def fly(folder: Path) -> None:
 def said(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, tuple[int, str, str]]]:
     """What every command said, one after the other in one folder."""
     folder = tmp_path_factory.mktemp("voice") / "trial"
-    fly(folder / "runs")
+    fly(folder / "runs", SPEEDS)
     with chdir(folder), in_this_process():
         yield {line: run(line) for line in LINES}
 
@@ -151,7 +151,7 @@ def test_a_warning_comes_after_the_headline_and_not_among_the_data(said):
 @pytest.mark.slow
 def test_a_day_is_pasted_from_one_next_line_to_the_other(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    fly(tmp_path / "logs")
+    fly(tmp_path / "logs", (*SPEEDS, 1.8))
     (tmp_path / "logs" / "zigzag.parquet").unlink()
     line, taken = "inspect logs/pulses_1.4.parquet", []
     while not line.startswith("python"):

@@ -6,7 +6,6 @@ The whole bank of 200 cases is `python tests/benchmarks/hidden_effects.py --case
 
 from __future__ import annotations
 
-import hidden_lag
 import numpy as np
 import pytest
 from truth import maneuvers
@@ -65,16 +64,8 @@ def test_a_single_hidden_effect_is_among_the_first_three_and_its_error_falls(fir
     assert found.final.validation.rate_rms_rad_s <= found.base.validation.rate_rms_rad_s * 1.001
 
 
-def test_nothing_is_named_where_nothing_is_hidden() -> None:
-    training, unseen = hidden_lag.runs(lag=0.0)
-    found = diagnose(training, Axis.YAW, [unseen])
-    assert (found.verdict, found.effects) == ("sufficient", ())
-    assert found.final == found.base
-
-
-@pytest.mark.slow  # the normal suite has a smaller trial
-@pytest.mark.parametrize("first", [0, 10])
-def test_nothing_is_named_in_the_banks_cases_without_an_effect(first: int) -> None:
+@pytest.mark.parametrize("first", [0, pytest.param(10, marks=pytest.mark.slow)])
+def test_nothing_is_named_where_nothing_is_hidden(first: int) -> None:
     found = diagnosed(visible_case("none", first))
     assert found.verdict in ("sufficient", "disturbed")
     assert found.effects == ()
