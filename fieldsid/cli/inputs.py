@@ -71,19 +71,21 @@ def read_groups(
     kept = [sifted(group, islice(outcomes, len(group)), refused) for group in groups]
     used, runs = [path for group in kept for path, _ in group], [run for group in kept for _, run in group]
     refuse_twice(runs, used)
-    _say_how_read(runs, several=len(paths) > 1)
+    say_how_read(runs, several=len(paths) > 1)
     named = iter(_apart(runs, used, paths))
     return [list(islice(named, len(group))) for group in kept]
 
 
-def _say_how_read(runs: Sequence[Run], *, several: bool) -> None:
-    """Print on stderr how logs without a mapping were read."""
+def say_how_read(runs: Sequence[Run], *, several: bool, also: Sequence[str] = ()) -> None:
+    """Print on stderr how logs without a mapping were read; `also` are the codes of other notes on that."""
     from fieldsid.cli.console import say
-    from fieldsid.logs.run import READ_AS
+    from fieldsid.logs.run import READ_AS, READ_WITH
 
     for run in runs:
+        if any(note.code == READ_WITH for note in run.notes):
+            continue
         for note in run.notes:
-            if note.code == READ_AS:
+            if note.code in (READ_AS, *also):
                 say(f"{run.name}: {note.message}" if several else note.message)
 
 

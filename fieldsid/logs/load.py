@@ -48,8 +48,9 @@ def load_run(
     which the log is one. salvage: take what is left of a damaged log. max_gap_s: longest gap allowed in a main signal. part: the
     times in s between which the log is taken and judged. fin_max_rad: fin limits by signal, for the finding of saturation.
     progress: given the share of the log that has been read, now and then. recognise: read a log without a mapping by what
-    `inspect` proposes, where nothing an axis needs is in doubt. otherwise: the mapping of a log without one, whose own names are
-    not enough and that holds every column of it. Raises LogError or MappingError, and DataError where the part is empty.
+    `inspect` proposes, where nothing an axis needs is in doubt; to names of its own that are enough certain ones always come.
+    otherwise: the mapping of a log without one, whose own names are not enough and that holds every column of it. Raises LogError
+    or MappingError, and DataError where the part is empty.
     """
     if str(path) == "-":
         more = {"channels": channels, "salvage": salvage, "max_gap_s": max_gap_s, "part": part, "fin_max_rad": fin_max_rad}
@@ -119,12 +120,13 @@ def map_for(
     complete = chosen_map(None, chosen, channels)
     is_open = mapping is None and not channels and (chosen is None or chosen.origin is None)
     told = frozenset[str]() if complete is None else frozenset(complete.sources)
-    if complete is None or (recognise and is_open and not (is_enough(told) and told >= WANTED)):
+    may_join = is_open and (recognise or is_enough(told))
+    if complete is None or (may_join and not (is_enough(told) and told >= WANTED)):
         from fieldsid.logs.mapping.certain import certain_of
         from fieldsid.logs.mapping.propose import propose
 
         found = reader.inventory(path, options, TableForm())
-        certain = certain_of(propose(found, reader, options)) if recognise and is_open else None
+        certain = certain_of(propose(found, reader, options)) if may_join else None
         mapped = None if certain is None else certain.mapping
         # what a log's own names tell is sure: where that is enough, others join it and replace none of it
         if certain is not None and mapped is not None and (not is_enough(told) or told < mapped.sources.keys()):

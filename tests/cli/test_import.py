@@ -327,3 +327,18 @@ def test_a_log_on_standard_input_is_said_to_be_that(run_cli, log, tmp_path, monk
     told = run_cli("import", "-", "-o", tmp_path / "runs")
     assert told.code == 0
     assert "rests on standard input: SI" in told.out
+
+
+def test_import_reads_what_identify_reads_and_says_what_it_leaves_out(run_cli, tmp_path):
+    time = np.arange(0.0, 30.0, 0.1)
+    columns = [time, 0.1 * np.sin(time), 0.1 * np.cos(time), 0.1 * np.sign(np.sin(time)), 2.9 + 0.02 * np.sin(9.0 * time), time]
+    log = tmp_path / "a.csv"
+    header = "time_s,yaw_rad,yaw_rate_rad_s,rudder_rad,speed_knots,battery_temp"
+    np.savetxt(log, np.column_stack(columns), delimiter=",", header=header, comments="", fmt="%.6g")
+    answer = run_cli("import", log, "-o", tmp_path / "run.parquet")
+    assert answer.code == 0
+    assert "surge from speed_knots (kn)" in answer.err
+    assert "columns that are not used: battery_temp" in answer.err
+    run = load_run(tmp_path / "run.parquet")
+    assert run["surge_m_s"] == pytest.approx(columns[4] * 1852.0 / 3600.0, abs=1e-5)
+    assert run.signals.keys() == load_run(log, recognise=True).signals.keys()

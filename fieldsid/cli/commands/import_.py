@@ -42,7 +42,7 @@ def command(
     """
     from fieldsid.artifacts import check_output
     from fieldsid.cli.console import emit, one_of_each_kind, tracked, warn
-    from fieldsid.cli.inputs import mapping_of, one_run
+    from fieldsid.cli.inputs import mapping_of, one_run, say_how_read
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.cli.voice import voice
     from fieldsid.face.arguments import vehicle_of
@@ -69,6 +69,7 @@ def command(
     outcomes = (attempt(lambda log_and_bar: importer.read(log_and_bar[0], limits, log_and_bar[1]), pair) for pair in shown)
     read = sifted(logs, outcomes, skips.skip) if logs else []
     refuse_twice([run for _, runs in read for run in runs], [log for log, runs in read for _ in runs])
+    say_how_read([run for _, runs in read for run in runs], several=len(logs) > 1, also=("ignored_columns",))
     placed = [pair for log, runs in read for pair in zip(runs, importer.places(targets[log], len(runs)), strict=True)]
     for _, place in placed:
         check_output(place, force=force)
