@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from fieldsid.errors import UsageError
@@ -45,6 +46,7 @@ class Page:
         return f"# {self.title}\n\n```json\n{self.text.rstrip()}\n```\n" if self.path.suffix == ".json" else self.text
 
 
+@cache
 def all_pages() -> dict[str, Page]:
     """Return every page by topic, in the order of reading."""
     found = [page_of(p) for p in GUIDE.rglob("*") if p.suffix in {".md", ".json"}]
@@ -67,12 +69,14 @@ def _sections(text: str) -> dict[str, str]:
     return {name.strip("`"): body for name, body in _SECTION.findall(text)}
 
 
+@cache
 def sections() -> dict[str, Page]:
     """Return what every warning's code and every parameter is about, by its name."""
     pages = [all_pages()[topic] for topic in SECTIONS_OF]
     return {name: Page(f"{page.topic}/{name}", name, page.path, name) for page in pages for name in _sections(page.text)}
 
 
+@cache
 def short_topics() -> set[str]:
     """Return the names that stand for a page by themselves: those of effects and of commands, of codes and parameters."""
     parts = [topic.partition("/") for topic in all_pages()]
