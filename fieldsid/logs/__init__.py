@@ -1,4 +1,4 @@
-"""Logs: a file becomes a Run, clean, in SI and radians, NED and forward-starboard-down, on one clock."""
+"""Log files: reading them as a Run, in SI units and radians, in NED and forward-starboard-down axes, on one clock."""
 
 from fieldsid.logs.channels import ChannelMap, Source
 from fieldsid.logs.load import load_run

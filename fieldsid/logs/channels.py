@@ -1,4 +1,4 @@
-"""Which column or topic of a log is which signal, as plain records: what a mapping says, however it came to be."""
+"""Records that state which column or topic of a log is which signal: the content of a mapping, from a file or from code."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from fieldsid.logs.convert.frames import Frame
 
 Stamp = Literal["header", "receive"]
 ATTITUDE = "attitude"
-"""Not a signal but three: a quaternion mapped to it gives yaw, pitch and roll."""
+"""Name for a quaternion in a mapping; it gives three signals: yaw, pitch and roll."""
 POSITION = "position"
-"""Two signals: latitude and longitude mapped to it give x and y, in m north and east of the first fix."""
+"""Name for latitude and longitude in a mapping; they give x and y, in m north and east of the first fix."""
 COMBINED = (ATTITUDE, POSITION)
 ANGLES = ("yaw_rad", "pitch_rad", "roll_rad")
 
 
 AXES = ((("yaw_rad", "yaw_rate_rad_s"), ("rudder_rad", "rudder_measured_rad")),
         (("pitch_rad", "pitch_rate_rad_s"), ("elevator_rad", "elevator_measured_rad")))  # fmt: skip
-"""What each axis needs: one of its motion, and one of its fins."""
+"""The signals of each axis, motion and fin: identification needs at least one of each."""
 
 
 def is_enough(signals: Iterable[str]) -> bool:
-    """Whether some signals are all that one axis needs."""
+    """Return whether the signals include a motion and a fin of at least one axis."""
     known = set(signals)
     known |= set(ANGLES) if ATTITUDE in known else set()
     return any(known & set(motion) and known & set(fins) for motion, fins in AXES)
@@ -34,14 +34,14 @@ def is_enough(signals: Iterable[str]) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Where one signal comes from: a column (name, or index from 0), four columns of a quaternion, or a topic's field.
+    """The source of one signal: a column (name, or index from 0), four columns of a quaternion, or a topic's field.
 
-    value = sign x (number in its unit, as SI), turned into our frames, + offset in SI. `stamp` None means the header's where
-    the message has one. `unit` None means what the column's name or the message type says, else SI. Where the unit is
-    `counts`, `centre` is their number at zero, and `scale` the rad that one is worth; for an entry of a sum `scale` is what its
-    number is worth in the sum, of either sign. A time may be put together from several columns, whose parts the unit names.
-    `date` and `week` are the columns of a time's days, where the time is a clock, and of its GPS weeks; the `scale` of a time
-    that counts samples is the s of one.
+    value = sign x (number converted to SI), rotated into NED and FRD, + offset in SI. `stamp` None means the header's stamp where
+    the message has one. `unit` None means the unit that the column's name or the message type states, else SI. Where the unit is
+    `counts`, `centre` is the count at zero angle and `scale` the angle in rad of one count; for an entry of a sum, `scale` is its
+    factor in the sum, of either sign. A time may be composed of several columns; `unit` then names their parts. `date` holds the
+    columns of the date where the time is a time of day, `week` the column of the GPS week; for a time that counts samples,
+    `scale` is the sampling interval in s.
     """
 
     column: str | int | None = None
@@ -61,12 +61,12 @@ class Source:
 
     @property
     def places(self) -> tuple[str | int, ...]:
-        """Every column that is read."""
+        """Every column that the source reads."""
         return tuple(c for c in (self.column, *self.columns, *self.date, self.week) if c is not None)
 
     @property
     def counts_rows(self) -> bool:
-        """Whether this is a time without a column: the rows themselves, so many a second."""
+        """Whether this is a time without a column: the rows are counted, at a constant rate."""
         return self.scale is not None and not self.places and self.topic is None
 
     @property
@@ -79,7 +79,7 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class TableForm:
-    """How a text table is written; None where it is to be found out."""
+    """The format of a text table; None where the reader detects it."""
 
     separator: str | None = None
     header: bool | None = None
@@ -90,7 +90,7 @@ class TableForm:
 
 @dataclass(frozen=True, slots=True)
 class Pressure:
-    """What turns pressure into depth: density in kg/m^3 and the pressure at the surface in Pa (0 for a gauge)."""
+    """The constants that convert pressure to depth: density in kg/m^3, and pressure at the surface in Pa (0 for a gauge)."""
 
     density: float = 1025.0
     surface_pa: float = 101325.0
@@ -100,7 +100,8 @@ class Pressure:
 class ChannelMap:
     """The whole mapping of a log: sources by canonical signal, the time column of a table, frames, clocks, depth.
 
-    A signal that is the sum of several sources has one for each, as `rudder_rad[0]` and `rudder_rad[1]`: see `signal_of`.
+    A signal that is the sum of several sources has one entry for each, such as `rudder_rad[0]` and `rudder_rad[1]`; see
+    `signal_of`.
     """
 
     sources: Mapping[str, Source]
@@ -118,5 +119,5 @@ class ChannelMap:
 
     @property
     def place(self) -> str:
-        """Where the mapping stands, for messages."""
+        """The file of the mapping, for messages."""
         return f"`{self.origin}`" if self.origin else "the mapping"

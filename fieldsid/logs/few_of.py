@@ -1,4 +1,4 @@
-"""Names in a message: of many only the first are said."""
+"""Lists of names in messages, cut after the first few."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ SHOWN = 12
 
 
 def few_of(names: Sequence[str]) -> str:
-    """Return names in a row, of many the first few."""
+    """Return the names joined by commas, at most the first SHOWN of them."""
     return ", ".join(names[:SHOWN]) + ", ..." * (len(names) > SHOWN)

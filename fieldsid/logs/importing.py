@@ -1,4 +1,4 @@
-"""`sysid import` as functions: where each run goes, reading it, and writing it with its notes."""
+"""`sysid import` as functions: choose the output file of each run, read the run, and write it with its notes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FORMATS = {"parquet": ".parquet", "csv": ".csv", "csv.gz": ".csv.gz"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Imported:
-    """A run that was written, and where."""
+    """A run that was written, and its file."""
 
     run: Run
     name: Annotated[str, Key("Its name.", "run")]
@@ -49,7 +49,10 @@ class Imported:
 
 
 def runs_under_way(load: Callable[[tuple[float, float], float], Run], max_gap_s: float) -> list[Run]:
-    """Return the stretches of a log under way as runs; load reads a part in s with the longest gap allowed in s."""
+    """Return the stretches of a log in which the vehicle is under way, as runs.
+
+    `load` reads the part of the log between two times in s, with the longest gap allowed in s.
+    """
     run = load(WHOLE, np.inf)
     stretches, notes = stretches_of(run)
     if not notes:
@@ -59,9 +62,9 @@ def runs_under_way(load: Callable[[tuple[float, float], float], Run], max_gap_s:
 
 @dataclass(frozen=True, slots=True)
 class Importer:
-    """The choices of one import, the same for all its logs; `joined` are the other tables of a run of which the log is one.
+    """The options of one import, the same for all its logs; `joined` are the other tables where a run consists of several tables.
 
-    `otherwise` is the mapping of a log without one, see `load_run`.
+    `otherwise` is the mapping for a log that has none of its own; see `load_run`.
     """
 
     mapping: ChannelMap | None = None
@@ -76,9 +79,9 @@ class Importer:
     otherwise: ChannelMap | None = None
 
     def targets(self, logs: Sequence[Path], output: Path, form: str, *, force: bool = False) -> list[Path]:
-        """Return the file each log becomes; raises before anything is read what would be the same for all logs.
+        """Return the output file of each log; raise, before any log is read, the errors that concern all logs.
 
-        Raises UsageError and ArtifactError for a file that cannot be written, MappingError for a channel that is none.
+        Raises UsageError and ArtifactError for a file that cannot be written, MappingError for a channel that is not valid.
         """
         self._sources()
         if form not in FORMATS:
@@ -100,13 +103,13 @@ class Importer:
     def read(
         self, log: Path, fin_max_rad: Mapping[str, float] | None = None, progress: Callable[[float], None] | None = None
     ) -> list[Run]:
-        """Return the runs of one log: its stretches under way, each judged by itself, or what `part` or `whole` ask for."""
+        """Return the runs of one log: its stretches under way, each examined separately, or what `part` or `whole` select."""
         if self.whole or self.part != WHOLE:
             return [self._load(log, fin_max_rad, progress, self.part, self.max_gap_s)]
         return runs_under_way(lambda part, gap: self._load(log, fin_max_rad, progress, part, gap), self.max_gap_s)
 
     def places(self, target: Path, count: int) -> list[Path]:
-        """Return the file of each run of a log: the log's own, and where it has several stretches their numbers behind it."""
+        """Return the output file of each of `count` runs of a log: the target, with a number appended where there are several."""
         suffix = next(s for s in SUFFIXES if target.name.endswith(s))
         stem = target.name.removesuffix(suffix)
         return [target] if count == 1 else [target.with_name(f"{stem}_{i + 1}{suffix}") for i in range(count)]

@@ -32,14 +32,14 @@ _TOPIC_EXAMPLE = (
 )
 NO_TIME = "# No column is a time; say how many rows there are a second:\n# time: {rate: 10}\n"
 SHORT = 120
-"""Letters up to which a finding tells what was found beside what is wrong."""
+"""Largest number of letters of what was found that a note repeats after the statement of the problem."""
 _PLAIN = re.compile(r"^[A-Za-z/_][\w/.]*$")
 _RESERVED = frozenset({"y", "n", "yes", "no", "on", "off", "true", "false", "null"})
 
 
 @dataclass(frozen=True, slots=True)
 class ShownChannel:
-    """A channel as the page shows it."""
+    """One line of the table of channels that the command prints."""
 
     name: Annotated[str, Key("Its name.")]
     type: Annotated[str, Key("Its type.")] = ""
@@ -50,7 +50,7 @@ class ShownChannel:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Inspection(Brief):
-    """What a log holds, the mapping proposed for it, the Run that gives (None when it gives none), and the findings."""
+    """The inventory of a log, the mapping proposed for it, the Run read with it (None where that fails), and the findings."""
 
     inventory: Inventory
     proposal: Proposal
@@ -81,7 +81,7 @@ def inspect_log(
     joined: Sequence[Path] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Inspection:
-    """Return what is in a log, or in a run of several tables; `progress` is given the share that has been looked through.
+    """Return what is in a log, or in a run of several tables; `progress` is called with the share that has been read.
 
     Raises LogError when it cannot be read at all, MappingError for a mapping that does not fit.
     """
@@ -94,11 +94,13 @@ def inspect_log(
     options = replace(options, progress=progress or options.progress)
     inventory = reader.inventory(path, options, TableForm() if given is None else given.table)
     proposal = propose(inventory, reader, options)
-    own = reader.own_map(path, options)
-    looked, more = len(inventory.channels), inventory.more
-    many = f"{looked + more} channels: the first {looked} by name were looked into for signals, {more} were not"
+    own_map_found = reader.own_map(path, options)
+    inspected, more = len(inventory.channels), inventory.more
+    many = f"{inspected + more} channels: the first {inspected} by name were looked into for signals, {more} were not"
     notes_of_size = [Note("many_channels", many, {"more": more})] if more else []
-    needs_none = own is not None and not {s for s in proposal.body["signals"] if s in MAIN} - own.sources.keys()
+    needs_none = (
+        own_map_found is not None and not {s for s in proposal.body["signals"] if s in MAIN} - own_map_found.sources.keys()
+    )
     run = proposal.run
     if mapping is not None or needs_none:
         run = load_run(path, mapping, msg_path=msg_path, joined=joined, salvage=True, max_gap_s=math.inf)
@@ -106,20 +108,20 @@ def inspect_log(
     notes = [*notes_of_size, *inventory.notes, *proposed, *(() if run is None else run.notes)]
     if proposal.problem is not None and run is None:
         what, found, hint = proposal.problem.what, proposal.problem.found, proposal.problem.hint
-        said = f"{what} ({found})" if len(found) <= SHORT else what
-        notes.append(Note("not_importable", f"{said}: {hint}" if hint else said, {"found": found, "hint": hint}))
+        problem_text = f"{what} ({found})" if len(found) <= SHORT else what
+        notes.append(Note("not_importable", f"{problem_text}: {hint}" if hint else problem_text, {"found": found, "hint": hint}))
     if not proposal.body["signals"] and run is None:
         notes.append(Note("nothing_recognised", "no name says what its numbers are: fill in `signals` in the mapping", {}))
     if not (set(FINS) & {*proposal.body["signals"], *(() if run is None else run.signals)} or joined):
         notes += tables_beside(path)
     chosen = given or (None if needs_none or run is None else mapping_of(proposal.body))
-    way = WayIn() if run is None else way_in(path, run, notes, Importer(chosen, msg_path=msg_path, joined=tuple(joined)))
-    if way.refusal is not None:
-        what, found, hint = way.refusal.what, way.refusal.found, way.refusal.hint
-        advice = f"import it with `{' '.join(way.options)}`" if way.options else hint
+    import_way = WayIn() if run is None else way_in(path, run, notes, Importer(chosen, msg_path=msg_path, joined=tuple(joined)))
+    if import_way.refusal is not None:
+        what, found, hint = import_way.refusal.what, import_way.refusal.found, import_way.refusal.hint
+        advice = f"import it with `{' '.join(import_way.options)}`" if import_way.options else hint
         notes.append(Note("refused", f"refused as it is: {what} ({found}); {advice}", {"found": found, "hint": hint}))
     distinct = {(n.code, n.message): n for n in notes if n.code != "ignored_columns"}
-    return Inspection(inventory, proposal, run, tuple(distinct.values()), needs_none, way, tuple(joined))
+    return Inspection(inventory, proposal, run, tuple(distinct.values()), needs_none, import_way, tuple(joined))
 
 
 def write_proposal(found: Inspection, path: Path, *, force: bool = False) -> Path:
@@ -134,7 +136,7 @@ def write_proposal(found: Inspection, path: Path, *, force: bool = False) -> Pat
 
 
 def _line(item: dict[str, Any]) -> str:
-    """Return one signal's source on one line of YAML; a name that YAML could take for something else is quoted."""
+    """Return one signal's source on one line of YAML; a name that YAML would parse as another type is quoted."""
     return "{" + ", ".join(f"{key}: {_scalar(value)}" for key, value in item.items()) + "}"
 
 
@@ -152,7 +154,7 @@ def _scalar(value: Any) -> str:
 
 
 def shown_channels(channel: ChannelInfo) -> Iterator[ShownChannel]:
-    """Yield the line of a column or a topic, and one for each of its fields where it has several."""
+    """Yield the line of a column or a topic, and one line for each field where it has several."""
     rate = f"{channel.rate_hz:.4g}" if math.isfinite(channel.rate_hz) else "-"
     fields = [f for f in channel.fields if "covariance" not in f.path and not f.path.startswith("header.")]
     holds = _range(fields[0]) if len(fields) == 1 else ""
@@ -164,7 +166,7 @@ def shown_channels(channel: ChannelInfo) -> Iterator[ShownChannel]:
 
 
 def _range(info: FieldInfo) -> str:
-    """Return the least and the largest of a number, its first values where there are none."""
+    """Return the smallest and largest value of a field, or its first values where it is not a number."""
     return ", ".join(map(_short, info.first)) if info.span is None else " .. ".join(map(_short, info.span))
 
 
@@ -173,29 +175,30 @@ def _short(value: Any) -> str:
 
 
 LEFT_OUT = frozenset({"truncated", "bad_rows", "not_a_number", "no_time", "time_order"})
-"""Codes of what a reading that takes all it can get has left out."""
+"""Codes of the notes on samples that a reading with salvage left out."""
 
 
 @dataclass(frozen=True, slots=True)
 class WayIn:
-    """The options with which a log is imported, none where it is as it is; and why a plain import is refused."""
+    """The options that an import of the log needs (none where a plain import succeeds), and the error of a plain import."""
 
     options: tuple[str, ...] = ()
     refusal: FieldsidError | None = None
 
 
 def way_in(path: Path, run: Run, notes: Iterable[Note], plain: Importer) -> WayIn:
-    """Return how a log is imported of which `run` is all that could be read, with `notes` on it: the first way it is not refused.
+    """Return the first combination of import options under which a log is not refused.
 
-    A log of which nothing was left out, and that has no long gap, is not read again: nothing of it is refused.
+    `run` holds all that could be read of the log, and `notes` are the notes on it. A log of which nothing was left out, and that
+    has no long gap, is not read again: a plain import accepts it.
     """
     notes = list(notes)
     longest = max((g.length_s for s in MAIN if run.has(s) for g in gaps_in(run.time, run[s])), default=0.0)
     if longest <= MAX_GAP_S and not any(n.code in LEFT_OUT for n in notes):
         return WayIn()
     refusal: FieldsidError | None = None
-    is_worth = _left(notes) >= WORTH_SALVAGING
-    for options, importer in _ways(plain, round(longest + 0.1, 1), salvaging=is_worth):
+    is_worth_salvaging = _share_kept(notes) >= WORTH_SALVAGING
+    for options, importer in _importers(plain, round(longest + 0.1, 1), salvaging=is_worth_salvaging):
         try:
             importer.read(path)
         except FieldsidError as error:
@@ -205,13 +208,13 @@ def way_in(path: Path, run: Run, notes: Iterable[Note], plain: Importer) -> WayI
     return WayIn((), refusal)
 
 
-def _left(notes: Iterable[Note]) -> float:
-    """Return the least share of the log's samples that a reading kept whose time repeats or goes back."""
+def _share_kept(notes: Iterable[Note]) -> float:
+    """Return the smallest share of samples that was kept where the time repeats or goes back; 1 where it does neither."""
     return min((1.0 - n.data["dropped"] / n.data["of"] for n in notes if n.code == "time_order"), default=1.0)
 
 
-def _ways(plain: Importer, gap_s: float, *, salvaging: bool) -> Iterator[tuple[tuple[str, ...], Importer]]:
+def _importers(plain: Importer, gap_s: float, *, salvaging: bool) -> Iterator[tuple[tuple[str, ...], Importer]]:
     for salvage in (False, True) if salvaging else (False,):
-        asked = ("--salvage",) if salvage else ()
-        yield asked, replace(plain, salvage=salvage)
-        yield (*asked, "--max-gap", f"{gap_s:g}"), replace(plain, salvage=salvage, max_gap_s=gap_s)
+        salvage_option = ("--salvage",) if salvage else ()
+        yield salvage_option, replace(plain, salvage=salvage)
+        yield (*salvage_option, "--max-gap", f"{gap_s:g}"), replace(plain, salvage=salvage, max_gap_s=gap_s)

@@ -1,4 +1,4 @@
-"""Any log file becomes a Run: every command that takes a run calls `load_run`."""
+"""Reading any log file as a Run: every command that takes a run calls `load_run`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from fieldsid.records.reading import read_yaml
 
 MAPPING_FILE = "mapping.yaml"
 WANTED = frozenset({"yaw_rad", "yaw_rate_rad_s", "surge_m_s"})
-"""Signals that are looked for under other names too, where a log's own names give what an axis needs without them."""
+"""Signals that are sought under other names as well, where the canonical names in a log suffice for an axis without them."""
 
 
 def load_run(
@@ -44,13 +44,14 @@ def load_run(
     """Read a log file or bag folder as a Run, with the doctor's findings as notes; `-` reads standard input.
 
     mapping: a ChannelMap or a mapping.yaml. Without one: the canonical column names, else `mapping.yaml` in the
-    working folder, else in the log's. channels: sources that count more than the mapping's. joined: the other tables of a run of
-    which the log is one. salvage: take what is left of a damaged log. max_gap_s: longest gap allowed in a main signal. part: the
-    times in s between which the log is taken and judged. fin_max_rad: fin limits by signal, for the finding of saturation.
-    progress: given the share of the log that has been read, now and then. recognise: read a log without a mapping by what
-    `inspect` proposes, where nothing an axis needs is in doubt; to names of its own that are enough certain ones always come.
-    otherwise: the mapping of a log without one, whose own names are not enough and that holds every column of it. Raises LogError
-    or MappingError, and DataError where the part is empty.
+    working folder, else in the folder of the log. channels: sources that override those of the mapping. joined: the other tables
+    where a run consists of several tables. salvage: read what is readable of a damaged log. max_gap_s: longest gap allowed in a
+    main signal. part: the times in s between which the log is read and examined. fin_max_rad: fin limits by signal, for the
+    finding of saturation. progress: called repeatedly with the share of the log that has been read. recognise: read a log without
+    a mapping by what `inspect` proposes, where nothing that an axis needs is in doubt; where the canonical names in the log
+    suffice for an axis, certain proposals are added to them in any case. otherwise: the mapping for a log without one, used where
+    the canonical names do not suffice and the log holds every column of that mapping. Raises LogError or MappingError, and
+    DataError where the part is empty.
     """
     if str(path) == "-":
         more = {"channels": channels, "salvage": salvage, "max_gap_s": max_gap_s, "part": part, "fin_max_rad": fin_max_rad}
@@ -63,20 +64,23 @@ def load_run(
     raw = reader.read(path, chosen, options)
     run = assemble(raw, chosen, path, options, part=part, max_gap_s=max_gap_s)
     if raw.finished:
-        return _judged_anew(run, fin_max_rad or {})
+        return _examined_again(run, fin_max_rad or {})
     return judged(replace(run, notes=(*notes, *run.notes)), raw, chosen, fin_max_rad)
 
 
 def judged(run: Run, raw: RawLog, mapping: ChannelMap, fin_max_rad: Mapping[str, float] | None = None) -> Run:
-    """Return a run, as it was read with a mapping, with the doctor's findings behind its notes."""
+    """Return a run that was read with a mapping, with the doctor's findings appended to its notes."""
     from fieldsid.logs.doctor.examine import examine
     from fieldsid.logs.doctor.stated import stated_by
 
     return replace(run, notes=(*run.notes, *examine(run, fin_max_rad, stated_by(mapping, raw))))
 
 
-def _judged_anew(run: Run, fin_max_rad: Mapping[str, float]) -> Run:
-    """Return an imported run with what was found then, but for what hangs on fin limits: they may have been corrected since."""
+def _examined_again(run: Run, fin_max_rad: Mapping[str, float]) -> Run:
+    """Return an imported run with the notes of its import, except those that depend on fin limits, which are examined again.
+
+    The fin limits may have been corrected since the import.
+    """
     kept = tuple(n for n in run.notes if n.code not in OF_LIMITS)
     if not fin_max_rad:
         return replace(run, notes=kept)
@@ -86,7 +90,7 @@ def _judged_anew(run: Run, fin_max_rad: Mapping[str, float]) -> Run:
 
 
 def _command(path: Path, mapping: ChannelMap, channels: Mapping[str, Source], options: ReadOptions) -> str:
-    """Return the command that imports a log as it is read here."""
+    """Return the command that imports a log with the options of this reading."""
     words = ["sysid", "import", *(["--join"] if options.joined else []), str(path), *map(str, options.joined)]
     words += ["--mapping", str(mapping.origin)] if mapping.origin else []
     for signal, source in channels.items():
@@ -105,76 +109,80 @@ def map_for(
     recognise: bool = False,
     otherwise: ChannelMap | Path | None = None,
 ) -> tuple[ChannelMap, list[Note]]:
-    """Return the mapping a log is read with, and a note where a file was picked up, or the log recognised.
+    """Return the mapping with which a log is read, and a note where a mapping file was found or the log was recognised.
 
-    Raises MappingError when there is none.
+    Raises MappingError where there is no mapping.
     """
     notes: list[Note] = []
-    chosen = _loaded(mapping) if mapping is not None else reader.own_map(path, options)
+    chosen = _as_channel_map(mapping) if mapping is not None else reader.own_map(path, options)
     if chosen is None:
         file = next((f for f in (Path(MAPPING_FILE), path.parent / MAPPING_FILE) if f.is_file() and maps_anything(f)), None)
-        chosen = None if file is None else _loaded(file)
+        chosen = None if file is None else _as_channel_map(file)
     if mapping is None and otherwise is not None and (chosen is None or not is_enough(chosen.sources)):
-        named = _loaded(otherwise)
-        chosen = named if _is_in(named, reader.inventory(path, options, named.table)) else chosen
+        named = _as_channel_map(otherwise)
+        chosen = named if _covers(named, reader.inventory(path, options, named.table)) else chosen
     complete = chosen_map(None, chosen, channels)
     is_open = mapping is None and not channels and (chosen is None or chosen.origin is None)
-    told = frozenset[str]() if complete is None else frozenset(complete.sources)
-    may_join = is_open and (recognise or is_enough(told))
-    if complete is None or (may_join and not (is_enough(told) and told >= WANTED)):
+    mapped_signals = frozenset[str]() if complete is None else frozenset(complete.sources)
+    may_join = is_open and (recognise or is_enough(mapped_signals))
+    if complete is None or (may_join and not (is_enough(mapped_signals) and mapped_signals >= WANTED)):
         from fieldsid.logs.mapping.certain import certain_of
         from fieldsid.logs.mapping.propose import propose
 
         found = reader.inventory(path, options, TableForm())
         certain = certain_of(propose(found, reader, options)) if may_join else None
         mapped = None if certain is None else certain.mapping
-        # what a log's own names tell is sure: where that is enough, others join it and replace none of it
-        if certain is not None and mapped is not None and (not is_enough(told) or told < mapped.sources.keys()):
+        # signals with canonical names are certain: where they suffice, proposed ones are added and replace none of them
+        if (
+            certain is not None
+            and mapped is not None
+            and (not is_enough(mapped_signals) or mapped_signals < mapped.sources.keys())
+        ):
             return mapped, list(certain.notes)
         if complete is None:
-            raise _unmapped(path, reader, options, found, {} if certain is None else certain.doubts)
+            raise _no_mapping_error(path, reader, options, found, {} if certain is None else certain.doubts)
     if complete.origin is not None:
         notes.append(Note(READ_WITH, f"read with `{complete.origin}`", {"path": str(complete.origin)}))
     return complete, notes
 
 
 def chosen_map(mapping: ChannelMap | Path | None, own: ChannelMap | None, channels: Mapping[str, Source]) -> ChannelMap | None:
-    """Return a mapping, a log's own without one, with single channels that count more; None where nothing maps anything."""
-    base = own if mapping is None else _loaded(mapping)
+    """Return the mapping, else that of the log's own names, overridden by single channels; None where all are missing."""
+    base = own if mapping is None else _as_channel_map(mapping)
     if base is None and not channels:
         return None
     base = base or ChannelMap({})
     sources = {s: c for s, c in channels.items() if s != TIME}
-    lines = {line for fin in sources for line in STEP_LINES.get(fin, ())}  # those of the column that another one stands for now
+    lines = {line for fin in sources for line in STEP_LINES.get(fin, ())}  # the step lines of a fin whose column is replaced
     kept = {s: c for s, c in base.sources.items() if s not in lines and signal_of(s) not in sources}
     return replace(base, sources={**kept, **sources}, time=channels.get(TIME, base.time))
 
 
 def maps_anything(mapping: Path) -> bool:
-    """Whether a mapping has a line for any signal: what `sysid init` writes, to be filled in, has none and says nothing."""
+    """Whether a mapping has a line for any signal; the template that `sysid init` writes has none."""
     return bool(read_yaml(mapping).get("signals", True))
 
 
 def needs_mapping(log: Path) -> bool:
-    """Whether a log's own names do not give what an axis needs; raises LogError."""
+    """Whether the canonical names in a log do not suffice for an axis; raises LogError."""
     own = reader_of(log).own_map(log, ReadOptions())
     return own is None or not is_enough(own.sources)
 
 
 def to_map(log: Path, joined: Sequence[Path] = ()) -> str:
-    """Return the command that writes a first mapping of a log, in place of one that maps nothing."""
+    """Return the command that writes a first mapping of a log; it overwrites a mapping file that exists."""
     words = ["sysid", "inspect", *(["--join"] if joined else []), str(log), *map(str, joined), "--write-mapping", MAPPING_FILE]
     return shlex.join([*words, *(["--force"] if Path(MAPPING_FILE).is_file() else [])])
 
 
-def _is_in(mapping: ChannelMap, found: Inventory) -> bool:
-    """Return whether a log holds every column and topic that a mapping names."""
+def _covers(mapping: ChannelMap, found: Inventory) -> bool:
+    """Return whether a log contains every column and topic that a mapping names."""
     sources = [*mapping.sources.values(), *([] if mapping.time is None else [mapping.time])]
     named = {str(place) for s in sources for place in (s.places if s.topic is None else (s.topic,))}
     return named <= {c.name for c in found.channels}
 
 
-def _loaded(mapping: ChannelMap | Path) -> ChannelMap:
+def _as_channel_map(mapping: ChannelMap | Path) -> ChannelMap:
     if isinstance(mapping, ChannelMap):
         return mapping
     from fieldsid.logs.mapping.mapping_file import load_mapping
@@ -182,7 +190,7 @@ def _loaded(mapping: ChannelMap | Path) -> ChannelMap:
     return load_mapping(mapping)
 
 
-def _unmapped(
+def _no_mapping_error(
     path: Path, reader: Reader, options: ReadOptions, found: Inventory, doubts: Mapping[str, str]
 ) -> MappingError:  # fmt: skip
     from fieldsid.logs.readers._tables_of_run import tables_beside
@@ -200,23 +208,23 @@ def _unmapped(
     if found.no_clock is not None:
         reason = found.no_clock[1]
         return MappingError(f"`{path}` has no clock: {reason.what}", found=reason.found, hint=f"{reason.hint}; {hint}")
-    lacking = _lacking(proposed)
-    if lacking:
-        what = f"no column of numbers in `{path}` is known by its name as {' or '.join(lacking)}"
+    missing = _missing_kinds(proposed)
+    if missing:
+        what = f"no column of numbers in `{path}` is known by its name as {' or '.join(missing)}"
     else:
         what = f"`{path}` needs a mapping: not all of its columns have the names of signals"
     return MappingError(what, found=f"columns {shown}", hint=hint)
 
 
-def _lacking(signals: Collection[str]) -> list[str]:
-    """Return in words what a run needs and none of some signals is."""
+def _missing_kinds(signals: Collection[str]) -> list[str]:
+    """Return, in words, the kinds of signal that a run needs and that are missing among the signals."""
     motions, fins = ({s for axis in AXES for s in axis[i]} for i in range(2))
     kinds = ("time", {TIME}), ("the vehicle's angle or rate", motions | {ATTITUDE}), ("a fin's angle", fins)
     return [words for words, any_of in kinds if not any_of & set(signals)]
 
 
 def _near_names(found: Inventory) -> tuple[str, Collection[str]]:
-    """Say which signals columns that are none by their names probably are, as `sysid inspect` does; and return all proposed."""
+    """Return, in words, which signals the columns without canonical names probably are, and all signals that are proposed."""
     from fieldsid.logs.mapping.draft import draft_of, place_of
 
     body = draft_of(found).body

@@ -1,4 +1,4 @@
-"""A pandas table becomes a Run, by the same names, units and findings as a file with these columns."""
+"""Reading a pandas table as a Run, with the same names, units and findings as a file with these columns."""
 
 from __future__ import annotations
 
@@ -42,33 +42,35 @@ def run_of_frame(
 ) -> Run:
     """Return the Run of a table with one row per sample; arguments as those of `load_run`.
 
-    The time is a column or the index: numbers, date and time, or a time difference. name: that of the run, without one what
-    `Run.to_frame` called it, else "table". Raises MappingError and LogError.
+    The time is a column or the index: numbers, date and time, or a time difference. name: the name of the run; without it the
+    name that `Run.to_frame` stored, else "table". Raises MappingError and LogError.
     """
-    called = name or str(frame.attrs.get("name", "")) or NAME
-    table, place = _with_time(frame), Path(called)
+    run_name = name or str(frame.attrs.get("name", "")) or NAME
+    table, place = _with_time_column(frame), Path(run_name)
     names = tuple(map(str, table.columns))
     try:
-        chosen = _map(called, names, mapping, channels or {})
+        chosen = _chosen_map(run_name, names, mapping, channels or {})
         columns = Columns(place, names, len(names), lambda i: _cells(table.iloc[:, i]))
         options = ReadOptions(None, salvage)
         raw = series_of(place, columns, chosen, (), options)
         run = assemble(raw, chosen, place, options, part=part, max_gap_s=max_gap_s)
     except (LogError, MappingError) as error:  # the readers' own hints name commands that take files
         raise type(error)(error.what, found=error.found, hint=_HINT) from error
-    return judged(replace(run, name=called, source=None), raw, chosen, fin_max_rad)
+    return judged(replace(run, name=run_name, source=None), raw, chosen, fin_max_rad)
 
 
-def _map(called: str, names: tuple[str, ...], mapping: ChannelMap | Path | None, channels: Mapping[str, Source]) -> ChannelMap:
+def _chosen_map(
+    run_name: str, names: tuple[str, ...], mapping: ChannelMap | Path | None, channels: Mapping[str, Source]
+) -> ChannelMap:
     chosen = chosen_map(mapping, own_map_of(names), channels)
     if chosen is None:
-        what = f"`{called}` has no time and signal that are known by their names"
+        what = f"`{run_name}` has no time and signal that are known by their names"
         raise MappingError(what, found=", ".join(names) or "no columns")
     return chosen
 
 
-def _with_time(frame: DataFrame) -> DataFrame:
-    """Return a table whose index, where it has a name or counts time, is a column of it."""
+def _with_time_column(frame: DataFrame) -> DataFrame:
+    """Return the table with its index as a column, where the index has a name or holds times."""
     if frame.index.name is None and frame.index.dtype.kind not in "Mm":
         return frame
     name = TIME if frame.index.name is None else str(frame.index.name)
@@ -76,7 +78,7 @@ def _with_time(frame: DataFrame) -> DataFrame:
 
 
 def _cells(column: Series[Any]) -> npt.NDArray[Any]:
-    """Return the cells (n,) of a column as a file's would be: numbers, stamps in UTC, or words."""
+    """Return the cells (n,) of a column as a file reader would: numbers, stamps in UTC, or text."""
     if column.dtype.kind == "m":
         seconds: npt.NDArray[np.float64] = column.dt.total_seconds().to_numpy()
         return seconds

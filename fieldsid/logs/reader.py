@@ -1,4 +1,4 @@
-"""The contract of a reader: one file in readers/ with a `READER`; it recognises, lists and reads one kind of log."""
+"""The interface of a reader: one file in readers/ with a `READER`, which recognises, lists and reads one kind of log."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ from fieldsid.registry import members
 
 PACKAGE = "fieldsid.logs.readers"
 DEFINED = "message"
-"""The kind of a topic whose fields the format defines: its names are not guessed at."""
+"""The kind of a topic whose fields the format defines, so that their meaning is not guessed from names."""
 MOST_CHANNELS = 5000
-"""Channels of a log that are looked into, twice those of a glider, which has the most; of others, how many there are is said."""
+"""Largest number of channels of a log that are inspected, twice those of a glider; the others are only counted."""
 TABLE = "table"
-"""The kind of a topic that is a file of its own, whose fields are its columns."""
+"""The kind of a topic that is a separate file, whose fields are its columns."""
 JOINED = "several_tables"
 """The reader of a run in several tables."""
 WORTH_SALVAGING = 0.5
-"""Share of a log from which its readable part is offered."""
+"""Smallest readable share of a damaged log at which a hint offers to salvage it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """One signal as the log has it: stamps (n,) in s, and numbers (n,) or quaternions (n, 4) as x y z w.
+    """One signal as it is logged: stamps (n,) in s, and numbers (n,) or quaternions (n, 4) as x y z w.
 
-    `unit` is what the file itself says about the numbers. `is_height` marks a z coordinate, up in ENU.
+    `unit` is the unit that the file itself states. `is_height` marks a z coordinate, up in ENU.
     """
 
     time: FloatArray
@@ -53,9 +53,9 @@ class Series:
 
 @dataclass(frozen=True, slots=True)
 class RawLog:
-    """What a reader hands on: series by canonical signal (or `attitude`), and what it noticed.
+    """The result of a reader: series by canonical signal (or `attitude`), and its notes.
 
-    `finished` marks a Run of ours that was written before: its signals are taken as they are.
+    `finished` marks a Run that this program wrote: its signals need no conversion.
     """
 
     name: str
@@ -67,9 +67,9 @@ class RawLog:
 
 @dataclass(frozen=True, slots=True)
 class FieldInfo:
-    """One number inside a channel: its path (empty for a column), its type, first values, least and largest.
+    """One field of a channel: its path (empty for a column), its type, its first values, and its smallest and largest value.
 
-    `means` is the signal that it is by the definition of the format itself, with what a mapping must say to read it.
+    `means` is the signal that the field is by the definition of the format, with the keys a mapping needs to read it.
     """
 
     path: Annotated[str, Key("Its path in a message; empty for the column of a table.")]
@@ -82,7 +82,7 @@ class FieldInfo:
 
 
 def span_of(values: npt.NDArray[Any]) -> tuple[float, float] | None:
-    """Return the least and the largest of numbers, those that are none left out; None where there are none."""
+    """Return the smallest and largest finite number; None where there is none."""
     if values.dtype.kind not in "fiub":
         return None
     seen = values[np.isfinite(values)]
@@ -91,7 +91,7 @@ def span_of(values: npt.NDArray[Any]) -> tuple[float, float] | None:
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """The numbers of a table's columns by name or place, (n,) each, on its time (n,) in s, which `source` reads."""
+    """The numbers of a table's columns (n,) by name or index, and its time (n,) in s, read from `source`."""
 
     time: FloatArray
     columns: Mapping[str | int, FloatArray]
@@ -100,7 +100,7 @@ class Samples:
 
 @dataclass(frozen=True, slots=True)
 class ChannelInfo:
-    """One column or topic: how many samples, at which rate in Hz (NaN where unknown), what is inside, and the unit it states."""
+    """One column or topic: its number of samples, its rate in Hz (NaN where unknown), its fields, and the unit it states."""
 
     name: Annotated[str, Key("Its name.")]
     kind: Annotated[str, Key("Its type.", "type")]
@@ -112,10 +112,10 @@ class ChannelInfo:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Inventory(Brief):
-    """What is in a log file; `table` says how a text table was understood, `samples` are a table's numbers.
+    """What is in a log file; `table` is the format that was detected for a text table, `samples` are the numbers of a table.
 
-    `more` are channels beyond the MOST_CHANNELS that were looked into. `frame` is that of a log of topics whose format has one,
-    `by_topic` whether it is such a log. `no_clock` is the column of a table that is called its time, and why it is none.
+    `more` is the number of channels beyond the MOST_CHANNELS that were inspected. `frame` is the frame that the format of a log
+    of topics defines, where it does. `no_clock` is the column that a table calls its time and that cannot be one, with the error.
     """
 
     path: Path
@@ -131,7 +131,7 @@ class Inventory(Brief):
 
     @property
     def by_topic(self) -> bool:
-        """Whether its signals are fields of topics, each on a clock of its own, and not columns of a table."""
+        """Whether its signals are fields of topics, each with a separate clock, and not columns of a table."""
         return self.form.endswith("bag") or self.frame is not None
 
     @property
@@ -142,11 +142,11 @@ class Inventory(Brief):
 
 @dataclass(frozen=True, slots=True)
 class ReadOptions:
-    """What a caller may ask of any reader: a folder of .msg files, and to take what is left of a damaged log.
+    """The options of any reader: a folder of .msg files, and `salvage`, to read what is readable of a damaged log.
 
-    `command` is the one that imports the log as it is read here, for hints; `clock` the time column of a table that is listed,
-    where a mapping names it. `joined` are the other tables of a run of which the log is one. `progress` is given which share of
-    the log has been read, now and then.
+    `command` is the command that imports the log with these options, for hints; `clock` the time column of a table that is
+    listed, where a mapping names it. `joined` are the other tables where a run consists of several tables. `progress` is called
+    repeatedly with the share of the log that has been read.
     """
 
     msg_path: Path | None = None
@@ -157,22 +157,22 @@ class ReadOptions:
     progress: Callable[[float], None] = lambda _: None
 
     def with_option(self, option: str) -> str:
-        """Return the command that imports the log with one option more, into a folder of its own."""
+        """Return the command that imports the log with one more option, into the folder `imported/`."""
         return f"`{self.command} {option} -o imported/`"
 
     def salvaging(self, words: str, left: float) -> str:
-        """Return the hint to take what is left of a log, where that share of it is worth it; nothing elsewhere."""
+        """Return the hint to salvage a log of which the share `left` is readable; empty where that is below WORTH_SALVAGING."""
         return f"{words}: {self.with_option('--salvage')}" if left >= WORTH_SALVAGING else ""
 
 
 def never_canonical(path: Path, options: ReadOptions) -> ChannelMap | None:
-    """Return None: the names of these logs are their own, and which output moves which fin is the vehicle's."""
+    """Return None, for logs whose names are never canonical: the vehicle decides which output moves which fin."""
     return None
 
 
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """One kind of log. `own_map` gives the mapping of a file whose names are canonical, or None when they are not."""
+    """One kind of log. `own_map` returns the mapping of a file whose names are canonical, or None where they are not."""
 
     name: str
     says: str
@@ -184,7 +184,7 @@ class Reader:
 
 
 def reader_of(path: Path, joined: Sequence[Path] = ()) -> Reader:
-    """Return the reader that recognises a file, alone or with the other tables of its run, by its content.
+    """Return the reader that recognises a file by its content, or the reader of several tables where others are joined.
 
     Raises LogError when one is missing, empty or unknown.
     """
@@ -193,7 +193,7 @@ def reader_of(path: Path, joined: Sequence[Path] = ()) -> Reader:
     known: dict[str, Reader] = dict(members(PACKAGE, "READER"))
     if joined:
         return known[JOINED]
-    # Text is what is left when no signature of a binary format is there, so the table is asked last.
+    # A text table has no signature, so its reader is tried last.
     for name in sorted(known, key=lambda n: (n == "csv_table", n)):
         if known[name].sniff(path):
             return known[name]
@@ -201,21 +201,21 @@ def reader_of(path: Path, joined: Sequence[Path] = ()) -> Reader:
 
 
 def check_readable(path: Path) -> None:
-    """Raise LogError when a log is not there, cannot be opened, is no file or folder, or is empty."""
+    """Raise LogError where a log does not exist, cannot be opened, is neither a file nor a folder, or is empty."""
     try:
         is_empty = _is_empty(path)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise _missing(path) from error
     except OSError as error:
         raise LogError(
-            f"`{path}` cannot be read: {error.strerror or error}", found=f"in `{path.parent}`", hint=_way_in(path, error)
+            f"`{path}` cannot be read: {error.strerror or error}", found=f"in `{path.parent}`", hint=_access_hint(path, error)
         ) from error
     if is_empty:
         raise LogError(f"`{path}` is empty", found="0 bytes", hint=COPY_AGAIN)
 
 
 def _is_empty(path: Path) -> bool:
-    """Whether a file holds nothing; raises OSError where it, or the folder it is, cannot be read."""
+    """Whether a file is empty; raises OSError where the file or folder cannot be read."""
     if path.is_dir():
         next(path.iterdir(), None)
         return False
@@ -234,7 +234,7 @@ def _missing(path: Path) -> LogError:
 
 
 def neighbours(path: Path) -> str:
-    """Return what lies where a file was looked for."""
+    """Return, in words, the content of the folder in which a file was expected."""
     folder = path.parent
     if not folder.is_dir() or not os.access(folder, os.R_OK):
         return f"no folder `{folder}` either"
@@ -242,13 +242,13 @@ def neighbours(path: Path) -> str:
     return f"`{folder}` holds {few_of(names) or 'nothing'}"
 
 
-def _way_in(path: Path, error: OSError) -> str:
-    """Return how one comes to read a file; nothing where its permissions are not what is in the way."""
+def _access_hint(path: Path, error: OSError) -> str:
+    """Return the hint for a file that cannot be opened: how to obtain the permission, or to check the path."""
     if not isinstance(error, PermissionError):
         return "check the path"
     try:
         found = path.stat()
-    except OSError:  # what is closed is a folder above it
+    except OSError:  # a folder above it is closed
         return "ask the owner of its folder for it, or for the permission"
     if found.st_uid == getattr(os, "geteuid", lambda: None)():
         return f"`chmod u+{'rx' if stat.S_ISDIR(found.st_mode) else 'r'} {quote(str(path))}`"

@@ -1,7 +1,7 @@
-"""A Run: the clean log of one test run, SI and radians, NED and forward-starboard-down, on one clock.
+"""A Run: the converted log of one test run, in SI units and radians, in NED and forward-starboard-down axes, on one clock.
 
-Signals carry the canonical column names, the only names inside the package. A sample where a sensor gave
-nothing is NaN: gaps stay gaps.
+Signals have the canonical column names, the only names inside the package. A sample that a sensor did not measure is NaN; gaps
+are not filled.
 """
 
 from __future__ import annotations
@@ -51,31 +51,32 @@ SIGNALS: Mapping[str, str] = MappingProxyType(
 )
 """Canonical signal names and their units; `thrust` may be in any unit."""
 FINS = ("rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad")
-"""What fins were told, and what they did."""
+"""The commanded and the measured fin angles."""
 MOTORS = ("thrust", "thrust_ratio", "propeller_rpm")
-"""What the propulsion was told, or did: its scale bears on no estimate."""
+"""The signals of the propulsion, commanded or measured; no estimate depends on their scale."""
 PART = "["
-"""What stands behind a signal in the name of an entry of its sum: `rudder_rad[0]`."""
+"""The character after the signal in the name of an entry of a sum, as in `rudder_rad[0]`."""
 STEP_LINES: Mapping[str, tuple[str, str]] = MappingProxyType(
     {fin: (f"{fin[:-4]}_from_rad", f"{fin[:-4]}_to_rad") for fin in FINS}
 )
-"""Beside a fin that moves between the run's samples: start and end of its line over the step that each sample begins.
+"""For each fin, the signals of its step lines: the fin angle at the start and at the end of the step that begins at a sample.
 
-The line has the mean and the first moment of what the fin was told, or did, in that step (`logs/convert/clock.py`).
+They exist where the fin moves between the samples of the run. The straight line from start to end has the mean and the first
+moment of the fin angle in that step (`logs/convert/clock.py`).
 """
 LINES = frozenset(name for pair in STEP_LINES.values() for name in pair)
 COLUMNS: Mapping[str, str] = MappingProxyType({**SIGNALS, **dict.fromkeys(sorted(LINES), "rad")})
 """All names of a run's signals and their units."""
 GOALS = frozenset({"yaw_goal_rad", "pitch_goal_rad"})
-"""The angles that an autopilot was told to hold."""
+"""The setpoints of an autopilot's angles."""
 COMMANDS = frozenset({"rudder_rad", "elevator_rad", *MOTORS}) | GOALS
-"""Signals that stand until the next one."""
+"""Commanded signals, which are constant until their next sample (zero-order hold)."""
 MEASURED = frozenset(SIGNALS) - COMMANDS
-"""What sensors measured."""
+"""Signals measured by sensors."""
 
 
 def signal_of(name: str) -> str:
-    """Return the signal that a source is for: the entries of a sum are named `rudder_rad[0]`, `rudder_rad[1]` and so on."""
+    """Return the signal to which a source belongs; the entries of a sum are named `rudder_rad[0]`, `rudder_rad[1]` and so on."""
     return name.partition(PART)[0]
 
 
@@ -91,20 +92,21 @@ class Note(Brief):
 
 
 def origin_of(notes: Iterable[Note]) -> float:
-    """Return the log's own time at time 0, in s: two readings of other fields start at other messages."""
+    """Return the log's time at time 0 of the run, in s; it depends on the fields read, which start at different messages."""
     return next((n.data["origin_ns"] / 1e9 for n in notes if n.code == "time_origin"), 0.0)
 
 
 SIMULATED = "simulated"
-"""Code of the note of a run that a model made."""
+"""Code of the note of a run that was simulated by a model."""
 READ_WITH = "mapping"
-"""Code of the note that names the mapping file which a log was read with, under `path`."""
+"""Code of the note that names the mapping file, under `path`."""
 READ_AS = "read_as"
-"""Code of the note that says how a log without a mapping was read, where nothing of it was in doubt."""
+"""Code of the note that lists how a log without a mapping was read."""
 EXPLAINING = frozenset({"time_origin", "clock", READ_WITH, READ_AS, "ignored_columns", "joined"})
 """Codes of the notes that explain rather than warn."""
 OF_LIMITS = ("saturated", "fin_limit")
-"""Codes of the notes that hang on the fin limits: a run keeps those of its import, and is judged by the limits of the day."""
+"""Codes of the notes that depend on the fin limits; they are made again, with the present limits, when an imported run is
+read."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -140,12 +142,12 @@ class Run(Plotted):
         return run
 
     def has(self, name: str) -> bool:
-        """Whether a signal is in the log with at least one finite sample."""
+        """Return whether the run has at least one finite sample of a signal."""
         values = self.signals.get(name)
         return values is not None and bool(np.isfinite(values).any())
 
     def __getitem__(self, name: str) -> FloatArray:
-        """Return a signal (n,); raises DataError naming what the log holds."""
+        """Return a signal (n,); raises DataError, which lists the signals of the run, where it is missing."""
         if name not in self.signals:
             raise DataError(
                 f"run {self.name!r} has no signal `{name}`",

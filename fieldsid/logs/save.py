@@ -1,4 +1,4 @@
-"""A Run as a file: Parquet keeps everything, CSV the canonical columns."""
+"""Writing a Run to a file: Parquet keeps all of it, CSV only time and signals."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SUFFIXES = (".parquet", ".csv", ".csv.gz")
 def save_run(run: Run, path: Path, *, force: bool = False) -> Path:
     """Write a run to .parquet, .csv or .csv.gz and return the path.
 
-    Every number comes back exactly. Parquet also keeps the notes, the schema, the tool's version and the sha256 of
+    Numbers are written without loss. Parquet also keeps the notes, the schema, the tool's version and the sha256 of
     the log and of its mapping file. Raises UsageError for another suffix, ArtifactError when the file exists or cannot be
     written.
     """
@@ -63,7 +63,7 @@ def _head(run: Run) -> dict[str, object]:
 def _save_csv(run: Run, path: Path, *, force: bool) -> Path:
     with replacing(path, force=force) as temporary, temporary.open("wb") as raw:
         if path.suffix == ".gz":
-            # Without the time of writing in its head, the same run gives the same bytes.
+            # mtime=0 leaves the time of writing out of the header, so that the same run gives the same bytes
             with gzip.GzipFile(filename="", fileobj=raw, mode="wb", mtime=0, compresslevel=6) as packed:
                 _write_rows(run, packed)
         else:
@@ -72,7 +72,7 @@ def _save_csv(run: Run, path: Path, *, force: bool) -> Path:
 
 
 def _write_rows(run: Run, stream: IO[bytes] | gzip.GzipFile) -> None:
-    """Write every number with as many digits as bring it back exactly, and nothing where there is none."""
+    """Write every number with as many digits as restore it exactly, and an empty cell for NaN."""
     pa, csv = import_module("pyarrow"), import_module("pyarrow.csv")
     columns = {TIME: run.time, **run.signals}
     table = pa.table({name: pa.array(values, from_pandas=True) for name, values in columns.items()})

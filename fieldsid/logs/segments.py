@@ -1,8 +1,8 @@
-"""The part of a run worth fitting: steady, excitation, recovery.
+"""The part of a run that is fitted: steady start, excitation and recovery.
 
-From 2 s before the fin first clearly leaves its trim to 10 s after it last came back. A controller's small work on
-the fin around its trim is not excitation: an excursion is above a quarter of the largest one, above half a degree and
-above four times the fin's usual activity.
+It begins 2 s before the fin first clearly leaves its trim and ends 10 s after it last did. Small fin angles of a controller
+about the trim are not excitation: an excursion is larger than a quarter of the largest one, than half a degree and than four
+times the usual activity of the fin.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from fieldsid.numerics.arrays import BoolArray, FloatArray
 BEFORE_S = 2.0
 AFTER_S = 10.0
 LEAST_RAD = 0.0087
-"""Half a degree: what is below is no excitation."""
+"""Half a degree in rad; a smaller excursion is not excitation."""
 SHARE_OF_LARGEST = 0.25
 ACTIVITY = 4.0
 WHOLE = 0.8
-"""A run whose excitation covers more than this share of it is taken whole."""
+"""Share of a run from which on its excitation is long enough for the complete run to be used."""
 STEADY_S = 1.0
-"""Time at the start over which the trim is read."""
+"""Time at the start over which the trim is the median of the fin angle."""
 
 YAW = "yaw"
 _FINS = {YAW: ("rudder_measured_rad", "rudder_rad"), "pitch": ("elevator_measured_rad", "elevator_rad")}
@@ -35,40 +35,40 @@ _FINS = {YAW: ("rudder_measured_rad", "rudder_rad"), "pitch": ("elevator_measure
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A part of a run, in s, and why it was chosen."""
+    """A part of a run: its start and end in s, and the reason for the choice."""
 
     start_s: float
     end_s: float
     why: str
 
     def of(self, run: Run) -> Run:
-        """Return the run between the two times."""
+        """Return the part of a run between the two times."""
         return run.between(self.start_s, self.end_s)
 
 
 def segment(run: Run, axis: str) -> Segment:
     """Return the part of a run that excites an axis (`yaw` or `pitch`).
 
-    Raises DataError when the log has no fin for the axis, or the fin never leaves its trim.
+    Raises DataError where the log has no fin for the axis, or the fin never leaves its trim.
     """
     signal = _fin_of(run, axis)
     if signal is None:
         raise no_fin(run, axis, _FINS[axis][1])
-    time, fin = _seen(run, signal)
+    time, fin = _finite_samples(run, signal)
     away, limit = excursions(run.name, axis, signal, time, fin, _answer_of(run))
-    return _around(run, time, away, signal, limit)
+    return _segment_around(run, time, away, signal, limit)
 
 
 def is_excited(run: Run, axis: str) -> bool:
     """Whether a run has a fin for an axis (`yaw` or `pitch`) that leaves its trim."""
     signal = _fin_of(run, axis)
-    return signal is not None and bool(_away(*_seen(run, signal))[0].any())
+    return signal is not None and bool(_excursion_mask(*_finite_samples(run, signal))[0].any())
 
 
 def excited_axis(runs: Sequence[Run], *, written: str) -> str:
-    """Return the axis (`yaw` or `pitch`) that runs excite; `written` is how one is chosen, `{axis}` in it.
+    """Return the axis (`yaw` or `pitch`) that the runs excite; `written` is how the user chooses one, with `{axis}` in it.
 
-    Raises UsageError where they excite both or none, DataError where they have no fin for either.
+    Raises UsageError where they excite both axes or none, DataError where they have no fin for either.
     """
     if not any(_fin_of(run, axis) for run in runs for axis in _FINS):
         raise DataError(
@@ -96,28 +96,28 @@ def excited_axis(runs: Sequence[Run], *, written: str) -> str:
 
 
 def plane_of(runs: Sequence[Run]) -> str:
-    """Return the axis that most runs excite, of several the one that more have a fin of, then yaw."""
+    """Return the axis that most runs excite; in a tie the axis with a fin in more runs, then yaw."""
     return max(_FINS, key=lambda a: (sum(is_excited(run, a) for run in runs), sum(_fin_of(run, a) is not None for run in runs)))
 
 
 def may_show(run: Run, axis: str) -> bool:
-    """Whether a run may show something of an axis: unless it excites the other one alone."""
+    """Return whether a run may be informative on an axis: false only where it excites the other axis alone."""
     return is_excited(run, axis) or not any(is_excited(run, other) for other in _FINS)
 
 
 def _fin_of(run: Run, axis: str) -> str | None:
-    """Return the signal of an axis' fin, the command where both are there; None where there is none."""
+    """Return the signal of the fin of an axis, the command where command and measurement exist; None where neither does."""
     return next((s for s in reversed(_FINS[axis]) if run.has(s)), None)
 
 
-def _seen(run: Run, signal: str) -> tuple[FloatArray, FloatArray]:
-    """Return times and values of a signal where it was measured."""
+def _finite_samples(run: Run, signal: str) -> tuple[FloatArray, FloatArray]:
+    """Return the times and values of the finite samples of a signal."""
     seen = np.isfinite(run[signal])
     return run.time[seen], run[signal][seen]
 
 
 class Answer(NamedTuple):
-    """What turns behind a fin: time (n,) s, and a rate (n,) rad/s, or an angle (n,) rad."""
+    """The response of the heading to the fin: time (n,) in s, and a rate (n,) in rad/s or an angle (n,) in rad."""
 
     time: FloatArray
     values: FloatArray
@@ -125,29 +125,29 @@ class Answer(NamedTuple):
 
 
 def _answer_of(run: Run) -> Answer | None:
-    """Return the heading's rate of a run, its heading without one; None where neither was measured."""
+    """Return the yaw rate r of a run, or without it the heading; None where neither was measured."""
     signal = next((s for s in ("yaw_rate_rad_s", "yaw_rad") if run.has(s)), None)
-    return None if signal is None else Answer(*_seen(run, signal), is_angle=signal == "yaw_rad")
+    return None if signal is None else Answer(*_finite_samples(run, signal), is_angle=signal == "yaw_rad")
 
 
 def excursions(
     name: str, axis: str, signal: str, time: FloatArray, fin: FloatArray, answer: Answer | None = None
 ) -> tuple[BoolArray, float]:
-    """Return where the fin (n,) rad of a run is clearly away from its trim, and the limit in rad.
+    """Return the mask (n,) of the samples at which the fin (n,) in rad is clearly away from its trim, and the limit in rad.
 
-    Raises DataError where it never is: such a run says nothing of what a fin does, but for what the heading's answer to a step
-    before it tells.
+    Raises DataError where it never is: such a run is not informative on the fin. Where the fin is constant at an angle, the
+    error states the a22 and b2 that the settling of the yaw rate after an earlier step shows.
     """
-    away, limit = _away(time, fin)
+    away, limit = _excursion_mask(time, fin)
     if away.any():
         return away, limit
     low, high = np.degrees(fin.min()), np.degrees(fin.max())
     middle = float(np.median(fin))
-    tells = _settling(answer, middle) if axis == YAW and np.ptp(fin) < LEAST_RAD < abs(middle) else ""
-    if tells:
+    settling_text = _settling_text(answer, middle) if axis == YAW and np.ptp(fin) < LEAST_RAD < abs(middle) else ""
+    if settling_text:
         raise DataError(
             f"`{signal}` of run {name!r} stands at {np.degrees(middle):.2f} deg throughout: its step is before the first sample",
-            found=f"{time[-1] - time[0]:.3g} s at {low:.2f} to {high:.2f} deg; {tells}",
+            found=f"{time[-1] - time[0]:.3g} s at {low:.2f} to {high:.2f} deg; {settling_text}",
             hint="log some seconds before the step, or the step back as well: at one angle C0 and the fin's part are one number",
         )
     raise DataError(
@@ -157,8 +157,8 @@ def excursions(
     )
 
 
-def _settling(answer: Answer | None, fin: float) -> str:
-    """Return in words what a heading's settling at one fin angle in rad tells, where it tells anything."""
+def _settling_text(answer: Answer | None, fin: float) -> str:
+    """Return, in words, a22 and b2 from the settling of the yaw rate at a constant fin angle (rad); empty where it shows none."""
     found = None if answer is None else settling_of(answer.time, np.unwrap(answer.values), integrated=answer.is_angle)
     if found is None:
         return ""
@@ -167,7 +167,7 @@ def _settling(answer: Answer | None, fin: float) -> str:
 
 
 def no_fin(run: Run, axis: str, missing: str) -> DataError:
-    """Return the error of a run without a fin for an axis; its hint names the other axis where that one has one."""
+    """Return the error of a run without a fin for an axis; its hint names the other axis where the run has a fin for that."""
     other = next(a for a in _FINS if a != axis)
     hint = f"map `{missing}` on import"
     if any(run.has(fin) for fin in _FINS[other]):
@@ -179,29 +179,29 @@ def no_fin(run: Run, axis: str, missing: str) -> DataError:
     )
 
 
-def _away(time: FloatArray, fin: FloatArray) -> tuple[BoolArray, float]:
+def _excursion_mask(time: FloatArray, fin: FloatArray) -> tuple[BoolArray, float]:
     trim = float(np.median(fin[time <= time[0] + STEADY_S]))
     off = np.abs(fin - trim)
     quiet = off[off < SHARE_OF_LARGEST * off.max()] if off.max() > 0 else off
-    # The median of what is small anyway, so that a long excitation does not raise its own limit.
+    # The median of the small deviations only, so that a long excitation does not raise its own limit.
     activity = float(np.median(quiet)) if quiet.size else 0.0
     limit = max(LEAST_RAD, SHARE_OF_LARGEST * float(off.max()), ACTIVITY * activity)
     return off > limit, limit
 
 
 def last_moved(time: FloatArray, fin: FloatArray) -> float:
-    """Return when a fin (n,) rad was last clearly away from its trim, NaN where it never was; time (n,) s."""
-    away = np.flatnonzero(_away(time, fin)[0]) if time.size else np.empty(0, dtype=np.intp)
+    """Return the time at which a fin (n,) in rad was last clearly away from its trim, NaN where it never was; time (n,) in s."""
+    away = np.flatnonzero(_excursion_mask(time, fin)[0]) if time.size else np.empty(0, dtype=np.intp)
     return float(time[away[-1]]) if away.size else float("nan")
 
 
-def _around(run: Run, time: FloatArray, away: BoolArray, signal: str, limit: float) -> Segment:
+def _segment_around(run: Run, time: FloatArray, away: BoolArray, signal: str, limit: float) -> Segment:
     moved = np.flatnonzero(away)
     first, last = float(time[moved[0]]), float(time[moved[-1]])
     begin, end = float(run.time[0]), float(run.time[-1])
     if last - first >= WHOLE * (end - begin):
         return Segment(begin, end, f"the whole run: `{signal}` is away from trim from {first:.2f} to {last:.2f} s")
-    # a log whose samples are further apart keeps at least the one before and the one after
+    # where the sampling interval is longer, keep at least one sample before and one after
     step = float(np.median(np.diff(run.time)))
     start, stop = max(begin, first - max(BEFORE_S, step)), min(end, last + max(AFTER_S, step))
     why = (

@@ -1,4 +1,4 @@
-"""A log given where a file of this program is expected: what it is, and what to do with it."""
+"""Errors for a log that is given where a file of this program is expected."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from fieldsid.records.reading import read_yaml
 
 @contextmanager
 def unless_log(path: Path, wanted: str) -> Iterator[None]:
-    """Raise for a file that cannot be read as what is wanted ("a model") that it is a log, where it is one."""
+    """Raise an error that names the file a log, where reading it as `wanted` (such as "a model") fails and it is a log."""
     try:
         yield
     except ArtifactError as error:
         try:
             read_yaml(path)
-        except ArtifactError:  # lines of numbers are no YAML with keys
+        except ArtifactError:  # a table of numbers is not YAML with keys
             if (log := if_log(path, wanted)) is not None:
                 raise log from error
         raise
 
 
 def if_log(path: Path, wanted: str) -> ArtifactError | None:
-    """Return the error that a file is a log and not what is wanted; None where it is no log.
+    """Return the error that a file is a log and not what is wanted; None where it is not a log.
 
-    A text that names no known signals and has no time in it may be anything: of that nothing is claimed.
+    A text without canonical names and without a time may be anything, and is not called a log.
     """
     try:
         reader = reader_of(path)
