@@ -120,7 +120,7 @@ def map_for(
         chosen = None if file is None else _as_channel_map(file)
     if mapping is None and otherwise is not None and (chosen is None or not is_enough(chosen.sources)):
         named = _as_channel_map(otherwise)
-        chosen = named if _covers(named, reader.inventory(path, options, named.table)) else chosen
+        chosen = named if _is_in_log(named, reader.inventory(path, options, named.table)) else chosen
     complete = chosen_map(None, chosen, channels)
     is_open = mapping is None and not channels and (chosen is None or chosen.origin is None)
     mapped_signals = frozenset[str]() if complete is None else frozenset(complete.sources)
@@ -175,7 +175,7 @@ def to_map(log: Path, joined: Sequence[Path] = ()) -> str:
     return shlex.join([*words, *(["--force"] if Path(MAPPING_FILE).is_file() else [])])
 
 
-def _covers(mapping: ChannelMap, found: Inventory) -> bool:
+def _is_in_log(mapping: ChannelMap, found: Inventory) -> bool:
     """Return whether a log contains every column and topic that a mapping names."""
     sources = [*mapping.sources.values(), *([] if mapping.time is None else [mapping.time])]
     named = {str(place) for s in sources for place in (s.places if s.topic is None else (s.topic,))}

@@ -1,1 +1,1 @@
-"""The import doctor: what in a log would spoil an identification."""
+"""The import doctor: findings on a log that would spoil an identification."""

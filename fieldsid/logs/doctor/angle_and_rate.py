@@ -1,7 +1,7 @@
-"""Findings on an angle and its rate: the change of the one over a second is the other integrated over the same second.
+"""Findings on an angle and its rate: the change of the angle over a window equals the integral of the rate over it.
 
-Their slope is 1. One below zero is a sign turned, one near 57.3 or 1/57.3 a degree taken for a radian, a shift a clock of its
-own; where they do not go together at all, one of them is another signal.
+The slope of the regression of one on the other is then 1. A negative slope shows a wrong sign, a slope near 57.3 or 1/57.3
+degrees taken for radians, and a time shift two different clocks. Where the two are uncorrelated, one of them is another signal.
 """
 
 from __future__ import annotations
@@ -23,45 +23,45 @@ from fieldsid.numerics.trapezoid import trapezoid_integral
 from fieldsid.numerics.white_noise import MEDIAN_OF_NORMAL, robust_white_noise_std
 
 PAIR_WINDOW_S, LONG_WINDOW_S = 1.0, 4.0
-"""Time over which an angle's change is set against its rate's, and that for a motion which shows above its noise only then."""
+"""Windows over which the changes are compared: the first, and a longer one for a motion that exceeds the noise only over that."""
 TRUSTED = 0.8
-"""Correlation from which a slope is taken as real."""
+"""Smallest correlation at which a slope is used."""
 STRONG, WEAK = 0.9, 0.5
-"""Correlation of two signals of which one is the other's rate, and the one below which, at every shift, neither is."""
+"""Smallest correlation of a signal with its rate, and the correlation below which, at every shift, the two are unrelated."""
 MIN_NOISE_RATIO = 4.0
-"""How many times its noise a change must be to be judged."""
+"""Smallest ratio of a change to its noise at which it is compared."""
 FASTER, FEWEST_JUMPS = 1.5, 2
-"""Times a step at the rate of a fast tenth of the log by which an angle and its rate may differ, and places that are jumps."""
+"""Allowed difference of an angle from its rate, in steps at the 90th percentile of the rate, and fewest jumps for a finding."""
 JUMP_WIDTHS = (1, 2, 4)
-"""Steps over which they are compared."""
+"""Numbers of steps over which jumps are sought."""
 FITS_BETTER = 2.5
-"""Ratio of two variances of the same steps, 50 at least, that chance does not make: 2.4 is the one per mille of F(50, 50)."""
+"""Significant ratio of two variances of the same steps, at least 50: 2.4 is the upper 0.1 percent point of F(50, 50)."""
 ROUNDING = 1e-12
-"""Circular variance below which there is none."""
+"""Smallest circular variance, in place of zero."""
 DEGREES = 180.0 / math.pi
 RATES = {u.name: u.factor for u in UNITS.values() if u.dimension == "angle rate"}
-"""Units in which a rate is logged, in rad/s."""
+"""Units of rates, in rad/s."""
 LAG_S = 1.0
-"""Longest clock offset looked for."""
+"""Largest clock offset that is sought."""
 
 PAIRS = (("yaw_rad", "yaw_rate_rad_s"), ("pitch_rad", "pitch_rate_rad_s"), ("roll_rad", "roll_rate_rad_s"))
 CONTRADICTING = frozenset({"rate_sign", "unit", "swapped", "unrelated"})
 
 
 def angle_findings(run: Run, stated: Stated, faulty: Container[str]) -> list[Note]:
-    """Return the findings on each angle of a run and its rate; `faulty` are the signals of which another fault is known."""
+    """Return the findings on each angle of a run and its rate; `faulty` are the signals with another known fault."""
     found: list[Note] = []
     for angle, rate in PAIRS:
         if run.has(angle) and run.has(rate):
-            told = _swapped(run, angle, rate) or _angle_and_rate(run, angle, rate, stated)
-            if not any(n.code in CONTRADICTING for n in told):
-                told = [*told, *_jumps(run, angle, rate)]
-            found += told or ([] if angle in faulty or rate in faulty else _unrelated(run, angle, rate))
+            notes = _swapped(run, angle, rate) or _angle_and_rate(run, angle, rate, stated)
+            if not any(n.code in CONTRADICTING for n in notes):
+                notes = [*notes, *_jumps(run, angle, rate)]
+            found += notes or ([] if angle in faulty or rate in faulty else _unrelated(run, angle, rate))
     return found
 
 
 def _angle_and_rate(run: Run, angle: str, rate: str, stated: Stated) -> list[Note]:
-    in_degrees = _turned_in_degrees(run, angle, rate, stated) if angle == "yaw_rad" else []
+    in_degrees = _unwrapped_degrees(run, angle, rate, stated) if angle == "yaw_rad" else []
     changes = changes_of(run, angle, rate)
     if changes is None or in_degrees:
         return in_degrees
@@ -69,23 +69,23 @@ def _angle_and_rate(run: Run, angle: str, rate: str, stated: Stated) -> list[Not
     slope, trust = slope_of(a, b)
     if trust < TRUSTED:
         return []
-    return [*_of_slope(angle, rate, slope, stated), *_of_lag(angle, rate, a, b, step, stated)]
+    return [*_slope_findings(angle, rate, slope, stated), *_lag_findings(angle, rate, a, b, step, stated)]
 
 
 def agrees_with_rate(run: Run, angle: str, rate: str) -> bool:
-    """Whether an angle changes as its rate says, in the units that both are taken in."""
+    """Return whether the change of an angle equals the integral of its rate, in the units in which both were read."""
     changes = changes_of(run, angle, rate)
     return changes is not None and _is_rate_of(changes, TRUSTED)
 
 
 def _swapped(run: Run, angle: str, rate: str) -> list[Note]:
-    """An angle and a rate that are not each other's, where another signal is the one's."""
+    """Return the finding that two columns are swapped: angle and rate disagree, and one of them agrees with another signal."""
     own = changes_of(run, angle, rate)
     if own is not None and _is_rate_of(own, WEAK):
         return []
     others = [s for s, unit in SIGNALS.items() if s not in (angle, rate) and unit in ("rad", "rad/s") and run.has(s)]
-    asked = [(rate, angle), *((angle, s) for s in others), *((s, rate) for s in others)]
-    pairs = ((one, of) for one, of in asked if (c := changes_of(run, one, of)) is not None and _is_rate_of(c, STRONG))
+    candidates = [(rate, angle), *((angle, s) for s in others), *((s, rate) for s in others)]
+    pairs = ((one, of) for one, of in candidates if (c := changes_of(run, one, of)) is not None and _is_rate_of(c, STRONG))
     one, of = next(pairs, ("", ""))
     if not one:
         return []
@@ -103,7 +103,7 @@ def _swapped(run: Run, angle: str, rate: str) -> list[Note]:
 
 
 def refuse_contradiction(run: Run, angle: str, rate: str) -> None:
-    """Raise DataError where a finding on a run says that no model can follow both an angle and its rate."""
+    """Raise DataError where a note of a run states a contradiction of an angle and its rate, which no model can follow."""
     if not (run.has(angle) and run.has(rate)):
         return
     found = [n for n in run.notes if n.code in CONTRADICTING and {angle, rate} & set(n.data.get("signals", ()))]
@@ -117,41 +117,41 @@ def refuse_contradiction(run: Run, angle: str, rate: str) -> None:
 
 
 def contradiction(run: Run, angle: str, rate: str) -> str:
-    """Return how an angle and its rate contradict each other in a part of a run, empty where they do not.
+    """Return the contradiction of an angle and its rate in a part of a run, in words; empty where there is none.
 
-    A sign, a unit and a swap show in any stretch that moves. That the two are of two motions is told by a whole run alone.
+    A wrong sign or unit and a swap show in any part with motion. That the two are unrelated shows only in a complete run.
     """
     found = _swapped(run, angle, rate) or _angle_and_rate(run, angle, rate, Stated())
     return next((n.message for n in found if n.code in CONTRADICTING), "")
 
 
 def _is_rate_of(changes: tuple[FloatArray, FloatArray, float], least: float) -> bool:
-    """Whether changes of a signal go with the integral of another, one to one and with a correlation above a least one."""
+    """Return whether the changes of a signal equal the integral of another: slope 1, and a correlation above `least`."""
     slope, trust = slope_of(*changes[:2])
     return trust > least and abs(slope - 1.0) <= UNIT_LIMIT
 
 
 def _unrelated(run: Run, angle: str, rate: str) -> list[Note]:
-    """An angle and a rate that both move, and go together at no shift, nor by Euler's kinematics: one is another signal."""
+    """Return the finding that an angle and a rate are uncorrelated at every shift, also by Euler's kinematics."""
     tried = [changes_of(run, angle, rate)]
     if (turning := _euler_rate(run, angle)) is not None:
         tried.append(changes_of(Run(run.name, run.time, {**run.signals, rate: turning}), angle, rate))
     elif angle == "pitch_rad" and run.has("yaw_rate_rad_s") and np.nanstd(run["yaw_rate_rad_s"]) > np.nanstd(run[rate]):
-        return []  # at a roll that is not known, a turn pitches
+        return []  # at an unknown roll, the yaw rate r changes the pitch angle
     if any(c is None for c in tried):
         return []
-    alike = max(float(np.max(np.abs(shifted_correlations(c[0], c[1], c[0].size // 4)))) for c in tried if c is not None)
-    if alike >= WEAK:
+    peak = max(float(np.max(np.abs(shifted_correlations(c[0], c[1], c[0].size // 4)))) for c in tried if c is not None)
+    if peak >= WEAK:
         return []
     message = (
-        f"{angle} and {rate} are not of one motion (their changes have a correlation of {alike:.2f} at most, at any shift; limit "
+        f"{angle} and {rate} are not of one motion (their changes have a correlation of {peak:.2f} at most, at any shift; limit "
         f"{WEAK:g}): check which columns they are, or leave out the one that is wrong"
     )
-    return [Note("unrelated", message, {"signal": angle, "signals": [angle, rate], "value": alike, "limit": WEAK})]
+    return [Note("unrelated", message, {"signal": angle, "signals": [angle, rate], "value": peak, "limit": WEAK})]
 
 
 def _euler_rate(run: Run, angle: str) -> FloatArray | None:
-    """Return how fast an Euler angle changes by the rates of the body (Fossen 2021, eq. 2.39); None where one is missing."""
+    """Return the derivative of an Euler angle from q and r (Fossen 2021, eq. 2.39); None where a signal is missing."""
     signals = ("roll_rad", "pitch_rad", "pitch_rate_rad_s", "yaw_rate_rad_s")
     if angle == "roll_rad" or not all(run.has(s) for s in signals):
         return None
@@ -159,10 +159,10 @@ def _euler_rate(run: Run, angle: str) -> FloatArray | None:
     return q * np.cos(roll) - r * np.sin(roll) if angle == "pitch_rad" else (q * np.sin(roll) + r * np.cos(roll)) / np.cos(pitch)
 
 
-def _turned_in_degrees(run: Run, angle: str, rate: str, stated: Stated) -> list[Note]:
-    """A heading in degrees that was unwrapped as rad: whole turns are lost, but on the circle it goes with 57.3 of its rate.
+def _unwrapped_degrees(run: Run, angle: str, rate: str, stated: Stated) -> list[Note]:
+    """Return the finding that a heading in degrees was unwrapped as rad: modulo 2 pi it changes by 57.3 times its rate.
 
-    The circular variances 1 - |mean exp(i (step - k turn))| of k = 1 and k = 57.3 are compared (Mardia and Jupp 2000, 2.3.1).
+    The circular variances 1 - |mean exp(i (step - k turn))| for k = 1 and k = 57.3 are compared (Mardia and Jupp 2000, 2.3.1).
     """
     both = together(run, angle, rate)
     if both is None:
@@ -182,9 +182,9 @@ def _turned_in_degrees(run: Run, angle: str, rate: str, stated: Stated) -> list[
 
 
 def _jumps(run: Run, angle: str, rate: str) -> list[Note]:
-    """Changes of an angle that its rate does not make, or rates that the angle does not follow, beyond the noise of both.
+    """Return the finding of jumps: changes of an angle that differ from the integral of its rate by more than the noise.
 
-    A rate that is wrong for a few samples moves the angle's noise out of no single step, so that changes over a few are taken.
+    A rate that is wrong for a few samples stays within the noise of the angle in each step, so changes over a few steps are used.
     """
     both = together(run, angle, rate)
     if both is None:
@@ -192,7 +192,7 @@ def _jumps(run: Run, angle: str, rate: str) -> list[Note]:
     time, turned, turning = both
     swept = trapezoid_integral(time, turning)
     fastest = FASTER * float(np.percentile(np.abs(turning), 90))
-    found = [f for width in JUMP_WIDTHS if (f := _off_over(width, time, turned, swept, fastest)) is not None]
+    found = [f for width in JUMP_WIDTHS if (f := _jumps_over(width, time, turned, swept, fastest)) is not None]
     if not found:
         return []
     count, size, limit, at = max(found, key=lambda f: f[1] / f[2])
@@ -203,19 +203,19 @@ def _jumps(run: Run, angle: str, rate: str) -> list[Note]:
     return [Note("disagree", message, {"signal": angle, "value": size, "limit": limit, "count": count})]
 
 
-def _off_over(
+def _jumps_over(
     width: int, time: FloatArray, turned: FloatArray, swept: FloatArray, fastest: float
 ) -> tuple[int, float, float, float] | None:
-    """Return at how many places an angle is off its rate over some steps, by how much, the limit and when; None where at few.
+    """Return the number of jumps over some steps, the largest in rad, the limit and its time in s; None where there are few.
 
-    `fastest` is the rate by which they may be a step apart.
+    `fastest` is the rate in rad/s by which angle and rate may differ in a step.
     """
     off = over(turned - swept, width)
     off = np.abs(off - np.median(off))
     usual = float(np.median(off)) / MEDIAN_OF_NORMAL
     limit = max(SPREADS * usual, DIGITS * last_digit(turned))
-    odd = np.flatnonzero(off > np.maximum(limit, fastest * np.diff(time)[width - 1 :]))
-    places = 1 + int(np.count_nonzero(np.diff(odd) > width)) if odd.size else 0
+    jumping = np.flatnonzero(off > np.maximum(limit, fastest * np.diff(time)[width - 1 :]))
+    places = 1 + int(np.count_nonzero(np.diff(jumping) > width)) if jumping.size else 0
     if places < FEWEST_JUMPS or usual == 0.0:
         return None
     at = int(np.argmax(off))
@@ -223,9 +223,9 @@ def _off_over(
 
 
 def changes_of(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray, float] | None:
-    """Return the changes of an angle and of an integrated rate over the window (n,), and the step.
+    """Return the changes (n,) of an angle and of the integral of its rate over a window, and the step in s.
 
-    None when the log is too short, or neither moves clearly more than its noise.
+    Returns None where the log is too short, or where one of the two does not exceed its noise clearly.
     """
     both = together(run, angle, rate)
     if both is None:
@@ -245,11 +245,11 @@ def changes_of(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray,
 
 
 def _noise(values: FloatArray) -> float:
-    """Return the noise of a signal; that of its last digit where it stands still in it, or moves by whole ones."""
+    """Return the noise standard deviation of a signal, at least that of rounding to its last digit."""
     return max(robust_white_noise_std(np.diff(values, 2), 2), last_digit(values) / math.sqrt(12.0))
 
 
-def _of_slope(angle: str, rate: str, slope: float, stated: Stated) -> list[Note]:
+def _slope_findings(angle: str, rate: str, slope: float, stated: Stated) -> list[Note]:
     data = {"signal": rate, "signals": [angle, rate], "value": slope, "limit": 1.0}
     found = []
     if slope < 0.0:
@@ -272,14 +272,14 @@ def _of_slope(angle: str, rate: str, slope: float, stated: Stated) -> list[Note]
 
 
 def _unit_of_rate(rate: str, size: float, stated: Stated) -> str | None:
-    """Return the unit in which a rate goes with its angle, by how many times as fast that changes; None where it is its own."""
+    """Return the unit in which a rate agrees with its angle, which changes `size` times as fast; None where it has that unit."""
     own = SIGNALS[rate] if stated.is_si(rate) else stated.units[rate]
     unit = unit_of_ratio(size * RATES[own], RATES) if size > 0.0 and own in RATES else None
     return None if unit == own else unit
 
 
 def _in_degrees(large: str, unit: str, small: str, stated: Stated) -> tuple[str, dict[str, str]]:
-    """Return what to do about a signal that is larger than another by the degrees of a radian, and the unit to set if any."""
+    """Return the advice on a signal that is too large against another by the ratio of two units, and the unit to set if any."""
     wrong = [] if stated.is_si(small) else [f"{small} is not in `{stated.units[small]}`"]
     if not stated.is_si(large):
         return " or ".join(wrong) or f"taken as `{stated.units[large]}` already: check which ones they are", {}
@@ -287,7 +287,7 @@ def _in_degrees(large: str, unit: str, small: str, stated: Stated) -> tuple[str,
     return said, {} if wrong else {"unit": unit}
 
 
-def _of_lag(angle: str, rate: str, a: FloatArray, b: FloatArray, step: float, stated: Stated) -> list[Note]:
+def _lag_findings(angle: str, rate: str, a: FloatArray, b: FloatArray, step: float, stated: Stated) -> list[Note]:
     late, gain = lag_of(a, b, min(round(LAG_S / step), a.size // 4))
     lag = late * step
     limit = max(1.5 * step, 0.05)

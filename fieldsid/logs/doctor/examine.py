@@ -1,4 +1,4 @@
-"""The import doctor: what in a log would spoil an identification, each finding with its number, limit and remedy."""
+"""The import doctor: findings on a log that would spoil an identification, each with its number, limit and remedy."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import FINS, LINES, Note, Run
 
 JITTER_LIMIT = 0.2
-"""Standard deviation of the sampling step over its median."""
+"""Largest ratio of the standard deviation of the sampling step to its median."""
 
 
 def examine(run: Run, fin_max_rad: Mapping[str, float] | None = None, stated: Stated | None = None) -> tuple[Note, ...]:
-    """Return the findings on a run; `fin_max_rad` gives fin limits by signal, for saturation, `stated` what its mapping says.
+    """Return the findings on a run; `fin_max_rad` holds fin limits by signal, `stated` the units and signs of its mapping.
 
-    Every note has in its data the `value` measured and its `limit`, where there is one.
+    The data of every note contain the measured `value` and its `limit`, where there is one.
     """
-    # Garbage in a damaged log may be near the largest float; what overflows then is compared as infinity.
+    # Invalid numbers in a damaged log may be near the largest float; an overflow is then compared as infinity.
     stated = stated or Stated()
     with np.errstate(over="ignore", invalid="ignore"):
         findings = [*_sampling(run, stated), *_fins(run, fin_max_rad or {})]
@@ -47,7 +47,7 @@ def _sampling(run: Run, stated: Stated) -> list[Note]:
     median = float(np.median(steps))
     found = []
     if median > SLOW_S or median < FASTEST_S:
-        # a clock that counts in another unit goes on evenly; a glider that seldom writes does not
+        # a clock in another unit has regular steps; a glider that logs rarely does not
         is_even, limit = float(np.std(steps)) < JITTER_LIMIT * median, SLOW_S if median > SLOW_S else FASTEST_S
         advice = (likely_unit(median) if is_even else "") or "log faster"
         if median < FASTEST_S:

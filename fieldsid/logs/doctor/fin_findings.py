@@ -1,4 +1,4 @@
-"""Findings on fins and what follows them: a range no fin has, a motion that comes before the fin, a fin beyond its limit."""
+"""Findings on fins: an impossible range, a response that precedes the fin, a fin beyond its limit, a rolled vehicle."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
 WIDEST = 0.8
-"""Deflection in rad, 46 deg, that no fin of a vehicle has: the flow leaves it at half of that."""
+"""Deflection in rad (46 deg) that no fin of a vehicle reaches: a fin stalls at half of that."""
 BEYOND = math.pi
-"""Deflection in rad that no fin, rudder or turning thruster reaches: such numbers are in another unit."""
+"""Angle in rad that no fin, rudder or azimuth thruster exceeds: larger numbers are in another unit."""
 BEFORE_S, AFTER_S = 0.5, 1.0
-"""Times over which what moves before a step is set against what moves after it: so long the fin must have been still before,
-for the last step's answer to be over."""
+"""Times before and after a fin step over which the responses are compared. The fin must have been constant for their sum before
+a step, so that the response to the previous step is over."""
 EARLY = 0.15
-"""Share of the answer to a step that may come before it, by what is left of the motion before."""
+"""Largest share of the response to a step that may precede it, as the remainder of earlier motion."""
 FEWEST = 5
 ROLLED = math.acos(0.9)
-"""Roll in rad from which on the rate about the body's axis is a tenth off that of the heading: r = psi' cos(phi)."""
+"""Roll phi in rad at which the yaw rate of the body differs by a tenth from that of the heading: r = psi' cos(phi)."""
 
 
 def fin_findings(run: Run) -> list[Note]:
-    """Return the findings on the fins of a run, and on the roll under which they were used."""
+    """Return the findings on the fins and on the roll of a run."""
     found = []
     for (_, rate), (fin, _) in AXES:
         if run.has(fin):
-            found += [*_range(run, fin), *_early(run, fin, rate)]
-    return [*found, *(_roll(run) if run.has("roll_rad") else [])]
+            found += [*_range_finding(run, fin), *_early_response(run, fin, rate)]
+    return [*found, *(_roll_finding(run) if run.has("roll_rad") else [])]
 
 
-def _range(run: Run, fin: str) -> list[Note]:
+def _range_finding(run: Run, fin: str) -> list[Note]:
     largest = float(np.nanpercentile(np.abs(run[fin]), 99))
     if not WIDEST < largest <= 1.6:
         return []
@@ -51,7 +51,7 @@ def _range(run: Run, fin: str) -> list[Note]:
 
 
 def refuse_no_angle(run: Run, fin: str) -> None:
-    """Raise DataError where a fin's numbers (rad) are none of an angle: a fit would go through, its authority in no unit."""
+    """Raise DataError where the numbers of a fin cannot be an angle in rad: a fit would succeed with b2 in an unknown unit."""
     values = run[fin][np.isfinite(run[fin])]
     if not float(np.abs(values).max(initial=0.0)) > BEYOND or not float(np.percentile(np.abs(values), 99)) > BEYOND:
         return
@@ -64,8 +64,8 @@ def refuse_no_angle(run: Run, fin: str) -> None:
     )
 
 
-def _early(run: Run, fin: str, rate: str) -> list[Note]:
-    """The mean answer of the rate about steps of the fin: what comes before the step cannot be its answer."""
+def _early_response(run: Run, fin: str, rate: str) -> list[Note]:
+    """Return the finding that part of the mean response of the rate to fin steps precedes them: the fin is logged late."""
     both = together(run, fin, rate)
     if both is None:
         return []
@@ -78,11 +78,11 @@ def _early(run: Run, fin: str, rate: str) -> list[Note]:
     value = np.interp(at, time, answer)
     before = side * (value - np.interp(at - BEFORE_S, time, answer))
     after = side * (np.interp(at + AFTER_S, time, answer) - value)
-    whole = float(np.mean(before + after))
+    response = float(np.mean(before + after))
     error = float(np.std(before, ddof=1)) / math.sqrt(at.size)
-    share = float(np.mean(before)) / whole if whole != 0.0 else 0.0
-    of_whole = float(np.std(before + after, ddof=1)) / math.sqrt(at.size)
-    is_clear = abs(float(np.mean(before))) > SURE * error and abs(whole) > SURE * of_whole
+    share = float(np.mean(before)) / response if response != 0.0 else 0.0
+    response_error = float(np.std(before + after, ddof=1)) / math.sqrt(at.size)
+    is_clear = abs(float(np.mean(before))) > SURE * error and abs(response) > SURE * response_error
     if not is_clear or share <= EARLY:
         return []
     message = (
@@ -93,7 +93,7 @@ def _early(run: Run, fin: str, rate: str) -> list[Note]:
 
 
 def _steps(time: FloatArray, fin: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the last times before steps of a fin, and their sizes (k,), of those before which it was still."""
+    """Return the times (k,) just before steps of a fin that was constant before them, and the sizes (k,) of the steps."""
     change = np.diff(fin)
     moved = np.flatnonzero(np.abs(change) > 1e-3 * float(np.ptp(fin)))
     if not moved.size:
@@ -103,7 +103,7 @@ def _steps(time: FloatArray, fin: FloatArray) -> tuple[FloatArray, FloatArray]:
     return time[kept], change[kept]
 
 
-def _roll(run: Run) -> list[Note]:
+def _roll_finding(run: Run) -> list[Note]:
     seen = np.isfinite(run["roll_rad"])
     time, roll = run.time[seen], np.abs(run["roll_rad"][seen])
     share = float(np.mean((roll > ROLLED) & (roll < math.pi - ROLLED)))
@@ -111,13 +111,13 @@ def _roll(run: Run) -> list[Note]:
         return []
     message = (
         f"roll_rad is beyond {math.degrees(ROLLED):.0f} deg for {100 * share:.0f} % of the run (limit 5 %): there yaw and pitch "
-        f"answer to both fins, and no model of one axis holds{_upright(time, roll)}"
+        f"answer to both fins, and no model of one axis holds{_upright_advice(time, roll)}"
     )
     return [Note("rolled", message, {"signal": "roll_rad", "value": share, "limit": 0.05})]
 
 
-def _upright(time: FloatArray, roll: FloatArray) -> str:
-    """Return the advice to take the longest stretch between rolls of this size; nothing where there is none."""
+def _upright_advice(time: FloatArray, roll: FloatArray) -> str:
+    """Return the advice to use the longest stretch with a small roll; empty where there is none."""
     starts, behind = blocks_of(roll <= ROLLED)
     if not starts.size:
         return ""
@@ -126,22 +126,21 @@ def _upright(time: FloatArray, roll: FloatArray) -> str:
 
 
 BEYOND_SHARE = 0.05
-"""Share of a run in which a command may be beyond the fin's limit."""
+"""Largest share of a run in which a command may exceed the limit of the fin."""
 FIN_ZERO = 0.0175
-"""One degree, in rad: a fin's zero is not rigged better. Commands about a trim reach so far beyond the limit; a smaller offset
-is not counted on, nor against."""
+"""One degree in rad, the accuracy of a fin's zero. Commands about a trim may exceed the limit by as much."""
 
 
 def limit_findings(run: Run, fin_max_rad: Mapping[str, float]) -> list[Note]:
-    """Return the findings on a run that hang on its vehicle: fins beyond the limits (rad) given for their signals."""
-    return [note for fin, limit in fin_max_rad.items() for note in _beyond(run, fin, limit)]
+    """Return the findings that depend on the vehicle: fins beyond the limits (rad) given by signal."""
+    return [note for fin, limit in fin_max_rad.items() for note in _limit_finding(run, fin, limit)]
 
 
-def _beyond(run: Run, fin: str, limit: float) -> list[Note]:
-    """Return that a fin was measured, or commanded for long, beyond its limit (rad)."""
+def _limit_finding(run: Run, fin: str, limit: float) -> list[Note]:
+    """Return the finding that a fin was measured or commanded beyond its limit (rad) for more than BEYOND_SHARE of the run."""
     measured, stated = f"{fin.removesuffix('_rad')}_measured_rad", f"`{fin.removesuffix('_rad')}_max_rad` of vehicle.yaml"
     name = measured if run.has(measured) else fin
-    if not run.has(name) or (share := _share(run, name, limit)) <= BEYOND_SHARE:
+    if not run.has(name) or (share := _share_beyond(run, name, limit)) <= BEYOND_SHARE:
         return []
     reach = float(np.nanmax(np.abs(run[name])))
     message = (
@@ -155,15 +154,15 @@ def _beyond(run: Run, fin: str, limit: float) -> list[Note]:
     return [Note("saturated", message + advice, data)]
 
 
-def _share(run: Run, name: str, limit: float) -> float:
+def _share_beyond(run: Run, name: str, limit: float) -> float:
     return float(np.mean(np.abs(run[name][np.isfinite(run[name])]) > limit + FIN_ZERO))
 
 
 def share_beyond(run: Run, fin: str, limit: float) -> float:
-    """Return the share of a run in which a fin's command is beyond its limit (rad); one that is at it shows where the fin is.
+    """Return the share of a run in which the command of a fin exceeds its limit (rad), so that the fin angle is unknown.
 
-    Nothing is hidden where the fin itself was measured.
+    The share is zero where the fin itself was measured.
     """
     if run.has(f"{fin.removesuffix('_rad')}_measured_rad") or fin.endswith("_measured_rad"):
         return 0.0
-    return _share(run, fin, limit)
+    return _share_beyond(run, fin, limit)

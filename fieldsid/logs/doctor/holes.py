@@ -1,7 +1,7 @@
-"""Holes in a fin's log that hide a move: what the fin did meanwhile nobody knows, and a fit that takes it as held is wrong.
+"""Gaps in the log of a fin that hide a movement: a fit that assumes a constant fin over such a gap is wrong.
 
-A log with a usual step has a hole where the next sample comes more than FEW_STEPS steps later, whether the other signals go on
-or not; a command that is published when it changes has none. Where the fin is at another angle after a hole the run is cut
+A log with regular steps has a hole where the next sample comes more than FEW_STEPS steps later, whether or not the other signals
+continue; a command that is published when it changes has no holes. Where the fin is at another angle after a hole, the run is cut
 there, and the part in which the fin moves most is used.
 """
 
@@ -17,16 +17,16 @@ from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 JITTER = 0.35
-"""Share of the usual step within which steps differ by the clock's jitter, not by a sample that is missing."""
+"""Relative deviation from the usual step that is jitter of the clock and not a missing sample."""
 REGULAR = 0.9
-"""Share of the steps that are the usual one, but for jitter, from which on a longer one has lost samples."""
+"""Smallest share of usual steps, within jitter, in a log with regular steps, in which a longer step has missing samples."""
 MOVED = 0.25
-"""Share of the fin's range from which on a change is a move; over a hole less is held, or taken as half way."""
+"""Share of the range of a fin from which on a change is a movement; a smaller one over a hole is neglected."""
 
 
 @dataclass(frozen=True, slots=True)
 class Hole:
-    """A hole in a fin's log: its last sample before and the first after, in s, and the fin there, in rad."""
+    """A hole in the log of a fin: times in s and fin angles in rad of the last sample before it and the first after it."""
 
     start_s: float
     end_s: float
@@ -35,7 +35,7 @@ class Hole:
 
 
 def usual_step(steps: FloatArray) -> float | None:
-    """Return the usual one of steps (n,) in s, None where there is none."""
+    """Return the usual step of steps (n,) in s; None where they are irregular."""
     if steps.size == 0:
         return None
     usual = float(np.median(steps))
@@ -43,12 +43,12 @@ def usual_step(steps: FloatArray) -> float | None:
 
 
 def is_usual(regular: BoolArray) -> bool:
-    """Whether the median of some steps is their usual one, told by which of them differ from it by jitter alone (n,)."""
+    """Return whether steps are regular: `regular` (n,) marks those that differ from their median by jitter only."""
     return bool(np.count_nonzero(regular) > REGULAR * regular.size)
 
 
 def holes_of(time: FloatArray, fin: FloatArray) -> tuple[Hole, ...]:
-    """Return the holes of a fin (n,) in rad, NaN where its log has nothing, at times (n,) in s."""
+    """Return the holes in a fin (n,) in rad at times (n,) in s; NaN marks a missing sample."""
     seen = np.flatnonzero(np.isfinite(fin))
     steps = np.diff(time[seen])
     usual = usual_step(steps)
@@ -68,7 +68,7 @@ def hiding(holes: Sequence[Hole], fin: FloatArray) -> tuple[Hole, ...]:
 
 
 def unbroken(run: Run, signal: str) -> Run:
-    """Return the part of a run between holes that hide a move of a fin's signal, that in which the fin moves most."""
+    """Return the part of a run, between holes that hide a movement of the fin, in which the fin moves most."""
     hidden = hiding(holes_of(run.time, run[signal]), run[signal])
     if not hidden:
         return run
@@ -80,18 +80,18 @@ def unbroken(run: Run, signal: str) -> Run:
 
 
 def hole_notes(run: Run, signal: str) -> tuple[Note, ...]:
-    """Return what the holes of a fin's signal mean for a fit of the run; one without samples at all is the clock's."""
+    """Return notes on the consequences of the holes in a fin signal for a fit; a gap of all signals is not one of them."""
     holes = holes_of(run.time, run[signal])
     hidden = hiding(holes, run[signal])
-    held = [h for h in holes if h not in hidden and ((run.time > h.start_s) & (run.time < h.end_s)).any()]
+    taken_as_constant = [h for h in holes if h not in hidden and ((run.time > h.start_s) & (run.time < h.end_s)).any()]
     notes = []
     if hidden:
         used, h = unbroken(run, signal), max(hidden, key=_length)
         says = f" and is at {h.after:.3g} rad then, not at {h.before:.3g}: when it moved is not in the log, so that only "
         part = f"{used.time[0]:.2f} .. {used.time[-1]:.2f} s are used"
         notes.append(_note("fin_unknown", run, signal, hidden, says + part))
-    if held:
-        notes.append(_note("fin_missing", run, signal, held, ": taken as held"))
+    if taken_as_constant:
+        notes.append(_note("fin_missing", run, signal, taken_as_constant, ": taken as held"))
     return tuple(notes)
 
 

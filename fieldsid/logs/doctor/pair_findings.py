@@ -1,7 +1,7 @@
-"""Findings on signals that must agree: a speed and the way made, its course and the heading, a dive and its pitch, fins.
+"""Findings on signals that must agree: speed and position, course and heading, depth and pitch, command and fin.
 
-With x north and y east the course atan2(dy, dx) goes with the heading; with x east and y north it goes against it, to pi/2. A
-vehicle dives by its pitch: d(depth)/dt = -u sin(pitch) + w cos(pitch) (Fossen 2011, eq. 2.30, without roll).
+With x north and y east the course atan2(dy, dx) increases with the heading; with x east and y north it is pi/2 minus that. The
+depth follows the pitch: d(depth)/dt = -u sin(pitch) + w cos(pitch) (Fossen 2011, eq. 2.30, without roll).
 """
 
 from __future__ import annotations
@@ -23,25 +23,31 @@ from fieldsid.numerics.shifted_correlation import lag_of, slope_of
 from fieldsid.numerics.trapezoid import trapezoid_integral
 
 SPEEDS = {unit: factor_to("surge_m_s", unit) for unit in ("kn", "mph", "km/h", "ft/s", "cm/s", "mm/s")}
-"""Units in which a speed is logged, in m/s."""
+"""Units of speeds, in m/s."""
 LEAST_WAY, MOST_WAY = 0.6, 1.5
-"""How many times the speed the way made in a second may be: a current and a slip lie between."""
+"""Limits of the ratio of the speed from positions to the logged speed; currents and sideslip stay within."""
 SLOWEST = 0.1
-"""Speed in m/s below which the way made is the sensors' noise."""
+"""Speed in m/s below which a distance is mostly sensor noise."""
 SLOW_RPM = 30.0
 MOST_ADVANCE_M = 4.0
-"""Way made in a turn of a propeller that is larger than any this program's vehicles have."""
+"""Advance in m per turn of the propeller that no vehicle of this kind reaches."""
 
 
 def pair_findings(run: Run, stated: Stated) -> list[Note]:
     """Return the findings on pairs of signals of a run."""
     of_fins = [note for _, (command, fin) in AXES for note in _command_and_fin(run, command, fin, stated)]
-    return [*_speed_and_way(run, stated), *_speed_and_turns(run), *of_fins, *_course(run), *_dive(run, stated)]
+    return [
+        *_speed_and_distance(run, stated),
+        *_speed_and_turns(run),
+        *of_fins,
+        *_course_findings(run),
+        *_dive_findings(run, stated),
+    ]
 
 
-def _speed_and_way(run: Run, stated: Stated) -> list[Note]:
-    """The way made over five seconds against the speed; a current may change it, a unit changes it more."""
-    ratio = _way_by_speed(run)
+def _speed_and_distance(run: Run, stated: Stated) -> list[Note]:
+    """Return the finding that the speed from positions over 5 s and the logged speed differ by a factor, as by a wrong unit."""
+    ratio = _distance_to_speed_ratio(run)
     if ratio is None or LEAST_WAY < ratio < MOST_WAY:
         return []
     unit = unit_of_ratio(ratio, SPEEDS) if stated.is_si("surge_m_s") else None
@@ -56,26 +62,26 @@ def _speed_and_way(run: Run, stated: Stated) -> list[Note]:
 
 
 def goes_with_way(run: Run) -> bool:
-    """Whether the way made by x and y is that of the speed."""
-    ratio = _way_by_speed(run)
+    """Return whether the speed from x and y agrees with the logged speed."""
+    ratio = _distance_to_speed_ratio(run)
     return ratio is not None and LEAST_WAY < ratio < MOST_WAY
 
 
-def _way_by_speed(run: Run) -> float | None:
-    """Return how many times the speed the way made in a second is; None where there is too little of either."""
+def _distance_to_speed_ratio(run: Run) -> float | None:
+    """Return the ratio of the speed from positions to the logged speed; None where there is too little of either."""
     seen = together(run, "x_m", "y_m", "surge_m_s")
     if seen is None or seen[0].size <= 2 * (width := width_of(seen[0], 5.0)):
         return None
     time, x, y, surge = seen
     made = np.hypot(over(x, width), over(y, width)) / over(time, width)
-    said = np.abs(over(trapezoid_integral(time, surge), width)) / over(time, width)
-    # In a turn the straight way is shorter than the path, so the fastest windows decide.
-    fast = float(np.percentile(said, 90))
+    speed_logged = np.abs(over(trapezoid_integral(time, surge), width)) / over(time, width)
+    # In a turn the straight distance is shorter than the path, so the fastest windows are compared.
+    fast = float(np.percentile(speed_logged, 90))
     return float(np.percentile(made, 90)) / fast if fast > SLOWEST else None
 
 
 def _speed_and_turns(run: Run) -> list[Note]:
-    """The way made in a turn of the propeller: a few tenths of a metre, whatever its slip."""
+    """Return the finding that the advance per turn of the propeller is impossible: it is a few tenths of a metre."""
     seen = together(run, "propeller_rpm", "surge_m_s")
     if seen is None:
         return []
@@ -114,25 +120,25 @@ def _command_and_fin(run: Run, command: str, fin: str, stated: Stated) -> list[N
 
 WINDOW_S = 3.0
 AGREES = 0.9
-"""Length of the mean unit vector of the angle between two directions from which on they agree."""
+"""Smallest length of the mean unit vector of the angle between two directions that agree."""
 TURNED = 0.2
-"""How much better the one must agree than the other: the heading must have turned for that."""
+"""Smallest difference of two agreements for a finding; the heading must turn for it to occur."""
 ALL_BUT = 0.95
-"""Share of the windows in which the vehicle must have moved for its course to be followed round."""
+"""Smallest share of windows with motion in which the course can be unwrapped."""
 RATIO = 2.0
-"""How much further than the heading the course may turn: a hull that slides in a turn turns as far as its course in the end."""
+"""Largest ratio of the turns of course and heading: a vehicle with sideslip turns as far as its course in the end."""
 FEWEST_MOVED = 20
 LEAST_DIVE, MOST_DIVE = ALIKE
-"""How many times what speed and pitch say a depth may change: a heave lies between."""
+"""Limits of the ratio of the change of depth to that from speed and pitch; a heave velocity stays within."""
 DEPTHS = {unit: factor_to("depth_m", unit) for unit in ("ft", "fathom", "cm", "mm")}
-"""Units in which a depth is logged, in m."""
+"""Units of depths, in m."""
 HEADINGS = {"deg": math.degrees(1.0), "rad": math.radians(1.0)}
-"""Units in which a heading is that was taken for the other one, by how many times as far it turns."""
+"""The unit to set for a heading that was read in the other unit, with the factor of its turns."""
 
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """The course made (m,) over windows of `width` samples in which a vehicle moved, what goes with it, and their share."""
+    """Course (m,) in rad over windows of `width` samples with motion, with heading, yaw rate, distance, and their share."""
 
     course: FloatArray
     heading: FloatArray
@@ -143,7 +149,7 @@ class Course:
 
     @property
     def slope(self) -> float | None:
-        """How far the course turns for a turn of the heading; None where they do not go together, or it is not followed round."""
+        """Ratio of the turns of course and heading; None where they are uncorrelated or the course cannot be unwrapped."""
         c, h = np.unwrap(self.course) - np.unwrap(self.course).mean(), self.heading - self.heading.mean()
         power = math.sqrt(float(c @ c) * float(h @ h))
         if self.moved <= ALL_BUT or power == 0.0 or float(c @ h) / power < AGREES or float(np.std(c)) < TURNED:
@@ -152,7 +158,7 @@ class Course:
 
 
 def course_of(run: Run, window_s: float = WINDOW_S) -> Course | None:
-    """Return the course that a run makes over windows in s; None where it makes none."""
+    """Return the course of a run over windows in s; None where there is too little motion."""
     seen = together(run, "x_m", "y_m", "yaw_rad")
     if seen is None or seen[0].size <= 4 * (width := width_of(seen[0], window_s)):
         return None
@@ -168,11 +174,11 @@ def course_of(run: Run, window_s: float = WINDOW_S) -> Course | None:
     return Course(np.arctan2(dy, dx)[moved], mean[moved], rate[moved], way[moved], share, width)
 
 
-def _course(run: Run) -> list[Note]:
+def _course_findings(run: Run) -> list[Note]:
     found = course_of(run)
     if found is None:
         return []
-    # by the way made: a course of little more than the sensors' noise says little
+    # weighted by the distance: the course of a short distance is mostly sensor noise
     along, against = (
         complex(np.average(np.exp(1j * (found.course - s * found.heading)), weights=found.way)) for s in (1.0, -1.0)
     )
@@ -203,13 +209,13 @@ def _course(run: Run) -> list[Note]:
 
 
 def goes_along_course(run: Run) -> bool:
-    """Whether the course made turns as far as the heading does, and turns at all: so it is in the unit it is taken in."""
+    """Return whether the course turns, and as far as the heading: the heading is then in the unit in which it was read."""
     found = course_of(run)
     return found is not None and found.slope is not None and 1.0 / RATIO < found.slope < RATIO
 
 
 def _dive_unit(slope: float, stated: Stated) -> list[Note]:
-    """Return the finding that a depth changes by a unit's factor of what speed and pitch say; the unit where one may be it."""
+    """Return the finding that the depth and speed with pitch differ by the factor of a unit, with the unit where it is unique."""
     may = [("depth_m", u) for u, f in DEPTHS.items() if abs(slope * f - 1.0) < UNIT_LIMIT and stated.is_si("depth_m")]
     may += [("surge_m_s", u) for u, f in SPEEDS.items() if abs(slope / f - 1.0) < UNIT_LIMIT and stated.is_si("surge_m_s")]
     if not may:
@@ -225,27 +231,27 @@ def _dive_unit(slope: float, stated: Stated) -> list[Note]:
 
 
 def goes_with_depth(run: Run) -> bool:
-    """Whether the depth changes as speed and pitch say, in the units that they are taken in."""
-    found = _dived(run)
+    """Return whether the depth changes as speed and pitch predict, in the units in which they were read."""
+    found = _depth_correlation(run)
     return found is not None and found[0] > TRUSTED and LEAST_DIVE < found[1] < MOST_DIVE
 
 
-def _dived(run: Run) -> tuple[float, float] | None:
-    """Return the correlation of the depth's change with what speed and pitch make of it, and their slope; None for too little."""
+def _depth_correlation(run: Run) -> tuple[float, float] | None:
+    """Return the correlation and slope of the change of depth on that from speed and pitch; None where there is too little."""
     seen = together(run, "depth_m", "pitch_rad", "surge_m_s")
     if seen is None or seen[0].size <= 4 * (width := width_of(seen[0], WINDOW_S)):
         return None
     time, depth, pitch, surge = seen
-    made, wanted = over(depth, width), over(trapezoid_integral(time, -surge * np.sin(pitch)), width)
-    # Fisher's z = atanh(r), over windows that share no sample
+    made, predicted = over(depth, width), over(trapezoid_integral(time, -surge * np.sin(pitch)), width)
+    # Fisher's z = atanh(r), with the number of windows that do not overlap
     enough = math.atanh(TRUSTED) * math.sqrt(max(made.size / width - 3.0, 0.0)) >= SURE
-    if not enough or float(np.ptp(made)) == 0.0 or float(np.ptp(wanted)) == 0.0:
+    if not enough or float(np.ptp(made)) == 0.0 or float(np.ptp(predicted)) == 0.0:
         return None
-    return float(np.corrcoef(made, wanted)[0, 1]), float(np.std(made) / np.std(wanted))
+    return float(np.corrcoef(made, predicted)[0, 1]), float(np.std(made) / np.std(predicted))
 
 
-def _dive(run: Run, stated: Stated) -> list[Note]:
-    found = _dived(run)
+def _dive_findings(run: Run, stated: Stated) -> list[Note]:
+    found = _depth_correlation(run)
     if found is None:
         return []
     trust, slope = found

@@ -1,4 +1,4 @@
-"""Findings on one signal at a time: constant, frozen, missing, coarse, spiked, or in a unit that cannot be meant."""
+"""Findings on single signals: constant, frozen, missing, coarse, with spikes, or in an impossible unit."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from fieldsid.logs.run import FINS, GOALS, MEASURED, MOTORS, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
 FITTED = frozenset({"yaw_rad", "pitch_rad", "yaw_rate_rad_s", "pitch_rate_rad_s"})
-"""What the free run is fitted to."""
+"""The signals to which the free run is fitted."""
 MISSING_LIMIT = 0.05
 FROZEN_S = 1.0
 COARSE_LIMIT = 0.3
-"""Share of samples equal to the one before, above which a signal is called coarse."""
+"""Largest share of samples equal to the one before; above it a signal is coarse, or is not examined for being frozen."""
 
 LARGEST = {
     "pitch_rad": (1.6, "deg"), "pitch_goal_rad": (1.6, "deg"),
@@ -27,7 +27,7 @@ LARGEST = {
     "rudder_measured_rad": (1.6, "deg"), "elevator_measured_rad": (1.6, "deg"),
     "surge_m_s": (8.0, "kn"), "depth_m": (11000.0, "mm"),
 }  # fmt: skip
-"""Largest size of a signal that can be meant, and the unit it is probably in when it is larger."""
+"""Largest plausible magnitude of a signal, and its probable unit where it is larger."""
 
 
 def signal_findings(run: Run, name: str, stated: Stated) -> list[Note]:
@@ -51,7 +51,7 @@ def _missing(name: str, seen: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> lis
     apart = float(np.median(steps)) if steps.size else 1.0
     if name not in MEASURED and apart > 1.0 and usual_step(steps) is None:
         return []  # a command that is published when it changes
-    # of a sensor slower than the clock only its own samples can be missing
+    # a sensor slower than the clock lacks samples only where its own are missing
     share = 1.0 - apart * float(seen.mean())
     if share <= MISSING_LIMIT:
         return []
@@ -67,12 +67,12 @@ def _size(run: Run, name: str, values: FloatArray, stated: Stated) -> list[Note]
     found = []
     if largest > limit and not (name == "surge_m_s" and goes_with_way(run)):
         servo = servo_of(values) if name in FINS and stated.is_si(name) else None
-        advice, told = stated.probable(name, unit, largest, limit)
+        advice, unit_data = stated.probable(name, unit, largest, limit)
         if servo is not None:
             advice = f"whole numbers about {servo.centre:g}, as a servo has: set `unit: counts` and `centre: {servo.centre:g}`"
-            told = {}
+            unit_data = {}
         message = f"{name} reaches {largest:.4g} {SIGNALS[name]} (limit {limit:g}): {advice}"
-        found.append(Note("unit", message, {"signal": name, "value": largest, "limit": limit, **told}))
+        found.append(Note("unit", message, {"signal": name, "value": largest, "limit": limit, **unit_data}))
     middle = float(np.median(values))
     if name == "surge_m_s" and middle < -0.1:
         message = f"surge_m_s is negative, {middle:.3g} m/s in the middle: {stated.flip(name)}, or set the frame"
@@ -81,7 +81,7 @@ def _size(run: Run, name: str, values: FloatArray, stated: Stated) -> list[Note]
 
 
 def _frozen(name: str, time: FloatArray, values: FloatArray) -> list[Note]:
-    """A sensor that repeats one value for long, among values that otherwise change."""
+    """Return the finding that a sensor repeats one value for long, among values that otherwise change."""
     same = np.diff(values) == 0.0
     if same.mean() > COARSE_LIMIT:
         return []

@@ -1,4 +1,4 @@
-"""What a mapping has said of a log already: the doctor advises nothing that is done, and takes back what is wrong."""
+"""The units, signs and stamps that a mapping states, so that the doctor advises no correction that was already made."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from fieldsid.logs.run import SIGNALS, signal_of
 
 @dataclass(frozen=True, slots=True)
 class Stated:
-    """Units by signal, the signals whose sign is turned, and those that are asked to take the stamps of their receipt."""
+    """Units by signal, the signals whose sign the mapping reverses, and those that use the stamps of receipt."""
 
     units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     turned: frozenset[str] = frozenset()
     received: frozenset[str] = frozenset()
 
     def is_si(self, signal: str) -> bool:
-        """Whether a signal's numbers were taken as they are: no unit was stated, or its own."""
+        """Return whether the numbers of a signal were read as SI: no unit was stated, or the SI unit."""
         return self.units.get(signal) in (None, SIGNALS[signal])
 
     def probable(self, signal: str, unit: str, largest: float, limit: float) -> tuple[str, dict[str, str]]:
-        """Return what to do about a signal that is larger than can be meant, and may be in a unit; and the unit to set if any."""
+        """Return the advice on a signal that is implausibly large and may be in `unit`, and the unit to set if any."""
         if not self.is_si(signal):
             return f"taken as `{self.units[signal]}` already: check which one it is", {}
         if largest * factor_to(signal, unit) <= limit:
@@ -33,17 +33,17 @@ class Stated:
         return "check its unit, and which one it is", {}
 
     def flip(self, *signals: str) -> str:
-        """Return how the sign of one of some signals is turned."""
+        """Return the advice on how to reverse the sign of one of the signals."""
         turned = next((s for s in signals if s in self.turned), None)
         return f"take `sign: -1` away from {turned}" if turned else f"set `sign: -1` at {' or '.join(signals)}"
 
     def stamps(self, *signals: str) -> str:
-        """Return the advice to take the stamps of measuring, where those of receipt were asked for; nothing elsewhere."""
+        """Return the advice to use the stamps of the header, where the mapping uses those of receipt; empty elsewhere."""
         return "; use `stamp: header` where the log has them" if any(s in self.received for s in signals) else ""
 
 
 def stated_by(mapping: ChannelMap, raw: RawLog) -> Stated:
-    """Return what a mapping, and the log itself, state of the signals of a log."""
+    """Return the units, signs and stamps that a mapping, and the log itself, state."""
     units = {s: v.unit for s, v in raw.series.items() if v.unit} | {s: c.unit for s, c in mapping.sources.items() if c.unit}
     return Stated(
         MappingProxyType({signal_of(s): u for s, u in units.items() if signal_of(s) in SIGNALS}),

@@ -1,4 +1,4 @@
-"""Signals where a run has all of them, and how they change over windows of some samples."""
+"""Samples at which a run has several signals, and the changes of signals over windows of samples."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from fieldsid.logs.run import Run
 from fieldsid.numerics.arrays import FloatArray
 
 FEWEST = 50
-"""Samples, or windows, from which on signals are compared."""
+"""Fewest samples or windows over which signals are compared."""
 SURE = 4.0
-"""Standard errors from which on a difference is no chance: 16,000 of noise alone make one."""
+"""Standard errors from which on a difference is significant: one of 16,000 differences of pure noise exceeds it."""
 Number = TypeVar("Number", np.float64, np.complex128)
 
 
 def together(run: Run, *signals: str) -> tuple[FloatArray, ...] | None:
-    """Return the times (n,) at which a run has all of some signals, and them there; None where it lacks one, or has too few."""
+    """Return the times (n,) at which a run has all the signals, and the signals (n,) at them; None below FEWEST samples."""
     if not all(run.has(s) for s in signals):
         return None
     seen = np.all([np.isfinite(run[s]) for s in signals], axis=0)
@@ -26,18 +26,18 @@ def together(run: Run, *signals: str) -> tuple[FloatArray, ...] | None:
 
 
 def width_of(time: FloatArray, window_s: float) -> int:
-    """Return the samples of a window at times (n,)."""
+    """Return the number of samples in a window of some s, for times (n,)."""
     step = float(np.nanmedian(np.diff(time))) if time.size > 1 else 0.0
     return max(1, round(window_s / step)) if step > 0.0 else 1
 
 
 def over(values: npt.NDArray[Number], width: int) -> npt.NDArray[Number]:
-    """Return the changes (n - width,) of numbers over windows of so many samples."""
+    """Return the changes (n - width,) of numbers over windows of `width` samples."""
     return values[width:] - values[:-width]
 
 
 def change(values: npt.NDArray[Number], width: int) -> npt.NDArray[Number]:
-    """Return the change of a column (n,) over a window about each sample, NaN at the ends."""
+    """Return the change (n,) of a column over a window of `width` samples centred at each sample, NaN at the ends."""
     found = np.full_like(values, np.nan)
     if values.size > width:
         found[width // 2 :][: values.size - width] = over(values, width)

@@ -1,1 +1,1 @@
-"""Which column or topic is which signal: names, their meaning, and the mapping file."""
+"""The mapping of columns and topics to signals: names, their meaning, and the mapping file."""

@@ -1,6 +1,7 @@
-"""Whether a proposed mapping may be used unasked: what an axis needs is told by names, agrees with the numbers, has its units.
+"""The decision whether a proposed mapping is used without confirmation by the user.
 
-What is in doubt is said with its reason. A mapping is asked for where an axis needs it, and it is left out where none does.
+It is used where names state the signals that an axis needs, the numbers agree with them, and their units are known. A signal in
+doubt is reported with the reason; it is left out where no axis needs it, else the user must write a mapping.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from fieldsid.logs.mapping.draft import place_of
 from fieldsid.logs.mapping.trial import Proposal
 from fieldsid.logs.run import READ_AS, Note
 
-SAID: Mapping[str, str] = MappingProxyType(
+DOUBT_REASONS: Mapping[str, str] = MappingProxyType(
     {"alternatives": "it may be another one", "left_out": "it cannot be read", "frame_open": "port and starboard are open",
      "course_against": "the course goes against it", "course_slope": "the course turns otherwise", "unit": "its unit is open",
      "course_offset": "the course is off it", "fin_range": "no fin goes so far", "fin_late": "the motion comes before it",
@@ -25,14 +26,14 @@ SAID: Mapping[str, str] = MappingProxyType(
      "over_ground": "it may be a course over ground"}
     | dict.fromkeys(CONTRADICTING - {"unit"}, "angle and rate contradict each other")
 )  # fmt: skip
-"""Codes of notes that put the signal they name in doubt, and how that is said."""
-OF_ALL = frozenset({"rate_guessed", "time_guessed", "time_unit"})
-"""Codes of notes that put the time in doubt, and all with it."""
+"""The reason, in words, for the doubt about a signal, by the code of the note that names the signal."""
+TIME_DOUBTS = frozenset({"rate_guessed", "time_guessed", "time_unit"})
+"""Codes of notes that put the time in doubt, and hence all signals."""
 
 
 @dataclass(frozen=True, slots=True)
 class Certain:
-    """A mapping that is used unasked with the notes that say so, or none; and why signals are in doubt."""
+    """A mapping that is used without confirmation, or None; its notes; and the reason for the doubt about each signal."""
 
     mapping: ChannelMap | None
     notes: tuple[Note, ...]
@@ -40,16 +41,16 @@ class Certain:
 
 
 def certain_of(proposal: Proposal) -> Certain:
-    """Return what of a proposed mapping is beyond doubt, where that is all that an axis needs."""
+    """Return the signals of a proposed mapping that are beyond doubt, where they suffice for an axis."""
     from fieldsid.logs.mapping.mapping_file import mapping_of
 
     signals = proposal.body["signals"]
     notes = (*proposal.notes, *(() if proposal.run is None else proposal.run.notes))
     doubts = _doubts(signals, notes)
     sure = {s: item for s, item in signals.items() if s not in doubts}
-    if proposal.run is None or not is_enough(sure) or any(n.code in OF_ALL for n in notes):
+    if proposal.run is None or not is_enough(sure) or any(n.code in TIME_DOUBTS for n in notes):
         return Certain(None, (), MappingProxyType(doubts))
-    return Certain(mapping_of(proposal.body | {"signals": sure}), (_said(sure, doubts),), MappingProxyType(doubts))
+    return Certain(mapping_of(proposal.body | {"signals": sure}), (_read_as_note(sure, doubts),), MappingProxyType(doubts))
 
 
 def _doubts(signals: Mapping[str, Any], notes: Iterable[Note]) -> dict[str, str]:
@@ -60,17 +61,17 @@ def _doubts(signals: Mapping[str, Any], notes: Iterable[Note]) -> dict[str, str]
             found |= dict.fromkeys(note.data["signals"], "nothing tells its unit")
         elif note.code == "evidence" and ({"column", "outputs"} & note.data.keys() or "sign" in str(note.data.get("finding"))):
             found[note.data["signal"]] = "only the numbers say so"
-        elif note.code in SAID:
-            found |= {s: SAID[note.code] for s in named if s in signals or s in ANGLES}
+        elif note.code in DOUBT_REASONS:
+            found |= {s: DOUBT_REASONS[note.code] for s in named if s in signals or s in ANGLES}
     if ATTITUDE in signals and (angles := [s for s in ANGLES if s in found]):
-        # in a plane two of its angles never move
-        moves = [s for s in angles if found[s] != SAID["constant"]]
+        # in motion in one plane two of the three angles are constant
+        moves = [s for s in angles if found[s] != DOUBT_REASONS["constant"]]
         found |= {ATTITUDE: found[moves[0] if moves else angles[0]]} if moves or len(angles) == len(ANGLES) else {}
     return found
 
 
-def _said(sure: Mapping[str, Any], doubts: Mapping[str, str]) -> Note:
-    """Return the line that says how a log is read: each signal with its place and unit, and what was left out."""
+def _read_as_note(sure: Mapping[str, Any], doubts: Mapping[str, str]) -> Note:
+    """Return the note that states how a log is read: each signal with its column and unit, and the signals left out."""
     parts = [f"{_short(s)} from {place_of(item)}{_unit(item)}" for s, item in sure.items()]
     left = [f"{_short(s)} ({why})" for s, why in doubts.items()]
     message = f"read as: {', '.join(parts)}" + (f"; left out: {', '.join(left)}" if left else "")

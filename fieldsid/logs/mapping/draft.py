@@ -1,4 +1,4 @@
-"""What a mapping may be before the log is read with it: the surest guess for each signal, and what the numbers of a table say."""
+"""The draft of a mapping before the log is read with it: the best guess for each signal, from names and a table's numbers."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from fieldsid.logs.run import SIGNALS, Note
 SCHEMA = "fieldsid/mapping/1"
 REP103, NED = "ENU/FLU", "NED/FRD"
 GLIDER_CLOCK, GLIDER_SENSORS = "m_present_time", ("m_", "c_")
-"""The clock of a glider's table, and how the sensors begin that are measured or commanded: others are settings and sums."""
+"""The time column of a glider's table, and the prefixes of measured and commanded sensors; others are settings and totals."""
 _MESSAGE_PATH = re.compile(r"\bheader\.|\bpose\.pose\.|\btwist\.twist\.|\borientation\.[xyzw]$")
-"""What columns are called that were written from messages, which are in the frames of REP 103."""
+"""Names of columns that were written from messages, which are in the frames of REP 103."""
 NORTH_EAST_DOWN = frozenset({"ned", "px"})
-"""Words of topics whose frames are others: of one called so, and of PX4's."""
+"""Words of topics that are in NED and FRD: those with the frame in their name, and those of PX4."""
 OTHER_HEADINGS, OTHERS_SHOWN = 4, 3
-"""Headings beside the surest that are tried, and others of any signal that are named."""
+"""Number of alternative headings that are tried, and number of alternatives of any signal that a note names."""
 
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """A mapping's body, why it is that, the signals whose unit the format defines, and lines of other headings."""
+    """The body of a mapping, notes on it, the signals whose unit the format defines, and lines of alternative headings."""
 
     body: dict[str, Any]
     notes: tuple[Note, ...]
@@ -43,7 +43,7 @@ class Draft:
 
 
 def place_of(item: Mapping[str, Any]) -> str:
-    """Return where a mapping's line says that a signal is: its column, its topic and field, or those of its sum."""
+    """Return, in words, the source in a line of a mapping: its column, its topic and field, or those of its sum."""
     if "sum" in item:
         return " + ".join(map(place_of, item["sum"]))
     if "topic" in item:
@@ -55,7 +55,7 @@ def place_of(item: Mapping[str, Any]) -> str:
 
 
 def with_units_by_span(draft: Draft, inventory: Inventory) -> None:
-    """Set the units that the least and largest of a column say, in a log that cannot be read as it is."""
+    """Set the units that the smallest and largest value of a column indicate, in a log that cannot be read as it is."""
     spans = {c.name: c.fields[0].span for c in inventory.channels if len(c.fields) == 1}
     signals = draft.body["signals"]
     seen = {s: np.array(span) for s, item in signals.items() if (span := spans.get(item.get("column", ""))) is not None}
@@ -63,7 +63,7 @@ def with_units_by_span(draft: Draft, inventory: Inventory) -> None:
 
 
 def draft_of(inventory: Inventory) -> Draft:
-    """Return what is to be tried on a log."""
+    """Return the draft of a mapping for a log."""
     body: dict[str, Any] = {"schema": SCHEMA}
     names = [c.name for c in inventory.channels]
     guesses = [g for c in inventory.channels for g in of_topic(c)] if inventory.by_topic else _of_columns(inventory, names)
@@ -87,7 +87,7 @@ def draft_of(inventory: Inventory) -> Draft:
 
 
 def _of_columns(inventory: Inventory, names: list[str]) -> list[Guess]:
-    """Return what the columns of a table may be; a name that several have, or none, says nothing of which one is meant."""
+    """Return the guesses for the columns of a table; a column whose name is not unique is named by its index."""
     starts = GLIDER_SENSORS if GLIDER_CLOCK in names else ("",)
     return [
         guess
@@ -98,7 +98,7 @@ def _of_columns(inventory: Inventory, names: list[str]) -> list[Guess]:
 
 
 def _frame_of_topics(inventory: Inventory) -> str:
-    """Return the frames of a log of topics: those of its format, but for tables that were written from messages."""
+    """Return the frames of a log of topics: those of its format, or REP 103 for tables that were written from messages."""
     if any(c.kind == TABLE and _MESSAGE_PATH.search(f.path) for c in inventory.channels for f in c.fields):
         return REP103
     named = words_of(" ".join(c.name + c.kind for c in inventory.channels).lower())
@@ -106,16 +106,16 @@ def _frame_of_topics(inventory: Inventory) -> str:
 
 
 def _time(source: Source) -> dict[str, Any]:
-    """Return a time as a mapping has it: one column or several, its unit, and the columns of its days or weeks."""
+    """Return the line of a time in a mapping: one column or several, its unit, and the columns of the date or week."""
     date = source.date[0] if len(source.date) == 1 else list(source.date)
     line = {"column": source.column, "columns": list(source.columns), "unit": source.unit, "date": date, "week": source.week}
     return {key: value for key, value in line.items() if value not in (None, [])}
 
 
 def _combined(best: dict[str, Guess], attitude: dict[str, Any] | None) -> dict[str, Any]:
-    """Return the lines of signals, with those that give several together: latitude and longitude, a quaternion.
+    """Return the lines of signals, with latitude and longitude combined to a position, and a quaternion to an attitude.
 
-    In a pose of x, y and theta the one angle is the heading; a `v` without a `u` beside it is the speed, and no sway.
+    In a pose of x, y and theta, theta is the heading; a `v` in a log without a `u` is the speed and not the sway.
     """
     latitude, longitude = (best.pop(s, None) for s in (LATITUDE, LONGITUDE))
     signals = {signal: guess.item for signal, guess in best.items()}
@@ -140,7 +140,7 @@ def _is_called(signals: Mapping[str, Any], signal: str, word: str) -> bool:
 
 
 def _other_headings(guesses: Iterable[Guess], signals: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
-    """Return the lines of what may also be the heading, beside one column or field that is taken for it."""
+    """Return the lines of the alternatives to the column or field that is taken for the heading."""
     if "yaw_rad" not in signals:
         return ()
     others = sorted((g for g in guesses if g.signal == "yaw_rad" and g.item != signals["yaw_rad"]), key=lambda g: -g.sure)
@@ -148,7 +148,7 @@ def _other_headings(guesses: Iterable[Guess], signals: Mapping[str, Any]) -> tup
 
 
 def _best(guesses: Iterable[Guess]) -> tuple[dict[str, Guess], list[Note]]:
-    """Return the surest guess for each signal, and a note where others are as near."""
+    """Return the guess with the highest score for each signal, and a note where others score nearly as high."""
     by_signal: dict[str, list[Guess]] = {}
     for guess in guesses:
         by_signal.setdefault(guess.signal, []).append(guess)
@@ -156,7 +156,7 @@ def _best(guesses: Iterable[Guess]) -> tuple[dict[str, Guess], list[Note]]:
     for signal, several in by_signal.items():
         ordered = sorted(several, key=lambda g: (-g.sure, -g.count))
         first = best[signal] = ordered[0]
-        # of two that a format defines to be one signal both are it
+        # where a format defines two fields as the same signal, neither is an alternative
         near = [g for g in ordered[1 : 1 + OTHERS_SHOWN] if g.sure > 0.5 * first.sure and not (g.defined and first.defined)]
         others = [f"`{place_of(g.item)}`" for g in near]
         if others and signal in SIGNALS:
@@ -166,7 +166,7 @@ def _best(guesses: Iterable[Guess]) -> tuple[dict[str, Guess], list[Note]]:
 
 
 def _by_numbers(samples: Samples, signals: dict[str, Any]) -> list[Note]:
-    """Add what the numbers of columns without a known name say, and return the reasons."""
+    """Add the signals that are recognised by the numbers of columns without a known name, and return the reasons."""
     columns = samples.columns
     known = {s: i["column"] for s, i in signals.items() if "column" in i}
     if "unit" not in signals.get(POSITION, {"unit": ""}):

@@ -1,4 +1,4 @@
-"""What one column or topic of a log may be, by its name, its type and the size of its numbers."""
+"""Guesses of the signal in one column or topic of a log, from its name, its type and the size of its numbers."""
 
 from __future__ import annotations
 
@@ -19,32 +19,32 @@ from fieldsid.numerics.arrays import FloatArray
 
 _COUNTERS = word_set("seq sec nanosec secs nsecs")
 NAMELESS = word_set("field data value val")
-"""Words of a column that is called by its table's name."""
+"""Words of column names that do not describe the content, so that the name of the table is used."""
 _IN_BRACKETS = re.compile(r"[\[(](?!\d+[\])])[^\])]+[\])]")
 _PLANAR = {
     "theta": "yaw_rad", "angular_velocity": "yaw_rate_rad_s", "linear_velocity": "surge_m_s", "x": "x_m", "y": "y_m",
 }  # fmt: skip
-"""Fields of a pose in the plane, which has an x, a y and one angle."""
+"""The signals of a pose in the plane (x, y and one angle) and of its rates, by field."""
 FRAMES = {"enu": "ENU/FLU", "flu": "ENU/FLU", "ned": "NED/FRD", "frd": "NED/FRD"}
-"""Words of a name that say in which frames its numbers are."""
+"""Words of a name that state the frames of its numbers."""
 _FRAMED = word_set("ned enu local")
 """Words of a pose whose x and y are metres: others are in degrees of latitude and longitude."""
 FORMAT, PRESSURE, PLANE = 9.0, 6.0, 5.0
-"""What is as sure as that: a field that its format defines, a pressure, a part of a pose in the plane."""
+"""Scores of a field that its format defines, of a pressure, and of a component of a pose in the plane."""
 NOTHING = 0.1
-"""What a column that never changes is as sure as, beside one that does."""
+"""Score of a column that never changes."""
 _PARTS_OF_QUATERNION = (
     re.compile(r"(?P<stem>.*?)(?P<part>[xyzw])(?P<end>_?\d*)$", re.IGNORECASE),
     re.compile(r"(?P<stem>.*?q(?:uat|uaternion)?s?[_.]?[\[(]?)(?P<part>[0-4])(?P<end>[\])]?)$", re.IGNORECASE),
 )
-"""How the parts of a quaternion are called: by their letters, or counted behind a `q` as in `q[0]` and `quat_1`."""
+"""Names of the components of a quaternion: letters, or numbers after a `q`, as in `q[0]` and `quat_1`."""
 UNIT_LENGTH = 0.02
-"""How far the length of a quaternion's four numbers may be from one."""
+"""Largest deviation of the median norm of a quaternion from one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Guess:
-    """A signal that a column or field may be, how sure that is, and how it is read; `defined` where a format says its unit."""
+    """A possible signal of a column or field, its score `sure`, its line in a mapping, and whether a format defines its unit."""
 
     signal: str
     sure: float
@@ -54,7 +54,7 @@ class Guess:
 
 
 def of_column(channel: ChannelInfo, place: str | int) -> Iterator[Guess]:
-    """Yield what a column may be; one of words is no signal."""
+    """Yield the guesses for a column; a column of text is no signal."""
     if channel.kind == "number":
         yield from _of_number(channel, channel.fields[0], {"column": place}, channel.name)
 
@@ -62,17 +62,17 @@ def of_column(channel: ChannelInfo, place: str | int) -> Iterator[Guess]:
 def _of_number(
     channel: ChannelInfo, info: FieldInfo, item: dict[str, Any], name: str, *, of_message: bool = False
 ) -> Iterator[Guess]:
-    """Yield what the numbers of a column, or of a field of messages, may be by a name."""
+    """Yield the guess for the numbers of a column, or of a field of messages, from a name."""
     first = [float(v) for v in info.first if isinstance(v, (int, float))]
     span = info.span or ((min(first), max(first)) if first else None)
     signal, sure = meaning_of(name, span) or (TIME, 0)
     if signal == TIME or not channel.count or (of_message and signal in (LATITUDE, LONGITUDE)):
         return
-    beside = channel.unit
-    unit = unit_of_field(channel.name, info.path, signal, beside) if of_message else unit_in_name(name, signal, beside)
+    unit_text = channel.unit
+    unit = unit_of_field(channel.name, info.path, signal, unit_text) if of_message else unit_in_name(name, signal, unit_text)
     is_compass = of_message and signal in ("yaw_rad", "yaw_goal_rad") and COMPASS & set(words_of(f"{channel.name} {info.path}"))
-    framed = next((frame for word, frame in FRAMES.items() if word in words_of(name)), "NED/FRD" if is_compass else None)
-    how = ({} if unit is None else {"unit": unit}) | ({} if framed is None else {"frame": framed})
+    name_frame = next((frame for word, frame in FRAMES.items() if word in words_of(name)), "NED/FRD" if is_compass else None)
+    how = ({} if unit is None else {"unit": unit}) | ({} if name_frame is None else {"frame": name_frame})
     moves = info.span is None or info.span[0] < info.span[1]
     is_defined = of_message and sure == STANDARD and signal not in ANGLES
     sure += is_defined and channel.kind.endswith("Imu")
@@ -80,10 +80,10 @@ def _of_number(
 
 
 def quaternion_of(names: Sequence[str], columns: Mapping[str | int, FloatArray]) -> dict[str, Any] | None:
-    """Return the four columns of an attitude: alike in name but for the part, together of length one; None where there are none.
+    """Return the line of a quaternion: four columns with names that differ in the component only, and of norm one; else None.
 
-    Of parts that are counted the real one is first or last: a vehicle is upright more often than on its side, so that the two
-    that are no turn about the vertical are small.
+    Where the components are numbered, the real one is first or last. A vehicle is upright more often than on its side, so the
+    components of roll and pitch are small, which tells the two orders apart.
     """
     stems: dict[tuple[str, str], dict[str, str]] = {}
     for pattern in _PARTS_OF_QUATERNION:
@@ -104,7 +104,7 @@ def quaternion_of(names: Sequence[str], columns: Mapping[str | int, FloatArray])
 
 
 def of_topic(channel: ChannelInfo) -> Iterator[Guess]:
-    """Yield what the fields of a topic may be."""
+    """Yield the guesses for the fields of a topic."""
     for info in channel.fields:
         if info.means is not None:
             signal, how = info.means
@@ -116,20 +116,20 @@ def of_topic(channel: ChannelInfo) -> Iterator[Guess]:
 
 
 def _of_table(channel: ChannelInfo, info: FieldInfo) -> Iterator[Guess]:
-    """Yield what a column may be of one of the tables of a run: by its name, or by the table's where it has none."""
+    """Yield the guesses for a column of one of several tables: from its name, or from that of the table where it has none."""
     words = words_of(info.path)
     is_nameless = set(words) <= NAMELESS or (len(words) == len("".join(words)) == 1)
     of_both = f"{info.path} {channel.name.partition('[')[0]}"
     name = of_both if is_nameless and (found := meaning_of(of_both)) is not None and found[1] > 1 else info.path
     for guess in _of_number(channel, info, {"topic": channel.name, "field": info.path}, name) if info.kind == "number" else ():
-        # a unit in brackets in which a signal cannot be says that it is another one
+        # a unit in brackets that does not fit the signal shows that the column is another signal
         has_other = _IN_BRACKETS.search(name) is not None and unit_in_name(name, guess.signal) is None
         if not (has_other and dimension_of(guess.signal) is not None):
             yield guess
 
 
 def _of_field(channel: ChannelInfo, info: FieldInfo) -> Iterator[Guess]:
-    """Yield what a field of a message may be: a part of a quaternion, of a pose in the plane, or by its name."""
+    """Yield the guesses for a field of a message: a quaternion, a component of a pose in the plane, or a signal by its name."""
     parent, _, last = info.path.rpartition(".")
     if last in _COUNTERS or "covariance" in info.path or "[" in parent or info.path.startswith(("velocity[", "effort[")):
         return
@@ -137,7 +137,7 @@ def _of_field(channel: ChannelInfo, info: FieldInfo) -> Iterator[Guess]:
     is_wanted, item = bool(COMMANDED & words), {"topic": channel.name, "field": info.path}
     of_four = [f for f in channel.fields if f.path.rpartition(".")[0] == parent]
     if {"x", "y", "theta"} <= paths and "z" not in paths and info.path in _PLANAR:
-        # of a commanded pose the angle alone is a signal, the heading wanted
+        # of a commanded pose only the angle is a signal: the heading setpoint
         signal = "yaw_goal_rad" if is_wanted else _PLANAR[info.path]
         if not is_wanted or last == "theta":
             yield Guess(signal, PLANE + bool(_FRAMED & words), item, count)

@@ -1,4 +1,4 @@
-"""mapping.yaml: which column or topic of a log is which signal; validated, unknown keys refused with the near match."""
+"""The file mapping.yaml, which states the column or topic of each signal; an unknown key is refused with the nearest one."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 def _key(says: str, example: str, default: Any = None) -> Any:
-    """Return the field of a key: what it is for, and an example that the guide shows."""
+    """Return the field of a key with its description and an example, which the guide shows."""
     return Field(default, description=says, examples=[example])
 
 
 class _Place(StrictModel):
-    """Where numbers are and how they are read: what a signal and an entry of a sum have both."""
+    """The source of numbers and their conversion: the keys that a signal and an entry of a sum share."""
 
     column: Column | None = _key("the column of a table, by its name or by its place from 0", "yaw_rad: {column: Heading}")
     columns: list[Column] | None = _key(
@@ -126,32 +126,35 @@ class _File(StrictModel):
 KEYS: Mapping[str, type[StrictModel]] = MappingProxyType(
     {"": _File, "a line of `signals`": _Source, "`time`": _Time, "`pressure`": _Pressure, "`table`": _Table}
 )
-"""The keys of a mapping by where they stand, as the guide lists them."""
+"""The keys of a mapping by the section that contains them, as the guide lists them."""
 
 
 def load_mapping(path: Path) -> ChannelMap:
     """Read a mapping.yaml.
 
-    Raises ArtifactError when it is no YAML, MappingError for an unknown key or signal (with the near match), a wrong
+    Raises ArtifactError where it is not YAML, MappingError for an unknown key or signal (with the near match), a wrong
     type, a unit that does not fit, or a source that names neither a column nor a topic.
     """
     return _channel_map(read_model(_File, path, error=MappingError), f"`{path}`", path)
 
 
 def mapping_of(body: Mapping[str, Any]) -> ChannelMap:
-    """Return a mapping given as the keys of mapping.yaml; raises MappingError."""
+    """Return the mapping of a dictionary with the keys of mapping.yaml; raises MappingError."""
     return _channel_map(validated(_File, body, place="the mapping", error=MappingError), "the mapping", None)
 
 
 def _refuse(place: str, *faults: tuple[object, str, object, str]) -> None:
-    """Raise MappingError for the first fault that is there: whether it is, what is wrong, what was found, and a hint."""
-    for is_there, what, found, hint in faults:
-        if is_there:
+    """Raise MappingError for the first fault that is present.
+
+    A fault is a tuple: whether it is present, what is wrong, what was found, and a hint.
+    """
+    for is_present, what, found, hint in faults:
+        if is_present:
             raise MappingError(f"{place} {what}", found=str(found), hint=hint)
 
 
 def frame_of(text: str | None, place: str) -> Frame | None:
-    """Return the frames a text names: `ENU/FLU`, `NED`, `FLU`; raises MappingError."""
+    """Return the frames that a text such as `ENU/FLU`, `NED` or `FLU` names; raises MappingError."""
     if text is None:
         return None
     named = [part.strip() for part in re.split("[-,/]", text.upper())]
@@ -205,14 +208,17 @@ def _channel_map(file: _File, place: str, origin: Path | None) -> ChannelMap:
 
 
 def _time(time: _Time, place: str) -> Source:
-    """The unit of a time is one of time, or says how a clock is written; one that counts samples or rows has a rate, and none."""
+    """Return the source of the time; raises MappingError.
+
+    Its unit is a unit of time, or the format of a clock; a time that counts samples or rows has a rate and no unit.
+    """
     rate, columns = time.rate, tuple(time.columns or ())
     is_one = (time.column is None) != (not columns) or (not columns and rate is not None)
-    way = "name one with `column`, those that make it up with `columns`, or give the rows a second with `rate`"
+    advice = "name one with `column`, those that make it up with `columns`, or give the rows a second with `rate`"
     is_both = rate is not None and (time.unit, time.date, time.week, time.columns) != (None, None, None, None)
     _refuse(
         f"{place}:",
-        (not is_one, "`time` needs one of `column`, `columns`, `rate`", "both" if columns else "none of them", way),
+        (not is_one, "`time` needs one of `column`, `columns`, `rate`", "both" if columns else "none of them", advice),
         (
             is_both,
             "a time with a `rate` counts samples, and has no unit, date or week",
@@ -232,35 +238,43 @@ def _time(time: _Time, place: str) -> Source:
 
 
 def _sources(signal: str, item: _Source | str | int, place: str) -> list[tuple[str, Source]]:
-    """Return where a signal is with its own name, or each entry of its sum with a name that has a number."""
+    """Return the source of a signal by its name, or the sources of the entries of its sum by numbered names."""
     known = (*COMBINED, *SIGNALS)
     _refuse(place, (signal not in known, f"maps an unknown signal `{signal}`", signal, near(signal, known)))
     if not isinstance(item, _Source):
         item = validated(_Source, {"column": item}, place=f"{place}, `{signal}`", error=MappingError)
     if item.sum is None:
         return [(signal, _source(signal, item, place))]
-    # a sum is of fins or motors, and all that is said of it is said of its entries
-    beside, flat = sorted(item.model_fields_set - {"sum"}), [i for i, entry in enumerate(item.sum) if entry.scale == 0.0]
-    nothing = "leave the entry out, or write what its number is worth"
+    # only fins and motors may be sums, and all keys of a sum are given at its entries
+    extra_keys, zero_entries = (
+        sorted(item.model_fields_set - {"sum"}),
+        [i for i, entry in enumerate(item.sum) if entry.scale == 0.0],
+    )
+    zero_hint = "leave the entry out, or write what its number is worth"
     _refuse(
         f"{place}:",
         (signal not in SUMMED, f"`{signal}` cannot be a sum", f"{len(item.sum)} entries", f"a sum is for {', '.join(SUMMED)}"),
         (
-            beside,
-            f"`{signal}` has `{''.join(beside[:1])}` beside its `sum`",
-            ", ".join(beside),
+            extra_keys,
+            f"`{signal}` has `{''.join(extra_keys[:1])}` beside its `sum`",
+            ", ".join(extra_keys),
             "write it at each entry of the sum",
         ),
-        (flat, f"entry {flat and flat[0]} of the sum `{signal}` has a scale of zero", "scale: 0", nothing),
+        (
+            zero_entries,
+            f"entry {zero_entries and zero_entries[0]} of the sum `{signal}` has a scale of zero",
+            "scale: 0",
+            zero_hint,
+        ),
     )
     return [(name, _source(name, entry, place)) for i, entry in enumerate(item.sum) for name in (f"{signal}{PART}{i}]",)]
 
 
 def _source(signal: str, item: _Source | _Entry, place: str) -> Source:
     _check_place(signal, item, place)
-    # The scale of an entry turns its unit, as the N of a thruster, to that of the sum.
-    is_turned = isinstance(item, _Entry) and item.scale is not None and find_unit(item.unit or "") is not None
-    if item.unit is not None and not is_turned:
+    # The scale of an entry converts its unit, such as N of a thruster, to that of the sum.
+    is_converted = isinstance(item, _Entry) and item.scale is not None and find_unit(item.unit or "") is not None
+    if item.unit is not None and not is_converted:
         _check_unit(signal, item.unit, place)
     as_written = item.model_dump(exclude={"sum", "field", "columns", "frame"})
     frame = frame_of(item.frame, f"{place}, `{signal}`")
@@ -268,7 +282,7 @@ def _source(signal: str, item: _Source | _Entry, place: str) -> Source:
 
 
 def _check_place(signal: str, item: _Source | _Entry, place: str) -> None:
-    """Exactly one of column, columns, topic says where a signal is; several are those of one line, counts those of a servo."""
+    """Raise MappingError unless exactly one of column, columns, topic is given, and its other keys fit the signal."""
     named = [n for n, v in (("column", item.column), ("columns", item.columns or None), ("topic", item.topic)) if v is not None]
     count, is_position, may_turn = len(item.columns or ()), signal == POSITION, signal in (ATTITUDE, *ANGLES)
     is_four = not is_position and (signal == ATTITUDE or count > 0)
@@ -300,14 +314,14 @@ def _check_place(signal: str, item: _Source | _Entry, place: str) -> None:
 
 
 def _check_unit(signal: str, unit: str, place: str) -> None:
-    """The unit is one, and of the signal's dimension; a depth may be a pressure, latitude and longitude are angles."""
-    dimensions, whole = fitting(signal), signal_of(signal)
+    """Raise MappingError unless the unit is known and fits the signal; a depth may be in a unit of pressure."""
+    dimensions, base_signal = fitting(signal), signal_of(signal)
     if not dimensions or unit == COUNTS or counts_unit(signal, unit) is not None:
         return
     known = [u.name for u in UNITS.values() if u.dimension == dimensions[0]]
     found = find_unit(unit, dimensions[0])
-    of_fins = OF_FINS if whole in FINS else ""
-    fits = f"use a unit of {dimensions[0]}, such as `{SIGNALS.get(whole, 'deg')}`{of_fins}"
+    of_fins = OF_FINS if base_signal in FINS else ""
+    fits = f"use a unit of {dimensions[0]}, such as `{SIGNALS.get(base_signal, 'deg')}`{of_fins}"
     _refuse(
         f"{place}: `{signal}`",
         (found is None, f"there is no unit {unit!r}", unit, near(unit, known)),

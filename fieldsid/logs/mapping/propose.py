@@ -1,4 +1,4 @@
-"""A first mapping for a log nobody has mapped yet, from names, message types and what the numbers say, tried on the log."""
+"""The proposal of a mapping for a log without one, from names, message types and numbers, tested by reading the log."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ TRIES = 6
 
 
 def propose(inventory: Inventory, reader: Reader, options: ReadOptions) -> Proposal:
-    """Return a mapping that `load_mapping` takes as soon as it names a signal, tried on the log itself.
+    """Return a proposed mapping that was tested by reading the log; `load_mapping` accepts it where it names a signal.
 
-    A signal that the log does not give after all is left out, and the reason said: a mapping that is proposed can be imported.
+    A signal that cannot be read is left out, with a note on the reason, so that a proposed mapping can be imported.
     """
     log, draft = Log(inventory, reader, options), draft_of(inventory)
     if inventory.samples is None and not inventory.by_topic:
         return _without_clock(log, draft)
-    return _tried(log, draft)
+    return _tested(log, draft)
 
 
-def _tried(log: Log, draft: Draft) -> Proposal:
+def _tested(log: Log, draft: Draft) -> Proposal:
     left_out: list[Note] = []
     signals = draft.body["signals"]
     for _ in range(TRIES if signals else 0):
-        done = attempt(lambda draft: _with_fins(log, _with_own_heading(log, draft), draft), draft)
+        done = attempt(lambda draft: _with_fins(log, _with_vehicle_heading(log, draft), draft), draft)
         if isinstance(done, Proposal):
             return done.saying(*left_out, *_over_ground(done))
         if done.signal not in signals or len(signals) < 2:
@@ -47,9 +47,9 @@ def _tried(log: Log, draft: Draft) -> Proposal:
 
 
 def _over_ground(done: Proposal) -> tuple[Note, ...]:
-    """Return the note that the heading is, by its name, what a receiver gives, where it is not ahead of the course made."""
-    place, lead = place_of(done.body["signals"].get("yaw_rad", {})), None if done.run is None else lead_of(done.run)
-    if not OVER_GROUND & set(words_of(place)) or (lead is not None and lead.is_clear):
+    """Return the note that the heading may be a course over ground: so its name says, and it does not lead the course."""
+    place, course_lead = place_of(done.body["signals"].get("yaw_rad", {})), None if done.run is None else lead_of(done.run)
+    if not OVER_GROUND & set(words_of(place)) or (course_lead is not None and course_lead.is_clear):
         return ()
     message = (
         f"yaw_rad is {place}, by its name of a receiver: where that is the course over ground, what is fitted is the course, "
@@ -58,8 +58,8 @@ def _over_ground(done: Proposal) -> tuple[Note, ...]:
     return (Note("over_ground", message, {"signal": "yaw_rad"}),)
 
 
-def _with_own_heading(log: Log, draft: Draft) -> Proposal:
-    """Return the proposal as it was tried, with the heading that the numbers show to be the vehicle's, of several."""
+def _with_vehicle_heading(log: Log, draft: Draft) -> Proposal:
+    """Return the tested proposal with, of several headings, the one that the numbers show to be the heading of the vehicle."""
     done = tried(log, draft.body, draft.defined)
     signals = draft.body["signals"]
     bodies = [draft.body | {"signals": signals | {"yaw_rad": dict(item)}} for item in draft.headings]
@@ -71,7 +71,7 @@ def _with_own_heading(log: Log, draft: Draft) -> Proposal:
 
 
 def _with_fins(log: Log, done: Proposal, draft: Draft) -> Proposal:
-    """Return a proposal with the fins that move each plane, where a log has several alike, and with what the draft says else."""
+    """Return a proposal with the fins of each axis, where a log has several similar ones, and the other notes of the draft."""
     if done.run is None:
         return done
     body, why = with_several_fins(log, done.body, done.run)
@@ -82,7 +82,7 @@ def _with_fins(log: Log, done: Proposal, draft: Draft) -> Proposal:
 
 
 def _without_clock(log: Log, draft: Draft) -> Proposal:
-    """Return the proposal for a table without a time: with the rate of its rows where heading and yaw rate tell it."""
+    """Return the proposal for a table without a time, with a sampling rate from heading and yaw rate where they agree."""
     with_units_by_span(draft, log.inventory)
     if log.inventory.no_clock is not None:
         return Proposal(draft.body, problem=log.inventory.no_clock[1]).saying(*draft.notes)
@@ -91,24 +91,24 @@ def _without_clock(log: Log, draft: Draft) -> Proposal:
     has_unit = "unit" in counted["signals"].get("yaw_rate_rad_s", {})
     found = rate_by_turning(run, has_unit=has_unit) if isinstance(run, Run) else None
     if found is None:
-        return _tried(log, draft)
+        return _tested(log, draft)
     rate, unit, why = found
     counted["signals"]["yaw_rate_rad_s"].setdefault("unit", unit)
-    return _tried(log, replace(draft, body=counted | {"time": {"rate": rate}})).saying(why)
+    return _tested(log, replace(draft, body=counted | {"time": {"rate": rate}})).saying(why)
 
 
 ASSUMED_HZ = 10.0
 USUAL_HZ = (1.0, 2.0, 4.0, 5.0, 8.0, 10.0, 16.0, 20.0, 25.0, 30.0, 32.0, 40.0, 50.0, 60.0, 64.0, 100.0, 128.0, 200.0, 250.0)
 NEAR = 0.02
-"""By how much of itself a rate may be off one that loggers have, and is that."""
+"""Relative deviation up to which an estimated rate is replaced by a usual rate of loggers."""
 SLOWEST_HZ, FASTEST_HZ = 0.5, 400.0
-"""Rates at which vehicles log."""
+"""Lowest and highest sampling rate of vehicle logs."""
 
 
 def rate_by_turning(run: Run, *, has_unit: bool) -> tuple[float, str, Note] | None:
-    """Return the rows a second of a run that was read with `ASSUMED_HZ`, the unit of its yaw rate, and why; None where open.
+    """Return the sampling rate of a run that was read with `ASSUMED_HZ`, the unit of its yaw rate, and a note; None where open.
 
-    `has_unit` says that the yaw rate's unit is known; else it is that in which a vehicle would log so fast.
+    `has_unit` states that the unit of the yaw rate is known; else it is the one that gives a possible sampling rate.
     """
     changes = changes_of(run, "yaw_rad", "yaw_rate_rad_s")
     slope, trust = slope_of(*changes[:2]) if changes is not None else (0.0, 0.0)

@@ -1,9 +1,9 @@
-"""A mapping that was drafted, tried on the log itself: degrees by size, then what the findings on the run it gives say.
+"""The test of a drafted mapping on the log: degrees are set by the size of numbers, then the findings on the run are applied.
 
-Each finding that sets a unit, a sign or a frame is one step, after which the log is read again: a heading that is turned may
-leave its rate against it. Which of two signals is wrong, where a finding says only that they go against each other, is told by
-what is surer: a rate is turned to its angle, an angle to a course over ground that is known to be north and east, a depth below
-the surface is positive.
+Each finding that sets a unit, a sign or a frame is one step, after which the log is read again: a heading with a new sign may
+contradict its rate. Where a finding says only that two signals contradict each other, the less certain one is corrected: a rate
+is corrected to agree with its angle, an angle to agree with a course over ground that is known to be north and east, and a depth
+below the surface is positive.
 """
 
 from __future__ import annotations
@@ -25,25 +25,25 @@ from fieldsid.logs.mapping.numbers.units_told import assumed_units, heading_in_d
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.run import FINS, SIGNALS, Note, Run
 
-MENDS = 6
-"""Readings of the log with what the last one's findings have set: a unit, a frame and the signs of two rates come in turn."""
+MAX_READINGS = 6
+"""Largest number of readings of the log, each with the corrections of the one before: a unit, a frame, the signs of two rates."""
 
 
 @dataclass(frozen=True, slots=True)
 class Log:
-    """A log, what is in it, and how it is read: damage is left out."""
+    """A log with its inventory, its reader and the options; it is read with salvage."""
 
     inventory: Inventory
     reader: Reader
     options: ReadOptions
 
     def read(self, mapping: ChannelMap) -> RawLog:
-        """Return what a mapping names; raises LogError and MappingError."""
+        """Return the signals that a mapping names; raises LogError and MappingError."""
         lenient = ReadOptions(self.options.msg_path, salvage=True, joined=self.options.joined)
         return self.reader.read(self.inventory.path, mapping, lenient)
 
     def run_of(self, body: Mapping[str, Any], raw: RawLog | None = None) -> Run:
-        """Return the run that a mapping's body gives of what was read; raises LogError, MappingError and DataError."""
+        """Return the run that a mapping's body gives, from `raw` where given; raises LogError, MappingError and DataError."""
         from fieldsid.logs.convert.assemble import assemble
         from fieldsid.logs.mapping.mapping_file import mapping_of
 
@@ -54,7 +54,7 @@ class Log:
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """A mapping's body, the Run it gives, or why it gives none, and what speaks for it or for others."""
+    """The body of a mapping, the Run it gives or the error that prevents one, and notes on its choices."""
 
     body: dict[str, Any]
     run: Run | None = None
@@ -62,47 +62,47 @@ class Proposal:
     notes: tuple[Note, ...] = ()
 
     def saying(self, *notes: Note) -> Proposal:
-        """Return the proposal with notes before its own."""
+        """Return the proposal with the given notes placed before its notes."""
         return replace(self, notes=(*notes, *self.notes))
 
 
 def tried(log: Log, body: dict[str, Any], defined: frozenset[str]) -> Proposal:
-    """Read the log with a mapping's body, and set in it what the numbers say; raises LogError, MappingError and DataError."""
+    """Read the log with a mapping's body, and set in it what the numbers show; raises LogError, MappingError and DataError."""
     from fieldsid.logs.doctor.examine import examine
     from fieldsid.logs.doctor.stated import stated_by
     from fieldsid.logs.mapping.mapping_file import mapping_of
 
     raw, signals = log.read(mapping_of(body)), body["signals"]
-    plain = {s: v for s, v in raw.series.items() if s in signals and v.values.ndim == 1}
-    told = {s: v.unit for s, v in plain.items() if v.unit is not None}
-    by_size = set_by_size(signals, {s: v.values for s, v in plain.items()}, told)
+    numeric_series = {s: v for s, v in raw.series.items() if s in signals and v.values.ndim == 1}
+    stated_units = {s: v.unit for s, v in numeric_series.items() if v.unit is not None}
+    by_size = set_by_size(signals, {s: v.values for s, v in numeric_series.items()}, stated_units)
     yaw = raw.series.get("yaw_rad")
     wraps = None if yaw is None else unit_of_wraps(yaw.values)
     in_doubt = by_size if wraps is None else by_size - {"yaw_rad"}
     why: list[Note] = []
-    for _ in range(MENDS):
+    for _ in range(MAX_READINGS):
         run, stated = log.run_of(body, raw), stated_by(mapping_of(body), raw)
         notes = examine(run, stated=stated)
-        set_now = mended(body, run, notes, in_doubt)
-        why += set_now
-        if not set_now:
+        corrections = mended(body, run, notes, in_doubt)
+        why += corrections
+        if not corrections:
             break
     if yaw is not None and "yaw_rad" in by_size and "unit" in signals["yaw_rad"]:
         why += heading_in_doubt(yaw.values, signals)
-    # a size tells that a rate beside its angle is not in rad/s, and not in which unit it is then: that the angle says
+    # the size of a rate shows that it is not in rad/s; its unit follows from the comparison with its angle
     open_rates = {rate for angle, rate in PAIRS if rate in by_size and run.has(angle)}
     known = {*defined, *stated.units, *({"yaw_rad"} if wraps == "rad" else ())} - open_rates
     why += assumed_units(run, known, {s: (place_of(item), item.get("unit", SIGNALS.get(s, ""))) for s, item in signals.items()})
     return Proposal(body, replace(run, notes=(*run.notes, *notes)), notes=tuple(why))
 
 
-ANGLES_BESIDE = (*FINS, "pitch_rad", "roll_rad")
+OTHER_ANGLES = (*FINS, "pitch_rad", "roll_rad")
 
 
 def mended(body: dict[str, Any], run: Run, findings: Iterable[Note], by_size: Container[str]) -> list[Note]:
-    """Set in a mapping's body what findings on the run it gives say; return what was set and why, none where nothing was.
+    """Set the corrections of the findings on a run in its mapping's body; return a note for each, none where nothing was set.
 
-    `by_size` holds the signals that were taken for degrees because their numbers are large.
+    `by_size` holds the signals that were assumed to be in degrees because their numbers are large.
     """
     signals, done = body["signals"], list[Note]()
     for note in findings:
@@ -114,7 +114,7 @@ def mended(body: dict[str, Any], run: Run, findings: Iterable[Note], by_size: Co
             signals[note.data["signal"]]["unit"] = goes_as
             done.append(_evidence([note.data["signal"]], f"`unit: {goes_as}`", note))
             continue
-        wrong, key, value = _remedy(note, body, run)
+        wrong, key, value = _correction(note, body, run)
         if wrong and not any(key in signals.get(s, {key: 0}) for s in wrong):
             for signal in wrong:
                 signals[signal][key] = value
@@ -122,8 +122,8 @@ def mended(body: dict[str, Any], run: Run, findings: Iterable[Note], by_size: Co
     return done
 
 
-def _remedy(note: Note, body: Mapping[str, Any], run: Run) -> tuple[list[str], str, Any]:
-    """Return the signals that a finding shows to be read wrongly, and the key and value that mend it; none where it does not."""
+def _correction(note: Note, body: Mapping[str, Any], run: Run) -> tuple[list[str], str, Any]:
+    """Return the signals that a finding shows to be read wrongly, and the key and value that correct them."""
     if note.code in ("unit", "speed_unit", "depth_unit", "course_slope"):
         return [note.data["signal"]] if "unit" in note.data else [], "unit", note.data.get("unit")
     if note.code in ("rate_sign", "speed_sign"):
@@ -138,15 +138,16 @@ def _remedy(note: Note, body: Mapping[str, Any], run: Run) -> tuple[list[str], s
 
 
 def _counts_turns(note: Note, signals: Mapping[str, Any], run: Run) -> bool:
-    """Whether a finding shows that a heading of more than a turn is in rad, as its course turns or number for number as its rate.
+    """Return whether a finding shows that a heading beyond 2 pi is in rad and counts turns.
 
-    The latter is so where the rate's unit is known, and where the other angles of the log are in rad: one logger wrote them.
+    Either its course turns by as much in rad, or its rate agrees with it in rad. The second counts only where the unit of the
+    rate is known or the other angles of the log are in rad, since one logger wrote them all.
     """
     if "unit" not in signals.get("yaw_rad", {}):
         return False
     if note.code == "course_slope":
         return note.data.get("unit") == "rad"
-    others = [s for s in ANGLES_BESIDE if s in signals and "unit" not in signals[s] and run.has(s)]
+    others = [s for s in OTHER_ANGLES if s in signals and "unit" not in signals[s] and run.has(s)]
     largest = max((float(np.nanpercentile(np.abs(run[s]), 99)) for s in others), default=np.inf)
     is_rate = note.code == "unit" and note.data["signal"] == "yaw_rate_rad_s"
     return is_rate and ("unit" in signals.get("yaw_rate_rad_s", {}) or largest < WIDEST)

@@ -1,7 +1,7 @@
-"""What names in logs mean, as rules: a signal, phrases of which a name holds all words, words beside which it is another thing.
+"""The meaning of names in logs, as rules: a signal, its phrases, and the words that exclude it.
 
-More words weigh more. A rule whose numbers say more than its words has a `holds`, which its column's least and largest must
-pass: a `TH` that goes round is a true heading, one between the tilts of a vehicle a theta.
+A phrase matches a name that contains all its words; more words weigh more. A rule may have a predicate `holds` on the smallest
+and largest number of the column: a `TH` of up to 360 is a true heading, one within the pitch of a vehicle a theta.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from fieldsid.logs.run import GOALS
 
 TIME = "time_s"
 LATITUDE, LONGITUDE = "latitude", "longitude"
-"""Not signals: together they give x and y."""
+"""Names that are not signals; together they give x and y."""
 Span = tuple[float, float]
-"""The least and the largest number of a column."""
+"""The smallest and the largest number of a column."""
 
 
 def word_set(text: str) -> frozenset[str]:
@@ -33,38 +33,38 @@ OF_ANOTHER = word_set(
     "error err cov covariance std sigma variance var bias limit lim max min quality valid flag gain gains temp temperature sound "
     "wind ws air variation status mode enabled count id"
 )
-"""Words that make a name one of something else than the signal it also names."""
+"""Words that show that a name is not the signal it also contains, such as its error or its limit."""
 COMPASS = word_set("heading hdg compass")
-"""Words of a heading that is one by its name: from north, clockwise."""
+"""Words of a heading that is counted clockwise from north, by its name."""
 OVER_GROUND = word_set("gps gnss course cog sog vtg ground track")
-"""Words of a course or a speed over ground, which current and sideslip keep from being the vehicle's own; and of a receiver
-that hears nothing under water, beside a position that was estimated."""
+"""Words of a course or a speed over ground, from which heading and speed through water differ by current and sideslip; and of a
+satellite receiver, which has no fix under water, so that an estimated position is preferred."""
 OF_SPEED = word_set("v vel velocity speed acceleration accel acc")
-"""Words of a speed or acceleration north or east, which is no place."""
+"""Words of a speed or acceleration north or east, which is not a position."""
 OTHERS = word_set(
     "angle signal raw filtered est estimate estimated sensor compass stick servo true magnetic joint vehicle boat glider"
 )
-"""Words that say nothing of the signal, and stand glued to those that do, as in `rudderangle`."""
+"""Words that do not identify a signal, but are written in one with those that do, as in `rudderangle`."""
 
 
 def anything(span: Span) -> bool:
-    """Whether a rule without a predicate holds."""
+    """Return True: the predicate of a rule without a condition on the numbers."""
     return True
 
 
 def within(limit: float) -> Callable[[Span], bool]:
-    """Return the predicate that no number is larger than a limit in size."""
+    """Return the predicate that no number exceeds a limit in magnitude."""
     return lambda span: max(map(abs, span)) <= limit
 
 
 def beyond(limit: float) -> Callable[[Span], bool]:
-    """Return the predicate that some number is larger than a limit in size."""
+    """Return the predicate that some number exceeds a limit in magnitude."""
     return lambda span: max(map(abs, span)) > limit
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A signal and the phrases, parted by commas, that mean it; `alone` where the name may hold no other word."""
+    """A signal and the phrases, separated by commas, that mean it; `alone` where the name may contain no other word."""
 
     signal: str
     phrases: str
@@ -74,7 +74,7 @@ class Rule:
 
 
 STEEPEST_DEG = 360.0
-"""A pitch or roll is less in any unit: a larger number is none, as the port or the error code that a constant may be."""
+"""Upper bound of a pitch or roll in any unit: a larger number is something else, such as a port or an error code."""
 _TILT = within(STEEPEST_DEG)
 _TURN = word_set("rate fin")
 
@@ -128,26 +128,27 @@ RULES = (
     Rule("yaw_rad", "th", holds=beyond(90.0), alone=True),
     Rule("pitch_rad", "th", holds=within(90.0), alone=True),
 )  # fmt: skip
-"""What names mean. The field's symbols are taken only where a name has no other word."""
+"""The meaning of names. Symbols of the field, such as r or u, match only where a name has no other word."""
 
-WANTED: Mapping[str, str] = MappingProxyType(
+AS_COMMANDED: Mapping[str, str] = MappingProxyType(
     {s: s for s in ("rudder_rad", "elevator_rad", "thrust", "propeller_rpm", TIME)}
     | {"yaw_rad": "yaw_goal_rad", "pitch_rad": "pitch_goal_rad"}
 )
-SEEN: Mapping[str, str] = MappingProxyType({"rudder_rad": "rudder_measured_rad", "elevator_rad": "elevator_measured_rad"})
-"""What signals are that were commanded, all others of which are none, and what they are that were measured."""
+AS_MEASURED: Mapping[str, str] = MappingProxyType({"rudder_rad": "rudder_measured_rad", "elevator_rad": "elevator_measured_rad"})
+"""AS_COMMANDED: the signal that the command of a signal is; a command of any other is none. AS_MEASURED: the signal that a
+measurement is."""
 GROUNDED = frozenset({"yaw_rad", "surge_m_s", LATITUDE, LONGITUDE})
-"""Signals that are the vehicle's own only where they are not over ground."""
+"""Signals that differ from the vehicle's heading, speed or position where their name says over ground."""
 GLIDER: Mapping[str, str] = MappingProxyType({"m": "measured", "c": "commanded"})
-"""What the first letter of a glider's sensor says, as in `m_fin` and `c_fin`."""
+"""The meaning of the first letter of a glider's sensor, as in `m_fin` and `c_fin`."""
 GREEK = word_set("phi theta psi")
-MOST_BESIDE_GREEK = 2
-"""Words beside a Greek letter up to which it is the symbol; with more it is an abbreviation, as in `PHI_HOST_PORT_DB`."""
+MOST_WORDS_WITH_GREEK = 2
+"""Number of other words up to which a Greek letter in a name is a symbol; with more it is an abbreviation: `PHI_HOST_PORT_DB`."""
 
 
 def is_abbreviation(words: list[str]) -> bool:
-    """Whether a Greek letter among words is no symbol."""
-    return bool(GREEK & set(words)) and len(words) > MOST_BESIDE_GREEK + 1
+    """Return whether the words contain a Greek letter that is an abbreviation and not a symbol."""
+    return bool(GREEK & set(words)) and len(words) > MOST_WORDS_WITH_GREEK + 1
 
 
 _TURNS = ("roll_rate_rad_s", "pitch_rate_rad_s", "yaw_rate_rad_s")
@@ -157,37 +158,41 @@ VECTORS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "position": ("x_m", "y_m", "depth_m"), "vector": ("roll_rad", "pitch_rad", "yaw_rad"),
     }
 )  # fmt: skip
-"""What the x, y and z are of vectors in standard messages; those of a `vector` where its topic is one of Euler's angles."""
+"""The signals of x, y and z of vectors in standard messages; those of a `vector` only where its topic has Euler angles."""
 EULER = word_set("rpy euler attitude orientation angles")
 
 PHRASES = tuple((rule, tuple(phrase.split())) for rule in RULES for phrase in rule.phrases.split(", "))
-"""Each phrase by its words, with its rule."""
+"""Each rule with each of its phrases, split into words."""
 KNOWN = (
     frozenset(word for _, phrase in PHRASES for word in phrase if len(word) > 2)
     | COMMANDED | MEASURED | OF_ANOTHER | OVER_GROUND | OTHERS | OF_SPEED | _TURN
 )  # fmt: skip
-"""Words that are told apart where they are written as one."""
+"""Words that are separated where they are written as one."""
 
 
 def part_of(path: str) -> str | None:
-    """Return the signal of one part of a standard message's vector, as in `twist.twist.angular.z`; None of any other."""
+    """Return the signal of one component of a vector in a standard message, such as `twist.twist.angular.z`; None for another."""
     parent, _, last = path.rpartition(".")
     vector = VECTORS.get(re.split(r"[. ]", parent)[-1])
     return None if vector is None or last not in ("x", "y", "z") else vector["xyz".index(last)]
 
 
 def weight(rule: Rule, phrase: tuple[str, ...], words: list[str]) -> int:
-    """Return what a phrase weighs of which a name holds all words: two each, and one where it is all there is."""
+    """Return the weight of a phrase in a name: 2 per word where the name contains all words, 1 for a rule that matches alone."""
     if rule.alone:
         return int(words == list(phrase))
     return 2 * len(phrase) if all(p in words for p in phrase) else 0
 
 
-def of_use(signal: str, sure: int, words: set[str]) -> tuple[str, int] | None:
-    """Return a signal as what it was wanted to be or what it was, and how sure its words make it."""
+def as_command_or_measurement(signal: str, sure: int, words: set[str]) -> tuple[str, int] | None:
+    """Return the signal, its command or its measurement, by the words of a name, and its score; None where it is no signal."""
     if COMMANDED & words:
-        return (WANTED[signal], sure + (WANTED[signal] in GOALS and "next" not in words)) if signal in WANTED else None
+        return (
+            (AS_COMMANDED[signal], sure + (AS_COMMANDED[signal] in GOALS and "next" not in words))
+            if signal in AS_COMMANDED
+            else None
+        )
     if signal in GROUNDED and OVER_GROUND & words:
         return signal, 1
     sure += (("true" in words) - ("magnetic" in words)) * (signal in ("yaw_rad", "surge_m_s"))
-    return SEEN.get(signal, signal) if MEASURED & words else signal, sure
+    return AS_MEASURED.get(signal, signal) if MEASURED & words else signal, sure

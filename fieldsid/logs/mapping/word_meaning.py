@@ -1,4 +1,4 @@
-"""What a name in somebody's log probably means: the rule of the vocabulary that most of its words keep."""
+"""The probable meaning of a name in a log: the rule of the vocabulary that matches most of its words."""
 
 from __future__ import annotations
 
@@ -6,31 +6,44 @@ import re
 
 from fieldsid.logs.channels import ANGLES
 from fieldsid.logs.doctor.angle_and_rate import PAIRS
-from fieldsid.logs.mapping.canonical_names import canonical, unit_said, words_of
-from fieldsid.logs.mapping.vocabulary import COMMANDED, EULER, OF_ANOTHER, PHRASES, Span, is_abbreviation, of_use, part_of, weight
+from fieldsid.logs.mapping.canonical_names import canonical, unit_stated, words_of
+from fieldsid.logs.mapping.vocabulary import (
+    COMMANDED,
+    EULER,
+    OF_ANOTHER,
+    PHRASES,
+    Span,
+    as_command_or_measurement,
+    is_abbreviation,
+    part_of,
+    weight,
+)
 
 RATES = dict(PAIRS)
-"""What an angle's name means beside the unit of a rate, as `yaw_deg_s`."""
+"""The rate that the name of an angle means together with the unit of a rate, as in `yaw_deg_s`."""
 CANONICAL, STANDARD = 9, 8
-"""What a canonical name, and a part of a standard message, is as sure as."""
+"""Scores of a canonical name and of a component of a standard message, comparable with those of rules."""
 
 
 def meaning_of(name: str, span: Span | None = None) -> tuple[str, int] | None:
-    """Return the signal a name probably means, with the least and largest of its numbers, and how sure that is; or None."""
-    said = canonical(name)
-    if said is not None:
-        return said.signal, CANONICAL
+    """Return the signal that a name probably means, and its score; None where there is none.
+
+    `span` holds the smallest and largest number of the column.
+    """
+    stated = canonical(name)
+    if stated is not None:
+        return stated.signal, CANONICAL
     words = words_of(name)
     part = part_of(name.strip())
     if part is not None and not COMMANDED & set(words) and (part not in ANGLES or EULER & set(words)):
         return part, STANDARD
     scored = [(score, rule) for rule, phrase in PHRASES if (score := weight(rule, phrase, words)) > 0]
-    held = [(score, rule) for score, rule in scored if span is None or rule.holds(span)]
-    best = max(held, key=lambda found: found[0], default=None)
+    matching = [(score, rule) for score, rule in scored if span is None or rule.holds(span)]
+    best = max(matching, key=lambda found: found[0], default=None)
     if best is None or OF_ANOTHER & set(words) or best[1].unless & set(words):
         return None
     if best[0] == 2 and is_abbreviation(words_of(re.split(r"[/ .]", name.strip())[-1])):
         return None
     signal = best[1].signal
-    is_rate = signal in RATES and unit_said(name, ("angle",)) is None and unit_said(name, ("angle rate",)) is not None
-    return of_use(RATES[signal] if is_rate else signal, best[0], set(words))
+    is_rate = signal in RATES and unit_stated(name, ("angle",)) is None and unit_stated(name, ("angle rate",)) is not None
+    return as_command_or_measurement(RATES[signal] if is_rate else signal, best[0], set(words))

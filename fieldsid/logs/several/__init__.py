@@ -1,1 +1,1 @@
-"""Many logs at once: names that tell them apart, and those that cannot be read."""
+"""Several logs at once: distinct names of runs, logs that cannot be used, and stretches under way."""

@@ -1,4 +1,4 @@
-"""Names of runs: each log's own, made different by folder and suffix where several share one, and no data twice."""
+"""Names of runs, made distinct by folder and suffix where several logs share one, and the refusal of data given twice."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from fieldsid.errors import UsageError
 from fieldsid.logs.run import Run
 
 _BOUNDARY = re.compile(r"[-_. ]+")
-"""What stands between the words of a file's name."""
-_BESIDE_NUMBERS = re.compile(r"[-_ ]+")
-"""The same without the point of a number: the 4 of `pulses_1.4` is no word."""
+"""Separators between the words of a file name."""
+_BOUNDARY_WITHOUT_POINT = re.compile(r"[-_ ]+")
+"""The separators without the point, since the 4 of `pulses_1.4` is not a word."""
 LONGEST_NAME = 20
-"""Letters of a name beside which a table of numbers has room in 80 columns."""
+"""Largest length of a name that leaves space for a table of numbers in 80 columns."""
 
 
 def stem_of(path: Path) -> str:
-    """Return the name of the run in a log: that of a folder, or of a file without its suffix: run7 of `run7.csv.gz`."""
+    """Return the name of the run in a log: that of the folder, or of the file without its suffix (run7 for `run7.csv.gz`)."""
     if str(path) == "-":
         return "stdin"
     name = path.name or path.resolve().name
@@ -37,14 +37,14 @@ def stem_of(path: Path) -> str:
 
 
 def _real(path: Path) -> Path:
-    """Return the file that a path leads to; a link that leads round and round stays what it is."""
+    """Return the file that a path leads to, with links resolved; a circular link is returned as it is."""
     return Path(os.path.realpath(path))
 
 
 def names_apart(names: Sequence[str], paths: Sequence[Path]) -> list[str]:
-    """Return the names of the runs of some files, those that several share with as many folders before them as it takes.
+    """Return distinct names of the runs of some files; a shared name is preceded by as many folders as are needed.
 
-    Files of one folder differ by their suffix. No two of the names are the same.
+    Files of one folder differ by their suffix.
     """
     alike: dict[str, list[int]] = defaultdict(list)
     for i, name in enumerate(names):
@@ -52,13 +52,13 @@ def names_apart(names: Sequence[str], paths: Sequence[Path]) -> list[str]:
     out = list(names)
     for name, places in alike.items():
         if len(places) > 1:
-            for i, own in zip(places, _told_apart(name, [_real(paths[i]) for i in places]), strict=True):
-                out[i] = own
+            for i, label_of_run in zip(places, _distinct_labels(name, [_real(paths[i]) for i in places]), strict=True):
+                out[i] = label_of_run
     return _numbered(out)
 
 
 def runs_apart(runs: Sequence[Run]) -> list[Run]:
-    """Return runs with names that no two share, as those of their files; of several from one file with a number behind each."""
+    """Return runs with distinct names, as those of their files; several runs of one file have a number appended."""
     of_file: dict[Path | int, list[int]] = defaultdict(list)
     for i, run in enumerate(runs):
         of_file[i if run.source is None else _real(run.source)].append(i)
@@ -67,59 +67,59 @@ def runs_apart(runs: Sequence[Run]) -> list[Run]:
     out = list(runs)
     for name, places in zip(named, of_file.values(), strict=True):
         for k, i in enumerate(places):
-            own = name if len(places) == 1 else f"{name}_{k + 1}"
-            out[i] = runs[i] if runs[i].name == own else replace(runs[i], name=own)
+            label_of_run = name if len(places) == 1 else f"{name}_{k + 1}"
+            out[i] = runs[i] if runs[i].name == label_of_run else replace(runs[i], name=label_of_run)
     return out
 
 
 def name_of_run(tables: Sequence[Path]) -> str:
-    """Return what a run in several tables is called: what their names begin with, else their folder."""
+    """Return the name of a run in several tables: the common start of their names, else their folder."""
     shared = shared_start([stem_of(path) for path in tables]).rstrip("-_. ")
     return shared or tables[0].resolve().parent.name
 
 
 def shared_start(stems: Sequence[str], boundary: re.Pattern[str] = _BOUNDARY) -> str:
-    """Return what names begin with, up to the end of a word in all of them: up to what matches `boundary`."""
+    """Return the common start of names, up to and including the last match of `boundary` in it."""
     same = common_start(stems)
     ends = [m.end() for m in boundary.finditer(same)]
     return same[: ends[-1]] if ends else ""
 
 
 def common_start(names: Sequence[str]) -> str:
-    """Return the letters that all names begin with."""
+    """Return the longest common start of names."""
     return "".join(letters[0] for letters in takewhile(lambda found: len(set(found)) == 1, zip(*names, strict=False)))
 
 
 @dataclass(frozen=True, slots=True)
 class ShortNames:
-    """What long names of several runs begin and end with, which a table leaves out: nothing where they are short or one."""
+    """The common start and end of long names, which a table leaves out; empty where the names are short or there is only one."""
 
     start: str
     end: str
 
     def of(self, name: str) -> str:
-        """Return a name with three dots for what all begin and end with."""
+        """Return a name with three dots in place of the common start and end."""
         middle = name[len(self.start) : len(name) - len(self.end)]
         return f"{'...' if self.start else ''}{middle}{'...' if self.end else ''}"
 
     @property
     def says(self) -> str:
-        """What the dots stand for, in words; empty where there are none."""
+        """The meaning of the dots, in words; empty where there are none."""
         parts = [f"{verb} with `{part}`" for verb, part in (("begin", self.start), ("end", self.end)) if part]
         return f"the names of all runs {' and '.join(parts)}" if parts else ""
 
 
 def short_names(names: Sequence[str]) -> ShortNames:
-    """Return what the names of runs have in common, up to the ends of words, where one of them is longer than LONGEST_NAME."""
+    """Return the common start and end of names, in complete words, where one of them is longer than LONGEST_NAME."""
     if len(set(names)) < 2 or max(map(len, names)) <= LONGEST_NAME:
         return ShortNames("", "")
-    start = shared_start(names, _BESIDE_NUMBERS)
-    end = shared_start([name[len(start) :][::-1] for name in names], _BESIDE_NUMBERS)[::-1]
+    start = shared_start(names, _BOUNDARY_WITHOUT_POINT)
+    end = shared_start([name[len(start) :][::-1] for name in names], _BOUNDARY_WITHOUT_POINT)[::-1]
     return ShortNames(start, end)
 
 
-def _told_apart(name: str, paths: Sequence[Path]) -> list[str]:
-    """Return the shortest labels that differ, or the longest there are."""
+def _distinct_labels(name: str, paths: Sequence[Path]) -> list[str]:
+    """Return the shortest labels that are distinct, or the longest possible ones."""
     labels = [name] * len(paths)
     for labels in _labels(name, paths):
         if len(set(labels)) == len(labels):
@@ -136,14 +136,14 @@ def _labels(name: str, paths: Sequence[Path]) -> Iterator[list[str]]:
 
 
 def _numbered(names: Sequence[str]) -> list[str]:
-    """Return the names with a number behind each that an earlier one has already."""
+    """Return the names with a number appended to each that repeats an earlier one."""
     out: list[str] = []
     for name in names:
-        own, n = name, 1
-        while own in out:
+        label_of_run, n = name, 1
+        while label_of_run in out:
             n += 1
-            own = f"{name}_{n}"
-        out.append(own)
+            label_of_run = f"{name}_{n}"
+        out.append(label_of_run)
     return out
 
 

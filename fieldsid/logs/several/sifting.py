@@ -1,4 +1,4 @@
-"""Of several logs those that can be used: one that cannot never stops the others."""
+"""The selection of the usable logs of several: one that cannot be used does not stop the others."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ Refused = Callable[[T, FieldsidError], None]
 """A function that is called with each item that cannot be used, and its error."""
 
 OF_ONE_LOG = (LogError, MappingError, DataError, ModelError, EffectError)
-"""Errors that lie in one log; any other lies in what was asked, and stops all."""
+"""Errors that concern one log; any other concerns the command and stops it."""
 
 
 def attempt(work: Callable[[T], R], item: T) -> R | FieldsidError:
-    """Return what some work makes of one item, or why that item cannot be used."""
+    """Return the result of `work` on one item, or the error that makes the item unusable."""
     try:
         return work(item)
     except OF_ONE_LOG as error:
@@ -25,10 +25,10 @@ def attempt(work: Callable[[T], R], item: T) -> R | FieldsidError:
 
 
 def sifted(items: Sequence[T], made: Iterable[R | FieldsidError], refused: Refused[T] | None = None) -> list[tuple[T, R]]:
-    """Return the items that can be used with what was made of each, see `attempt`.
+    """Return the usable items with the result of each; `made` holds a result or an error for each item, see `attempt`.
 
-    refused is called with each other one; without it the first error is raised. Raises DataError where none of
-    several is left, and the error itself where the only one cannot be used.
+    `refused` is called with each other item and its error; without it the first error is raised. Raises DataError where none of
+    several items is usable, and the item's own error where there is only one.
     """
     kept: list[tuple[T, R]] = []
     hints: set[str] = set()

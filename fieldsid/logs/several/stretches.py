@@ -1,8 +1,8 @@
-"""The stretches of a log in which the vehicle is under way: what lies between is on deck, adrift, at the surface or idle.
+"""The stretches of a log in which the vehicle is under way, and not on deck, adrift, at the surface or idle.
 
-Left out is where for some time the motor is off and no speed is made, the vehicle floats at the surface of a log that dives,
-or no angle, rate or fin changes any more at an end; and where the log has nothing at all. A motor that is off on a vehicle
-that still moves is a way of flying.
+Parts of some length are left out in which the motor is off and the speed is low, in which the vehicle is at the surface in a log
+with dives, in which no angle, rate or fin changes at the start or end of the log, or which have no samples. A vehicle that moves
+with its motor off, such as a glider, is under way.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from fieldsid.logs.run import MOTORS, Note, Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 OFF_S = 10.0
-"""Shorter than this nothing is left out."""
+"""Shortest duration of a part that is left out."""
 LEAST_S = 20.0
-"""A stretch shorter than this is none."""
+"""Shortest duration of a stretch."""
 IDLE = 0.15
-"""Share of the usual speed below which no way is made."""
+"""Share of the usual speed below which the vehicle counts as stopped."""
 DIVES_M, DIVES = 1.0, 0.2
-"""Depth in m, and share of the log below it, from which on a log is one of dives."""
+"""Depth in m, and smallest share of the samples below it, in a log with dives."""
 SURFACE_M = 0.3
 
 
@@ -32,14 +32,14 @@ Part = tuple[float, float]
 
 
 def stretches_of(run: Run) -> tuple[tuple[Part, ...], tuple[Note, ...]]:
-    """Return the stretches of a run under way, and notes on what lies outside of them; the whole run where there is none else."""
+    """Return the stretches of a run under way, and notes on the parts left out; the complete run where nothing is left out."""
     whole = ((float(run.time[0]), float(run.time[-1])),)
     reasons = {
         "no way is made": _idle(run),
-        "at the surface": _at_surface(run),
-        "nothing changes": _tails(run),
+        "at the surface": _surfaced(run),
+        "nothing changes": _constant_ends(run),
     }
-    off = {why: _long(run.time, mask) for why, mask in reasons.items()}
+    off = {why: _lasting_blocks(run.time, mask) for why, mask in reasons.items()}
     away = np.any(np.stack(list(off.values())), axis=0)
     breaks = np.flatnonzero((np.diff(run.time) > max(OFF_S, FEW_STEPS * float(np.median(np.diff(run.time))))) | np.diff(away)) + 1
     parts = [p for p in np.split(np.arange(run.time.size), breaks) if not away[p[0]]]
@@ -51,7 +51,7 @@ def stretches_of(run: Run) -> tuple[tuple[Part, ...], tuple[Note, ...]]:
 
 
 def _note(run: Run, kept: tuple[Part, ...], off: dict[str, BoolArray]) -> Note:
-    whys = [f"{why} ({_seconds(run.time, mask):.0f} s)" for why, mask in off.items() if mask.any()]
+    whys = [f"{why} ({_duration_s(run.time, mask):.0f} s)" for why, mask in off.items() if mask.any()]
     shown = few_of([f"{start:.2f} .. {end:.2f} s" for start, end in kept])
     left = float(run.time[-1] - run.time[0]) - sum(end - start for start, end in kept)
     reasons = "; ".join(whys) or "gaps of the log"
@@ -60,12 +60,12 @@ def _note(run: Run, kept: tuple[Part, ...], off: dict[str, BoolArray]) -> Note:
     return Note("stretches", message, data)
 
 
-def _seconds(time: FloatArray, mask: BoolArray) -> float:
+def _duration_s(time: FloatArray, mask: BoolArray) -> float:
     return float(np.diff(time)[mask[1:]].sum())
 
 
 def _idle(run: Run) -> BoolArray:
-    """Where no way is made and the motor, if it is in the log, is off."""
+    """Return the mask (n,) of the samples at which the vehicle is stopped and its motor, where logged, is off."""
     speed = np.abs(run["surge_m_s"]) if run.has("surge_m_s") else None
     motor = next((run[m] for m in MOTORS if run.has(m)), None)
     off = np.zeros(run.time.size, dtype=np.bool_)
@@ -80,7 +80,7 @@ def _idle(run: Run) -> BoolArray:
     return still & off if motor is not None and off.any() else still
 
 
-def _at_surface(run: Run) -> BoolArray:
+def _surfaced(run: Run) -> BoolArray:
     if not run.has("depth_m"):
         return np.zeros(run.time.size, dtype=np.bool_)
     depth = run["depth_m"]
@@ -88,8 +88,11 @@ def _at_surface(run: Run) -> BoolArray:
     return np.isfinite(depth) & (depth < SURFACE_M) if dives else np.zeros(run.time.size, dtype=np.bool_)
 
 
-def _tails(run: Run) -> BoolArray:
-    """Before the first and after the last change of an angle, a rate or a fin; a logger that holds the last value writes such."""
+def _constant_ends(run: Run) -> BoolArray:
+    """Return the mask (n,) of the samples before the first and after the last change of an angle, a rate or a fin.
+
+    A logger that repeats the last value writes such samples.
+    """
     mask = np.zeros(run.time.size, dtype=np.bool_)
     main = [run[s] for s in MAIN if run.has(s)]
     if not main:
@@ -102,8 +105,8 @@ def _tails(run: Run) -> BoolArray:
     return mask
 
 
-def _long(time: FloatArray, mask: BoolArray) -> BoolArray:
-    """Return only those runs of a mask (n,) that last."""
+def _lasting_blocks(time: FloatArray, mask: BoolArray) -> BoolArray:
+    """Return a mask (n,) with only those blocks that last at least OFF_S."""
     kept = mask.copy()
     for begin, end in zip(*blocks_of(mask), strict=True):
         if time[end - 1] - time[begin] < OFF_S:
