@@ -14,7 +14,7 @@ from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion_of
 from fieldsid.logs.mapping.numbers.recognise import PLACE, recognised
 from fieldsid.logs.mapping.numbers.true_heading import true_north
-from fieldsid.logs.mapping.numbers.units_told import set_by_size
+from fieldsid.logs.mapping.numbers.unit_inference import set_by_size
 from fieldsid.logs.mapping.vocabulary import LATITUDE, LONGITUDE
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import TABLE, Inventory, Samples

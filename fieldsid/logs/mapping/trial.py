@@ -21,7 +21,7 @@ from fieldsid.logs.doctor.fin_findings import WIDEST
 from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.draft import place_of
 from fieldsid.logs.mapping.numbers.true_heading import GEOGRAPHIC
-from fieldsid.logs.mapping.numbers.units_told import assumed_units, heading_in_doubt, set_by_size, unit_of_wraps
+from fieldsid.logs.mapping.numbers.unit_inference import assumed_units, heading_in_doubt, set_by_size, unit_of_wraps
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.run import FINS, SIGNALS, Note, Run
 

@@ -1,8 +1,8 @@
-"""Which fins move a plane, where a log has several alike: the sum of them that a mapping reads, with what speaks for it.
+"""The fins that turn the vehicle in an axis, where a log has several similar ones, as a sum in a mapping with the evidence.
 
-Fins of one vehicle are called alike but for a number or a side. What each does to the rate of the plane is told by the numbers,
-see shares.py; of an X tail the shares are 1/4 each, of twin rudders 1/2. Of a vehicle's outputs, of which no name says what they
-move, it is the one that the rate follows; where none does all are named with the line that is missing.
+The names of the fins of one vehicle differ in a number or a side only. The share of each in the angular acceleration of the axis
+is estimated by least squares, see shares.py; it is 1/4 for each fin of an X tail, 1/2 for twin rudders. Where the names are those
+of servo outputs, the fin is the output that the rate follows; where there is none, a note lists all outputs and the missing line.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from fieldsid.logs.few_of import few_of
 from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.fins.shares import EXPLAINS, WINDOWS_S, FinShares, explains, fin_shares, moved_by
 from fieldsid.logs.mapping.mapping_file import mapping_of
-from fieldsid.logs.mapping.numbers.units_told import Reading, as_counts, fin_reading
+from fieldsid.logs.mapping.numbers.unit_inference import Reading, as_counts, fin_reading
 from fieldsid.logs.mapping.trial import Log
 from fieldsid.logs.mapping.vocabulary import COMMANDED, MEASURED, OF_ANOTHER, word_set
 from fieldsid.logs.reader import Inventory, Series
@@ -34,50 +34,50 @@ from fieldsid.logs.run import FINS, Note, Run, origin_of
 from fieldsid.numerics.arrays import FloatArray
 
 OUTPUTS = word_set("servo servomotor actuator actuators rcou output outputs control controls")
-"""Words of what a vehicle's servos are told or say, which do not tell which moves what."""
+"""Words of commands to servos and measurements of them, which do not state the fin that a servo moves."""
 CALLED = OUTPUTS | word_set(
     "fin fins rudder rudders rud elevator elevators elev plane planes sternplane sternplanes surface surfaces flap flaps foil "
     "ctrl delta pwm u d input inputs act surf canard wing"
 )
-"""Words of what may be a fin among others."""
+"""Words in the names of one of several fins."""
 THRUSTERS = word_set("thrust thruster thrusters thr motor motors prop propeller esc jet engine rpm")
-"""Words of what turns a vehicle by pushing more on one side."""
+"""Words of thrusters, which turn a vehicle by a difference of thrust."""
 STARBOARD = word_set("starboard stbd right s r sb")
 SIDES = STARBOARD | word_set(
     "port left p l upper lower top bottom up down t b a c d ul ur ll lr tl tr bl br pu pl su sl ne nw se sw i ii iii iv"
 )
-"""Words of where one of several fins is."""
+"""Words of the position of one of several fins."""
 MOST = 16
-"""Fins and motors alike: more are no vehicle's."""
+"""Largest number of similar fins or motors of a vehicle."""
 Family = Mapping[str, Mapping[str, Any]]
-"""Fins alike: where a mapping finds each, by its name."""
+"""Similar fins: the source of each in a mapping, by its name."""
 SHORT_WORD = 2
-"""Letters up to which a word is a side only behind another."""
+"""Number of letters up to which a word is a side only where another word precedes it."""
 
 
 def is_measured(family: Family) -> bool:
-    """Whether fins are told as they were measured, by their names."""
+    """Return whether the names say that the fin angles were measured and not commanded."""
     words = {word for name in family for word in words_of(name)}
     return bool(words & MEASURED) and not words & (COMMANDED | {"set"})
 
 
 def are_outputs(family: Family) -> bool:
-    """Whether the names are those of servos in a log of topics: what each of them moves is the vehicle's."""
+    """Return whether the names are those of servo outputs in a log of topics, which do not state the fin that each moves."""
     return all(OUTPUTS & set(words_of(name)) and "topic" in place for name, place in family.items())
 
 
 def families(inventory: Inventory) -> list[Family]:
-    """Return columns, or fields of topics, that are called alike but for a number or a side, as places in a mapping by name."""
-    alike: dict[tuple[str, ...], dict[str, Mapping[str, Any]]] = {}
+    """Return the groups of columns, or fields of topics, whose names differ in a number or a side only, as sources by name."""
+    by_kind: dict[tuple[str, ...], dict[str, Mapping[str, Any]]] = {}
     for name, place in _numbers(inventory):
         kind = _kind(words_of(name))
         if kind is not None:
-            alike.setdefault(kind, {})[name] = place
-    return [f for f in alike.values() if 1 < len(f) <= MOST or (are_outputs(f) and any(c.isdigit() for c in "".join(f)))]
+            by_kind.setdefault(kind, {})[name] = place
+    return [f for f in by_kind.values() if 1 < len(f) <= MOST or (are_outputs(f) and any(c.isdigit() for c in "".join(f)))]
 
 
 def _numbers(inventory: Inventory) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the numbers of a log that its format does not define, by name, with their place."""
+    """Yield the name and the source of each number of a log that its format does not define."""
     for channel in inventory.channels if inventory.is_named else ():
         for info in channel.fields:
             if info.kind not in ("text", "numbers") and info.means is None:
@@ -88,31 +88,31 @@ def _numbers(inventory: Inventory) -> Iterator[tuple[str, Mapping[str, Any]]]:
 
 
 def _kind(words: list[str]) -> tuple[str, ...] | None:
-    """Return what fins of one kind have alike in their names; None for a name that is no fin's, or of one that stands alone."""
+    """Return the words of a name with numbers and sides replaced by `#`; None where it is not that of one of several fins."""
     kind = tuple("#" if w.isdigit() or (w in SIDES and (i or len(w) > SHORT_WORD)) else w for i, w in enumerate(words))
     is_fin = bool((CALLED | THRUSTERS) & set(kind)) or set(words) <= SIDES
     return kind if is_fin and "#" in kind and not OF_ANOTHER & set(words) else None
 
 
 def is_thruster(name: str) -> bool:
-    """Whether what pushes is called so, and no servo's motor, or by nothing but its side."""
+    """Return whether a name is that of a thruster and not of a servo motor, or consists of a side only."""
     words = set(words_of(name))
     return (bool(THRUSTERS & words) and not OUTPUTS & words) or words <= SIDES
 
 
 def is_on_starboard(name: str) -> bool:
-    """Whether a thruster is the one on the starboard side, by its name."""
+    """Return whether a name is that of a thruster on the starboard side."""
     return is_thruster(name) and bool(STARBOARD & set(words_of(name)))
 
 
 PLACE = ("column", "topic", "field")
 THRUST_RAD = 0.4
-"""What the largest difference of thrusters is taken for."""
+"""Fin angle in rad that is assumed for the largest difference of thrusters."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Fin:
-    """One of several fins: its name, how a mapping reads it, the rad that its number is worth, its angle (n,), and its share."""
+    """One of several fins: name, line in a mapping, angle in rad of one unit of its number, angle (n,) in rad, and share."""
 
     name: str
     item: Mapping[str, Any]
@@ -123,27 +123,27 @@ class _Fin:
 
 
 def with_several_fins(log: Log, body: Mapping[str, Any], run: Run) -> tuple[dict[str, Any], list[Note]]:
-    """Return a mapping's body with the fins that move each plane, of several alike, and what speaks for them; else as it is."""
+    """Return the body of a mapping with the fins that turn each axis, of several similar ones, and notes with the evidence."""
     signals, notes = dict(body["signals"]), []
     known, done = families(log.inventory), set[str]()
     for motion, of_plane in AXES:
         for family in known:
             signal = of_plane[is_measured(family)]
-            if signal in done or not any(map(run.has, motion)) or not _is_asked(signal, of_plane, signals, family):
+            if signal in done or not any(map(run.has, motion)) or not _may_be_used(signal, of_plane, signals, family):
                 continue
             fins = _read(log, {**body, "signals": signals}, family, run)
-            used, found = _told(fins, run, *motion) if fins else ([], None)
+            used, found = _effective_fins(fins, run, *motion) if fins else ([], None)
             if found is not None and found.explains >= EXPLAINS and not _is_known(signals.get(signal), used):
                 signals[signal] = _item(used)
                 done.add(signal)
-                if _is_of(signals.get("thrust", {}), family):  # one of several thrusters: their mean is the thrust
+                if _is_member(signals.get("thrust", {}), family):  # one of several thrusters: their mean is the thrust
                     signals["thrust"] = {"sum": [{**fin.item, "scale": _rounded(1.0 / len(fins))} for fin in fins]}
                 notes.append(_evidence(signal, motion[1], used, found, family))
     return {**body, "signals": signals}, notes
 
 
 def which_output(inventory: Inventory, signals: Mapping[str, Any]) -> list[Note]:
-    """Return the note that names a vehicle's outputs, and the line that is missing, where a mapping has no fin."""
+    """Return the note that lists the servo outputs, and the missing line, where a mapping has no fin."""
     outputs = [place for family in families(inventory) if are_outputs(family) for place in family.values()]
     if not outputs or set(FINS) & signals.keys():
         return []
@@ -165,47 +165,48 @@ def which_output(inventory: Inventory, signals: Mapping[str, Any]) -> list[Note]
     return [Note("which_output", message, {"signal": "rudder_rad", "others": named})]
 
 
-def _is_asked(signal: str, of_plane: tuple[str, str], signals: Mapping[str, Any], family: Family) -> bool:
-    """Whether a plane has no fin yet, one of several alike, or a sum of them beside which these were measured."""
+def _may_be_used(signal: str, of_plane: tuple[str, str], signals: Mapping[str, Any], family: Family) -> bool:
+    """Return whether a family may be the signal: the axis has no fin, one of this family, or only sums of other fins."""
     if signal in signals:
-        return _is_of(signals[signal], family)
+        return _is_member(signals[signal], family)
     return all("sum" in signals[s] for s in of_plane if s in signals)
 
 
-def _is_of(item: Mapping[str, Any], family: Family) -> bool:
-    """Whether what a line of a mapping reads is one of a family."""
+def _is_member(item: Mapping[str, Any], family: Family) -> bool:
+    """Return whether a line of a mapping reads one of a family."""
     return any(all(item.get(key) == value for key, value in place.items()) for place in family.values())
 
 
 def _read(log: Log, body: Mapping[str, Any], family: Family, run: Run) -> list[_Fin]:
-    """Return the fins of a family on the clock of the run, those that move; none where they cannot be read."""
+    """Return the moving fins of a family on the clock of the run; none where they cannot be read."""
     signals = {"rudder_rad": {"sum": [{**place, "scale": 1.0} for place in family.values()]}}
     try:
         raw = log.read(mapping_of({**body, "signals": signals}))
-    except FieldsidError:  # what cannot be read is no fin
+    except FieldsidError:  # a column that cannot be read is not a fin
         return []
     shift = origin_of(raw.notes) - origin_of(run.notes)
     seen = {
-        name: _held(series, run.time - shift)
+        name: _on_clock(series, run.time - shift)
         for name, series in zip(family, raw.series.values(), strict=True)
         if series.values.ndim == 1
     }
     moving = [n for n, v in seen.items() if np.isfinite(v).mean() > 0.5 and float(np.nanmax(v) - np.nanmin(v)) > 0.0]
     if not moving:
         return []
-    how = _how(moving, next(iter(raw.series.values())).unit, np.concatenate([seen[name] for name in moving]))
+    how = _conversion(moving, next(iter(raw.series.values())).unit, np.concatenate([seen[name] for name in moving]))
     return [_Fin(name, {**family[name], **how.item}, how.worth, (seen[name] - how.centre) * how.worth) for name in moving]
 
 
-def _held(series: Series, time: FloatArray) -> FloatArray:
+def _on_clock(series: Series, time: FloatArray) -> FloatArray:
     good = np.isfinite(series.time) & np.isfinite(series.values)
     return held(Track(series.time[good], series.values[good]), time)
 
 
-def _how(names: list[str], unit: str | None, values: FloatArray) -> Reading:
-    """Return how the numbers (n,) of fins alike are read.
+def _conversion(names: list[str], unit: str | None, values: FloatArray) -> Reading:
+    """Return the conversion of the numbers (n,) of similar fins.
 
-    By the unit in their names, as counts of a servo, or in degrees where they are too large; those of thrusters as they are.
+    They are read in the unit in their names, as counts of a servo, or in degrees where they are too large; thrusts are not
+    converted.
     """
     if unit is not None:
         return Reading({}, pick_unit(unit).factor)
@@ -217,22 +218,22 @@ def _how(names: list[str], unit: str | None, values: FloatArray) -> Reading:
 
 
 def _is_known(item: Mapping[str, Any] | None, used: list[_Fin]) -> bool:
-    """Whether one fin that a plane has already is all that moves it: the others do nothing, or have its numbers."""
+    """Return whether the mapping already has one of the fins, and all fins used have the same numbers as it."""
     if item is None or not all(np.array_equal(fin.values, used[0].values, equal_nan=True) for fin in used):
         return False
     return any(all(item.get(key) == fin.item[key] for key in PLACE if key in fin.item) for fin in used)
 
 
-def _told(fins: list[_Fin], run: Run, angle: str, rate: str) -> tuple[list[_Fin], FinShares | None]:
-    """Return the fins that do something to a rate, with their shares, over the window in which they explain most.
+def _effective_fins(fins: list[_Fin], run: Run, angle: str, rate: str) -> tuple[list[_Fin], FinShares | None]:
+    """Return the fins with an effect on a rate, with their shares, over the window in which they explain most.
 
-    The starboard one of two thrusters counts as positive, of fins the first.
+    The sign is such that a starboard thruster, or else the first fin, counts as positive.
     """
     turning, turned = (run[s] if run.has(s) else None for s in (rate, angle))
     found = []
     for width in (max(2, width_of(run.time, window)) for window in WINDOWS_S):
-        told = moved_by([fin.values for fin in fins], run.time, turning, turned, width, rights=angle == "pitch_rad")
-        found += [] if told is None else [fin_shares(*told, width)]
+        terms = moved_by([fin.values for fin in fins], run.time, turning, turned, width, rights=angle == "pitch_rad")
+        found += [] if terms is None else [fin_shares(*terms, width)]
     best = max(found, key=lambda shares: shares.explains, default=None)
     if best is None:
         return [], None
@@ -243,17 +244,17 @@ def _told(fins: list[_Fin], run: Run, angle: str, rate: str) -> tuple[list[_Fin]
 
 
 def _item(used: list[_Fin]) -> dict[str, Any]:
-    """Return how a mapping reads the fins that do something: one of them alone, or their sum."""
-    taken = _taken_for(used)
-    if len(used) == 1 and taken == 1.0:
+    """Return the line of a mapping for the fins with an effect: one of them alone, or their sum."""
+    angle_factor = _angle_factor(used)
+    if len(used) == 1 and angle_factor == 1.0:
         return dict(used[0].item)
-    # the scale of counts is the rad of one, of all others what the angle in their unit is worth
-    scales = [fin.share * taken * (fin.worth if fin.item.get("unit") == COUNTS else 1.0) for fin in used]
+    # for counts the scale is the angle in rad of one count, else the share in the sum
+    scales = [fin.share * angle_factor * (fin.worth if fin.item.get("unit") == COUNTS else 1.0) for fin in used]
     return {"sum": [{**fin.item, "scale": _rounded(scale)} for fin, scale in zip(used, scales, strict=True)]}
 
 
-def _taken_for(used: list[_Fin]) -> float:
-    """Return the rad that the numbers of thrusters are taken for, by the largest difference; one of fins, which are angles."""
+def _angle_factor(used: list[_Fin]) -> float:
+    """Return the factor from thrust to an equivalent fin angle in rad, from the largest difference; 1 for fins."""
     if any("unit" in fin.item or not is_thruster(fin.name) for fin in used):
         return 1.0
     largest = float(np.nanmax(np.abs(np.sum([fin.share * (fin.values - np.nanmedian(fin.values)) for fin in used], axis=0))))
@@ -265,14 +266,14 @@ def _rounded(value: float) -> float:
 
 
 def _evidence(signal: str, rate: str, used: list[_Fin], found: FinShares, family: Family) -> Note:
-    told = " ".join(f"{'-' if fin.share < 0.0 else '+'} {_fraction(abs(fin.share))}{fin.name}" for fin in used)
+    terms = " ".join(f"{'-' if fin.share < 0.0 else '+'} {_fraction(abs(fin.share))}{fin.name}" for fin in used)
     fitted = f", the best one alone {100 * found.best_alone:.0f} %; fitted {', '.join(f'{fin.fitted:.2g}' for fin in used)}"
     each, more = ("together they explain", fitted) if len(used) > 1 else ("it explains", "")
-    message = f"{signal} is {told.removeprefix('+ ')}: {each} {explains(found.explains, rate)}{more}"
+    message = f"{signal} is {terms.removeprefix('+ ')}: {each} {explains(found.explains, rate)}{more}"
     if found.patterns < len(used):
         ways = "together only" if found.patterns == 1 else f"in {found.patterns} patterns only"
         message += f"; they moved {ways}: how much of it each of them does is not told by this log, and taken by how far it went"
-    if _taken_for(used) != 1.0:
+    if _angle_factor(used) != 1.0:
         message += f"; no angles: the largest difference is taken for about {THRUST_RAD:g} rad, and the authority is per that"
     outputs = {"outputs": len(family)} if are_outputs(family) and len(used) == 1 else {}
     return Note("evidence", message, {"signal": signal, "fins": {fin.name: fin.share for fin in used}, **outputs})

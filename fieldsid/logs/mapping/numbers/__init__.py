@@ -1,1 +1,1 @@
-"""What the numbers of a log say of it: which signals they are, in which unit, from where they count."""
+"""Inference from the numbers of a log: the signal in a column, its unit, and the direction from which an angle is counted."""

@@ -1,11 +1,11 @@
-"""Which of several headings is the vehicle's own, and which way it counts: a course is one thing, and east is not north.
+"""The choice of the vehicle's heading among several columns, of which some are courses, and the direction from which it counts.
 
-A hull slides out of its turn: its heading is ahead of its course by the sideslip, which goes with the rate of turn (Fossen 2021,
-section 6.5). The time by which an angle leads the course of x and y, psi - chi = T r + current, is nil or negative for a course,
-whose receiver is late, and clearly positive for a compass. Where a rate of turn is logged, the heading is the one it makes.
+In a turn the heading psi is ahead of the course chi by the sideslip, which is proportional to the yaw rate r (Fossen 2021,
+section 6.5). The lead time T in psi - chi = T r + current is zero or negative for a course, whose receiver is late, and clearly
+positive for a compass. Where a yaw rate is logged, the heading is the angle that agrees with its integral.
 
-Heading, x and y from north and clockwise, and all three from east and counterclockwise, are mirror images of each other: no
-number of theirs tells which. A latitude and longitude does, a course over ground, and speeds north and east.
+Heading, x and y from north and clockwise, and all three from east and counterclockwise, are mirror images of each other, which
+their numbers cannot distinguish. A latitude and longitude can, and so can a course over ground or velocities north and east.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from fieldsid.logs.doctor.angle_and_rate import PAIRS, changes_of
 from fieldsid.logs.doctor.pair_findings import AGREES, TURNED, WINDOW_S, course_of
 from fieldsid.logs.doctor.together import FEWEST, SURE, change, width_of
 from fieldsid.logs.mapping.canonical_names import unit_in_name, words_of
-from fieldsid.logs.mapping.numbers.units_told import in_radians
+from fieldsid.logs.mapping.numbers.unit_inference import in_radians
 from fieldsid.logs.mapping.vocabulary import COMMANDED, COMPASS, LATITUDE, LONGITUDE, OF_ANOTHER, OVER_GROUND
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import Samples
@@ -31,25 +31,25 @@ from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import ComplexArray, FloatArray
 
 LEAD_S = 1.0
-"""Time over which a course is taken: in a longer one a vehicle turns more than once."""
+"""Window in s over which a course is computed; in a longer one a vehicle may turn more than once."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lead:
-    """By how many s an angle is ahead of the course that is made, and the standard error."""
+    """The time in s by which an angle leads the course, and its standard error."""
 
     seconds: float
     error: float
 
     @property
     def is_clear(self) -> bool:
-        """Whether the angle is surely ahead: that of a hull that slides out of its turns."""
+        """Return whether the angle leads the course significantly, as a heading does."""
         return self.seconds > SURE * self.error
 
 
 def better_heading(runs: Sequence[Run], names: Sequence[str]) -> tuple[int, Note] | None:
-    """Return which of the headings of one log, the first taken so far, is the vehicle's own in place of it, and why; or None."""
-    misfits = [_off_rate(run) for run in runs]
+    """Return the index of the heading that replaces the first of several, and the reason; None where the first is kept."""
+    misfits = [_rate_misfit(run) for run in runs]
     best = min(range(len(runs)), key=lambda i: misfits[i])
     if np.isfinite(misfits[0]) and best != 0 and misfits[0] > CLEARLY * misfits[best]:
         why = f"the logged rate makes it within {misfits[best]:.2g} rad, the other within {misfits[0]:.2g} rad"
@@ -60,9 +60,9 @@ def better_heading(runs: Sequence[Run], names: Sequence[str]) -> tuple[int, Note
     leads = {i: lead for i, run in enumerate(runs) if (lead := lead_of(run)) is not None and lead.is_clear}
     if not leads:
         return None
-    best, own = max(leads.items(), key=lambda found: found[1].seconds)
+    best, ahead = max(leads.items(), key=lambda found: found[1].seconds)
     why = (
-        f"in turns it is {own.seconds:.2f} +/- {own.error:.2f} s ahead of the course of x_m and y_m, as a hull that slides is; "
+        f"in turns it is {ahead.seconds:.2f} +/- {ahead.error:.2f} s ahead of the course of x_m and y_m, as a hull that slides is; "
         f"the other is that course ({other.seconds:.2f} +/- {other.error:.2f} s)"
     )
     return best, _taken(names, best, why)
@@ -73,20 +73,20 @@ def _taken(names: Sequence[str], best: int, why: str) -> Note:
     return Note("evidence", message, {"signal": "yaw_rad", "others": [names[0]]})
 
 
-def _off_rate(run: Run) -> float:
-    """Return by how many rad a heading's change over a window is off the integral of the yaw rate; infinite without one."""
+def _rate_misfit(run: Run) -> float:
+    """Return the standard deviation in rad of a heading's changes from the integral of the yaw rate; infinite without a rate."""
     changes = changes_of(run, *PAIRS[0])
     return float("inf") if changes is None else float(np.std(changes[0] - changes[1]))
 
 
 def lead_of(run: Run) -> Lead | None:
-    """Return by how much the heading of a run leads its course; None where the log does not show it."""
+    """Return the time by which the heading of a run leads its course; None where the log does not show it."""
     made = course_of(run, LEAD_S)
     return None if made is None else _regressed(made.heading - made.course, made.heading, made.rate, made.width)
 
 
 def _regressed(off: FloatArray, yaw: FloatArray, rate: FloatArray, width: int) -> Lead | None:
-    """Return the slope of an angle's difference from the course (n,) on its rate, beside an offset and a current's two parts."""
+    """Return T from the regression of psi - chi (n,) on the rate, an offset, and the two components of a current."""
     turned = np.exp(1j * off)
     angle = np.angle(turned * np.conj(np.mean(turned)))
     base = np.stack([rate, np.ones_like(rate), np.cos(yaw), np.sin(yaw)], axis=1)
@@ -94,50 +94,50 @@ def _regressed(off: FloatArray, yaw: FloatArray, rate: FloatArray, width: int) -
     if rank < base.shape[1]:
         return None
     left = angle - base @ values
-    # windows that overlap say the same `width` times
+    # overlapping windows are not independent: the variance is larger by `width`
     spread = width * float(left @ left) / max(angle.size - width * base.shape[1], 1)
     covariance = np.linalg.inv(base.T @ base) * spread
     return Lead(float(values[0]), float(np.sqrt(covariance[0, 0])))
 
 
 NEAR = math.pi / 4
-"""How far the angle between them may be from what it should be: sideslip, a current and a compass' error lie in it."""
+"""Largest deviation in rad from the expected angle between heading and course, for sideslip, current and compass errors."""
 ENU = "ENU"
 GEOGRAPHIC = frozenset({"north", "northing", "east", "easting", "n", "e", "utm"})
-"""Words of a column of metres that say which way it counts."""
+"""Words of a column in metres that state its direction."""
 
 
 def true_north(samples: Samples, names: Sequence[str], signals: Mapping[str, Any]) -> list[Note]:
-    """Set the frame of a heading, and of x and y, that count from east; return why, or that and how it stays open."""
-    place, yaw = _untold(samples, signals, "x_m", "y_m"), _untold(samples, signals, "yaw_rad")
-    ways: dict[tuple[str, ...], ComplexArray] = {("x_m", "y_m"): _made(samples, *place)} if place else {}
-    ways |= {("yaw_rad",): np.exp(1j * in_radians(yaw[0], signals["yaw_rad"].get("unit")))} if yaw else {}
+    """Set the frame of a heading, and of x and y, that count from east; return notes with the reason, or that it is undecided."""
+    place, yaw = _columns_without_frame(samples, signals, "x_m", "y_m"), _columns_without_frame(samples, signals, "yaw_rad")
+    directions: dict[tuple[str, ...], ComplexArray] = {("x_m", "y_m"): _displacement(samples, *place)} if place else {}
+    directions |= {("yaw_rad",): np.exp(1j * in_radians(yaw[0], signals["yaw_rad"].get("unit")))} if yaw else {}
     notes, settled = list[Note](), set[tuple[str, ...]]()
-    for said_by, travel in _travels(samples, names):
-        for turned, way in ways.items():
-            along, against, off = _agreement(way, travel)
+    for source, travel in _travels(samples, names):
+        for turned, direction in directions.items():
+            along, against, off = _agreement(direction, travel)
             is_open = max(along, against) < AGREES or abs(along - against) < TURNED or (against > along and abs(off) > NEAR)
             if turned not in settled and not is_open:
                 settled.add(turned)
-                notes += _turned(turned, signals, said_by, against, along) if against > along else []
-    if len(ways) < 2 or ("yaw_rad",) in settled or _is_named(signals):
+                notes += _set_from_east(turned, signals, source, against, along) if against > along else []
+    if len(directions) < 2 or ("yaw_rad",) in settled or _is_named(signals):
         return notes
-    along, against, _ = _agreement(*ways.values())
-    return [*notes, _open()] if len(settled) == 0 and along > AGREES and along - against > TURNED else notes
+    along, against, _ = _agreement(*directions.values())
+    return [*notes, _frame_open()] if len(settled) == 0 and along > AGREES and along - against > TURNED else notes
 
 
-def _turned(turned: tuple[str, ...], signals: Mapping[str, Any], said_by: str, against: float, along: float) -> list[Note]:
-    """Take signals as counted from east, and return why."""
+def _set_from_east(turned: tuple[str, ...], signals: Mapping[str, Any], source: str, against: float, along: float) -> list[Note]:
+    """Set signals as counted from east, and return a note with the reason."""
     for signal in turned:
         signals[signal]["frame"] = ENU
     message = (
-        f"{' and '.join(turned)}: taken with `frame: {ENU}`, counted from east: the way by {said_by} turns against it (agreement "
+        f"{' and '.join(turned)}: taken with `frame: {ENU}`, counted from east: the way by {source} turns against it (agreement "
         f"{against:.2f} against and {along:.2f} along it, limit {TURNED:g} between them)"
     )
     return [Note("evidence", message, {"signal": turned[0], "value": against - along, "limit": TURNED})]
 
 
-def _open() -> Note:
+def _frame_open() -> Note:
     message = (
         "yaw_rad goes with x_m and y_m whether all three count from north, clockwise, or from east, counterclockwise: the log "
         "does not tell port from starboard; a latitude and longitude or a course over ground beside them would, and so does a "
@@ -147,33 +147,33 @@ def _open() -> Note:
 
 
 def _is_named(signals: Mapping[str, Any]) -> bool:
-    """Whether the names of the columns say themselves which way they count."""
+    """Return whether the names of the columns state their directions."""
     words = {s: set(words_of(str(signals[s].get("column")))) for s in ("yaw_rad", "x_m", "y_m")}
     return bool((COMPASS | {"true", "magnetic"}) & words["yaw_rad"] or GEOGRAPHIC & (words["x_m"] | words["y_m"])) or any(
         "frame" in signals[s] for s in words
     )
 
 
-def _untold(samples: Samples, signals: Mapping[str, Any], *wanted: str) -> list[FloatArray]:
-    """Return the columns (n,) of some signals; nothing where one is not there, or its frame is known."""
+def _columns_without_frame(samples: Samples, signals: Mapping[str, Any], *wanted: str) -> list[FloatArray]:
+    """Return the columns (n,) of some signals; none where one is missing or its frame is known."""
     items = [item for s in wanted if not {"frame", "sign"} & (item := signals.get(s, {})).keys()]
     found = [samples.columns[item["column"]] for item in items if item.get("column") in samples.columns]
     return found if len(found) == len(wanted) else []
 
 
-def _made(samples: Samples, north: FloatArray, east: FloatArray) -> ComplexArray:
-    """Return the way made (n,) over a window about each sample, NaN at the ends."""
+def _displacement(samples: Samples, north: FloatArray, east: FloatArray) -> ComplexArray:
+    """Return the displacement north + i east (n,) over a window about each sample, NaN at the ends."""
     return change(north + 1j * east, width_of(samples.time, WINDOW_S))
 
 
 def _travels(samples: Samples, names: Sequence[str]) -> Iterator[tuple[str, ComplexArray]]:
-    """Yield the columns that are north and east by what they are, and the way (n,) that a vehicle goes by them."""
+    """Yield, in words, columns whose directions north and east are certain, and the displacement or direction (n,) they give."""
     known = [n for n in names if n in samples.columns and not (COMMANDED | OF_ANOTHER) & set(words_of(n))]
     means = {n: (meaning_of(n) or ("", 0))[0] for n in known}
     latitude, longitude = (next((n for n in known if means[n] == s), None) for s in (LATITUDE, LONGITUDE))
     if latitude is not None and longitude is not None:
         north, east = north_and_east(np.stack([samples.columns[latitude], samples.columns[longitude]], axis=1))
-        yield f"`{latitude}` and `{longitude}`", _made(samples, north, east)
+        yield f"`{latitude}` and `{longitude}`", _displacement(samples, north, east)
     fast = [next((n for n in known if _is_speed(n, side)), None) for side in ("n", "e")]
     if fast[0] is not None and fast[1] is not None:
         yield f"`{fast[0]}` and `{fast[1]}`", samples.columns[fast[0]] + 1j * samples.columns[fast[1]]
@@ -184,7 +184,7 @@ def _travels(samples: Samples, names: Sequence[str]) -> Iterator[tuple[str, Comp
 
 
 def _is_course(name: str, means: str, values: FloatArray) -> bool:
-    """Whether a column is a course over ground, which counts from north: so it is called, or a course that is never negative."""
+    """Return whether a column is a course over ground, which counts from north: by its name, or as a course without negatives."""
     words = set(words_of(name))
     if "cog" in words or (means == "yaw_rad" and OVER_GROUND & words):
         return True
@@ -193,19 +193,22 @@ def _is_course(name: str, means: str, values: FloatArray) -> bool:
 
 def _is_speed(name: str, side: str) -> bool:
     words = set(words_of(name))
-    whole = {"n": "north", "e": "east"}[side]
-    return f"v{side}" in words or (bool(words & {"v", "vel", "velocity", "speed"}) and bool(words & {side, whole, f"{whole}ing"}))
+    full_word = {"n": "north", "e": "east"}[side]
+    return f"v{side}" in words or (
+        bool(words & {"v", "vel", "velocity", "speed"}) and bool(words & {side, full_word, f"{full_word}ing"})
+    )
 
 
-def _agreement(ways: ComplexArray, travel: ComplexArray) -> tuple[float, float, float]:
-    """Return how well a direction (n,) goes with the travel and with its mirror image, and the angle off the latter in rad.
+def _agreement(directions: ComplexArray, travel: ComplexArray) -> tuple[float, float, float]:
+    """Return the agreement of a direction (n,) with the travel and with its mirror image, and the angle in rad to the latter.
 
-    From east and counterclockwise x + iy is i (north - i east): what goes with the mirror image is pi/2 from it.
+    Counted from east and counterclockwise, x + iy = i (north - i east): a direction that agrees with the mirror image is at pi/2
+    to it.
     """
-    weight = np.abs(travel) * np.abs(ways)
+    weight = np.abs(travel) * np.abs(directions)
     seen = np.isfinite(weight) & (weight > 0.0)
     if seen.sum() < FEWEST:
         return 0.0, 0.0, 0.0
-    a, b, w = ways[seen] / np.abs(ways[seen]), travel[seen] / np.abs(travel[seen]), weight[seen]
+    a, b, w = directions[seen] / np.abs(directions[seen]), travel[seen] / np.abs(travel[seen]), weight[seen]
     along, against = complex(np.average(a * np.conj(b), weights=w)), complex(np.average(a * b, weights=w))
     return abs(along), abs(against), math.remainder(float(np.angle(against)) - 0.5 * math.pi, math.tau)

@@ -1,8 +1,8 @@
-"""The unit of numbers that nothing states: by their size, by the jump where a heading wraps, by signals that agree with them.
+"""The inference of units that are not stated: from the size of numbers, the jump where a heading wraps, and other signals.
 
-An angle whose numbers go beyond a turn in rad, or jump by a turn where they wrap, tells its unit itself; a fin's are counts where
-they are whole and lie about the middle of a servo's. A rate agrees with the change of its angle, a speed with the way made by x
-and y and with the change of the depth, a heading with the course. What none of these tells is assumed to be SI.
+The unit of an angle follows from numbers beyond 2 pi, or from a jump of a turn where they wrap. The numbers of a fin are counts
+where they are integers about the centre of a servo. A rate must agree with the change of its angle, a speed with the distance by
+x and y and with the change of depth, a heading with the course. A unit that none of these shows is assumed to be SI.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ from fieldsid.logs.run import FINS, GOALS, MOTORS, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
 LARGEST_DEG = 180.0
-"""A fin whose numbers are larger is in no unit of an angle."""
+"""Largest number of a fin in a unit of angle."""
 WRAPPING = ("rad", "deg", "gon", "ddeg", "cdeg")
-"""Units in which headings are logged from nil to a turn; the first two where few numbers are beyond a turn in degrees."""
+"""Units of headings from zero to a turn; only the first two are tried where few numbers exceed 360."""
 OF_A_TURN = 0.9
-"""Share of a turn by which a heading jumps at least where it wraps: a vehicle does not turn by a tenth between two samples."""
+"""Smallest jump of a wrapping heading, in turns: a vehicle does not turn by a tenth of a turn between two samples."""
 TO_A_TURN = 1.01
-"""Turns that a heading which wraps spans at most: one, and what its last digit is rounded up by."""
+"""Largest span of a wrapping heading, in turns: one, plus the rounding of the last digit."""
 TURN = TO_A_TURN * math.tau
-"""A heading whose numbers are larger is not within a turn in rad."""
+"""Largest number of a wrapped heading in rad."""
 OFTEN = 0.05
-"""Share of the samples that must be beyond a turn in degrees: fewer may be damage."""
+"""Smallest share of samples beyond 360 that counts; fewer may be damaged samples."""
 MOST_TURNS = 10.0
-"""Turns that a heading of a log of maneuvers may count on."""
+"""Largest number of turns that an unwrapped heading in a log of maneuvers counts."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """How a mapping reads a fin's numbers, the rad that one is worth, and what they are at zero."""
+    """The conversion of a fin's numbers: keys of a mapping, angle in rad of one unit, and number at zero angle."""
 
     item: Mapping[str, Any]
     worth: float = 1.0
@@ -49,12 +49,12 @@ class Reading:
 
 
 def as_counts(servo: Servo) -> Reading:
-    """Return how the counts of a servo are read."""
+    """Return the conversion of the counts of a servo."""
     return Reading({"unit": COUNTS, "centre": round(servo.centre)}, FULL_RAD / servo.travel, servo.centre)
 
 
 def fin_reading(values: FloatArray) -> Reading | None:
-    """Return how the numbers (n,) of a fin are read: counts, degrees where they are too large for rad; None where for both."""
+    """Return the conversion of the numbers (n,) of a fin: counts, rad, or degrees where too large for rad; None beyond all."""
     servo, largest = servo_of(values), float(np.nanmax(np.abs(values)))
     if servo is not None:
         return as_counts(servo)
@@ -64,13 +64,13 @@ def fin_reading(values: FloatArray) -> Reading | None:
 
 
 def in_radians(values: FloatArray, unit: str | None = None) -> FloatArray:
-    """Return an angle (n,) in rad: by its unit, without one by its size."""
-    told = unit or ("deg" if float(np.nanmax(np.abs(values), initial=0.0)) > TURN else "rad")
-    return values * pick_unit(told).factor
+    """Return an angle (n,) in rad, converted from its unit, or without one from the unit that its size shows."""
+    unit_used = unit or ("deg" if float(np.nanmax(np.abs(values), initial=0.0)) > TURN else "rad")
+    return values * pick_unit(unit_used).factor
 
 
 def unit_of_wraps(values: FloatArray) -> str | None:
-    """Return the unit in which a heading (n,) jumps by nearly a turn where it wraps; None where it does in none."""
+    """Return the unit in which a heading (n,) jumps by nearly a turn where it wraps; None without one."""
     seen = values[np.isfinite(values)] if values.ndim == 1 else values[:0, 0]
     if seen.size < 2:
         return None
@@ -81,10 +81,10 @@ def unit_of_wraps(values: FloatArray) -> str | None:
 
 
 def set_by_size(signals: Mapping[str, Any], values: Mapping[str, FloatArray], stated: Mapping[str, str]) -> frozenset[str]:
-    """Set in the lines of signals what the size of their numbers (n,) says; return those whose angles are too large for rad.
+    """Set the units that the size of the numbers (n,) shows in the lines of signals; return the angles too large for rad.
 
-    Pitch, roll and goals without a unit are in degrees too where the heading is: one logger wrote them. `stated` are units that
-    are known without a line.
+    Where the heading is in degrees, pitch, roll and setpoints without a unit are so too, since one logger wrote them. `stated`
+    holds units that the log itself states.
     """
     seen = {s: v[np.isfinite(v)] for s, v in values.items() if "unit" not in signals[s] and s not in stated}
     seen = {s: v for s, v in seen.items() if v.size}
@@ -93,14 +93,14 @@ def set_by_size(signals: Mapping[str, Any], values: Mapping[str, FloatArray], st
         del seen[signal]
     units = {s: unit for s, v in seen.items() if (unit := _unit_by_size(s, v)) is not None}
     of_heading = {known.get("yaw_rad") for known in (units, stated)} | {signals.get("yaw_rad", {}).get("unit")}
-    beside = ("pitch_rad", "roll_rad", *sorted(GOALS)) if "deg" in of_heading else ()
-    for signal, unit in {**{s: "deg" for s in beside if s in seen and "field" not in signals[s]}, **units}.items():
+    in_heading_unit = ("pitch_rad", "roll_rad", *sorted(GOALS)) if "deg" in of_heading else ()
+    for signal, unit in {**{s: "deg" for s in in_heading_unit if s in seen and "field" not in signals[s]}, **units}.items():
         signals[signal]["unit"] = unit
     return frozenset(units)
 
 
 def _unit_by_size(signal: str, values: FloatArray) -> str | None:
-    """Return the unit of an angle or a rate whose numbers (n,) are too large for rad: degrees unless a heading's wraps differ."""
+    """Return the unit of an angle or rate whose numbers (n,) are too large for rad: degrees, or that of a heading's wraps."""
     limit, unit = (TURN, "deg") if signal in ("yaw_rad", "yaw_goal_rad") else LARGEST.get(signal, (np.inf, ""))
     if not (float(np.abs(values).max()) > limit and unit.startswith("deg")):
         return None
@@ -108,9 +108,9 @@ def _unit_by_size(signal: str, values: FloatArray) -> str | None:
 
 
 def _servos(seen: Mapping[str, FloatArray]) -> dict[str, Servo]:
-    """Return the kinds of counts in which fins and motors (n,) are logged, of those that are in counts.
+    """Return the kind of counts of each fin or motor (n,) that is logged in counts.
 
-    One that never moves far tells no kind itself, and is in that of the fins where its numbers fit it.
+    A signal that hardly moves does not show its kind; it is assigned that of the fins where its numbers fit.
     """
     kinds = {s: servo_of(v) for s, v in seen.items()}
     of_fins = [k for s, k in kinds.items() if s in FINS and k is not None]
@@ -121,7 +121,7 @@ def _servos(seen: Mapping[str, FloatArray]) -> dict[str, Servo]:
 
 
 def heading_in_doubt(values: FloatArray, signals: Mapping[str, Any]) -> list[Note]:
-    """Say of a heading (n,) taken for degrees by its size what else it may be, where no rate and no position tells."""
+    """Return the note on the doubt about a heading (n,) that is read in degrees by its size alone."""
     unit = signals["yaw_rad"].get("unit")
     if {"yaw_rate_rad_s", "x_m", POSITION} & signals.keys():
         return []
@@ -137,17 +137,17 @@ def heading_in_doubt(values: FloatArray, signals: Mapping[str, Any]) -> list[Not
             "another unit, as `unit: cdeg` or `unit: ddeg`?"
         )
         return [Note("unit", message, data)]
-    said = (
+    message_text = (
         f"yaw_rad is taken for degrees because it reaches {largest:.3g}; in radians that would be {in_radians:.1f} turns, "
         "and nothing in the log says which: set `unit: rad` if it counts turns"
     )
-    return [Note("unit", said, data)] if in_radians <= MOST_TURNS else []
+    return [Note("unit", message_text, data)] if in_radians <= MOST_TURNS else []
 
 
 def assumed_units(run: Run, known: Collection[str], places: Mapping[str, tuple[str, str]]) -> list[Note]:
-    """Return the note on the signals of a run, by their places and units, that are taken so though nothing says it.
+    """Return the note on the signals of a run whose units are assumed; `places` holds the source and unit of each.
 
-    `known` have a unit that is told.
+    `known` are the signals with a known unit.
     """
     sure = {s for s in run.signals if s in known}
     if goes_with_way(run):
