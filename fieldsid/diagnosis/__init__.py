@@ -1,4 +1,4 @@
-"""Which physical effect is missing, how sure that is, and what it could be instead."""
+"""The diagnosis of the physical effect that a model lacks, with its probability and the alternatives."""
 
 from fieldsid.diagnosis.diagnose import diagnose
 from fieldsid.diagnosis.records import Candidate, Diagnosis, Errors, Pair

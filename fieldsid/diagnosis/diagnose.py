@@ -1,4 +1,4 @@
-"""Which physical effect is missing: the function behind `sysid diagnose`."""
+"""The function behind `sysid diagnose`, which names the physical effects that a model lacks."""
 
 from __future__ import annotations
 
@@ -68,10 +68,10 @@ def diagnose(
 ) -> Diagnosis:
     """Return which catalogued effect the base model lacks, validated on runs it was not fitted to.
 
-    `model` is one whose effects are known: the base has them, and is fitted from its values too. `report` is called with the
-    names of each model tried. `thorough` removes the evaluation budget (search/budget.py). `unfit` is called for each run that
-    cannot be fitted; without it, or where no training run or no validation run is left, the error is raised. Raises DataError
-    when a run cannot be fitted on the axis, EffectError when a user's effect fails.
+    `model` is a model whose effects are known: they are part of the base, which is also fitted from its values. `report` is
+    called with the names of each model tried. `thorough` removes the evaluation budget (search/budget.py). `unfit` is called for
+    each run that cannot be fitted; without it, or where no training run or no validation run remains, the error is raised. Raises
+    DataError where a run cannot be fitted on the axis, EffectError where a user's effect fails.
     """
     known, own = ((), NONE) if model is None else (model.effects, model.own)
     fitted, checked = records_of([training, validation], axis, unfit)
@@ -85,24 +85,25 @@ def diagnose(
     if missing:
         raise DataError(f"`{missing[0]}` is in the model but cannot be simulated on these runs", found=unlogged[missing[0]])
     catalogue, narrow = shown_by_headings(catalogue, [*learned, *unseen], known)
-    told = partial(_diagnosis, unlogged=unlogged, skipped=unlogged | narrow, notes=notes)
+    diagnosis_of = partial(_diagnosis, unlogged=unlogged, skipped=unlogged | narrow, notes=notes)
     begin = partial(Search, learned, unseen, axis, catalogue, known, report, thorough=thorough, given=model)
     work = begin()
     work.base()
     if not work.is_noiseless:
-        return told(_best_result(work))
+        return diagnosis_of(_best_result(work))
     found = noiseless_search(work, lambda h: excess_explained(work, h) > MAIN_EXPLAINED_SHARE)
     if found is not None and excess_explained(work, found) > MAIN_EXPLAINED_SHARE:
-        return told(_search_result(work, found, found.likelihood_fit, Verdict("effect", added_effects(work, found))))
-    return told(_best_result(begin()))
+        return diagnosis_of(_search_result(work, found, found.likelihood_fit, Verdict("effect", added_effects(work, found))))
+    return diagnosis_of(_best_result(begin()))
 
 
 @dataclass(frozen=True, slots=True)
 class _SearchResult:
-    """The final model of a search, its verdict, and what is reported with it.
+    """The final model of a search, its verdict, and the other results that are reported.
 
-    `ml_fit` is the final model under the noise that its residuals are tested with; `models` are those of the base and of the
-    final model for the file, each with notes on the validation runs; the errors of the first `leading` models are worked out.
+    `ml_fit` is the fit of the final model under the noise model of its residual tests; `models` are the base and the final model
+    for the file, each with notes on the validation runs; `leading` are the models in their order of report, of which the first
+    have their errors computed.
     """
 
     work: Search
@@ -121,12 +122,12 @@ def _best_result(work: Search) -> _SearchResult:
 
 
 def _search_result(work: Search, found: ScoredModel, ml_fit: LikelihoodFit, verdict: Verdict | None = None) -> _SearchResult:
-    """Return the final model of a search with its residual tests, its models for the file, and its verdict unless given."""
+    """Return the final model of a search with its residual tests, its models for the file, and its verdict where not given."""
     base, ranked = work.base(), _leading(work, found)
     shown, beyond = ranked[:MAX_CANDIDATES], ranked[MAX_CANDIDATES:]
 
     def flown(h: ScoredModel) -> ScoredModel:
-        """Return a model as it is shown: its error is how near its free run can come, whatever a disturbance adds to that."""
+        """Return a model with the errors to report; its fit is by output error where that predicts the validation runs better."""
         if h is found or h.output_error_fit is not None:
             return h.evaluate_errors()
         return with_free_run(h, h.likelihood_fit.fitted.by_output_error(), work.floor).evaluate_errors()
@@ -135,7 +136,7 @@ def _search_result(work: Search, found: ScoredModel, ml_fit: LikelihoodFit, verd
         model = final_model(h)
         return model, as_flown(model, work.validation)
 
-    # at once, whatever the verdict will be: at the end of each sharing out one process waits for the other
+    # all in one parallel map, whatever the verdict: at the end of each map one process waits for the other
     parts: list[Callable[[], Any]] = [
         partial(refitted, found),
         partial(residual_tests, ml_fit),
@@ -153,7 +154,10 @@ def _search_result(work: Search, found: ScoredModel, ml_fit: LikelihoodFit, verd
 def _diagnosis(
     end: _SearchResult, unlogged: Mapping[str, str], skipped: Mapping[str, str], notes: tuple[Note, ...]
 ) -> Diagnosis:  # fmt: skip
-    """Return a search's result as a diagnosis, with why effects were not tried, those whose signal was not logged apart."""
+    """Return the result of a search as a diagnosis.
+
+    `skipped` holds the reasons why effects were not tried; `unlogged` those of them whose signal was not logged.
+    """
     work, found, verdict, base = end.work, end.found, end.verdict, end.work.base()
     named = found if verdict.word in ("effect", "undecided") else base
     (base_model, _), (model, flown) = end.models if named is found else (end.models[0], end.models[0])
@@ -176,7 +180,7 @@ def _diagnosis(
         where=where,
         next_maneuver=next_maneuver(work, verdict, found, unlogged, floor),
         unusual=apart_from_the_hulls_own(added_effects(work, named))[0],
-        skipped={**skipped, **{name: SCREENED for name in _of_the_user(work) if not any(name in h.names for h in end.leading)}},
+        skipped={**skipped, **{name: SCREENED for name in _user_effects(work) if not any(name in h.names for h in end.leading)}},
         notes=(
             *notes,
             *diverged,
@@ -189,27 +193,31 @@ def _diagnosis(
 
 
 def _leading(work: Search, found: ScoredModel) -> list[ScoredModel]:
-    """Return all models but the base: the one found, the accepted sets by log evidence, and the others, small ones first.
+    """Return all models but the base: the one found, the accepted sets by log evidence, then the others by size.
 
-    Of an effect of the user's own the best model is among those that are listed.
+    The best model with each effect defined by the user is among the first MAX_CANDIDATES.
     """
     base, sums = work.base(), work.evidences()
     others = [h for h in work.ranked() if h is not found and h is not base]
     others.sort(key=lambda h: (-sums[key], 0) if (key := frozenset(h.names)) in sums else (np.inf, len(key)))
-    whole = [*([found] if found is not base else []), *others]
-    first = [next((i for i, h in enumerate(whole) if name in h.names), 0) for name in _of_the_user(work)]
+    all_models = [*([found] if found is not base else []), *others]
+    first = [next((i for i, h in enumerate(all_models) if name in h.names), 0) for name in _user_effects(work)]
     beyond = sorted({i for i in first if i >= MAX_CANDIDATES})[:MAX_CANDIDATES]
     before = MAX_CANDIDATES - len(beyond)
-    return [*whole[:before], *(whole[i] for i in beyond), *(h for i, h in enumerate(whole[before:], before) if i not in beyond)]
+    return [
+        *all_models[:before],
+        *(all_models[i] for i in beyond),
+        *(h for i, h in enumerate(all_models[before:], before) if i not in beyond),
+    ]
 
 
-def _of_the_user(work: Search) -> list[str]:
-    """Return the user's own effects that the search was told to try."""
+def _user_effects(work: Search) -> list[str]:
+    """Return the names of the effects, defined by the user, that the search tries."""
     return [e.name for e in work.catalogue if e.definition is not None and e.name not in work.known]
 
 
 def _candidates(end: _SearchResult, floor: Noise, left: float) -> tuple[Candidate, ...]:
-    """Return the leading models as candidates of a search that ends at an error `left` over the noise floor."""
+    """Return the leading models as candidates, for a search whose final model has an error of `left` over the noise floor."""
     work, sums = end.work, end.work.evidences()
     p = probabilities(sums, left)
 
@@ -235,9 +243,9 @@ def _candidates(end: _SearchResult, floor: Noise, left: float) -> tuple[Candidat
 def confusable(
     work: Search, h: ScoredModel, others: Sequence[ScoredModel], p: Mapping[frozenset[str], float], floor: Noise
 ) -> tuple[str, ...]:
-    """Return the other models of the same size that take away nearly as much of the error, and are as good as likely.
+    """Return the other models of the same size that remove nearly as much of the error and are nearly as probable.
 
-    p are probabilities by sets of effects: what the evidence tells from one is no rival of it.
+    `p` holds probabilities by sets of effects; a model that the evidence separates from h is not confusable with it.
     """
     mine, own = excess_explained(work, h, floor), p.get(frozenset(h.names), 0.0)
 
@@ -257,7 +265,7 @@ def confusable(
 
 
 def where_of(h: ScoredModel, records: Sequence[Record]) -> tuple[tuple[Place, ...], tuple[Note, ...]]:
-    """Return where a model's free run fails, for the run it fails most on, and notes on the runs it diverges on."""
+    """Return where a model's free run fails, in the run with the largest error, and notes on the runs on which it diverges."""
     shown, notes = [], []
     for record in records:
         try:

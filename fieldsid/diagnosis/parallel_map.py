@@ -1,6 +1,6 @@
 """A parallel map over this process and a forked worker, where the system has a second core and can fork.
 
-Results refer to the records and effects that both processes hold instead of copying them.
+Results refer to the records and effects that both processes have in memory instead of copying them.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ R = TypeVar("R")
 
 
 class ParallelMap:
-    """The objects that two processes share: records by their place, effects by their name, the counter of evaluations."""
+    """The objects that two processes share: records by index, effects by name, and the counter of evaluations."""
 
     def __init__(
         self, records: Iterable[Record], effects: Iterable[Effect], evaluations: EvaluationCounter | None = None
@@ -31,9 +31,9 @@ class ParallelMap:
         self.effects, self._is_sharing = {e.name: e for e in effects}, False
 
     def map(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
-        """Return a function of every item as `parallel_map` does, and count the evaluations of each, whoever has done them.
+        """Return a function of every item as `parallel_map` does, and count the evaluations of both processes.
 
-        A map within a map is not shared.
+        A map inside a map runs in one process.
         """
         if self._is_sharing:
             return [function(item) for item in items]
@@ -80,7 +80,7 @@ class _Writer(WorkerPickler):
         return None
 
     def reducer_override(self, obj: object) -> Any:
-        """Return how a problem is built again without its cached arrays, and anything else as the base class does."""
+        """Return the reduction of a problem without its cached arrays; for any other object that of the base class."""
         if isinstance(obj, Problem):
             return Problem, (obj.records, obj.layout, obj.evaluations)
         return super().reducer_override(obj)
@@ -92,7 +92,7 @@ class _Reader(pickle.Unpickler):
         self.known = known
 
     def persistent_load(self, pid: tuple[str, Any]) -> object:
-        """Return the record or effect of a reference, an effect in the variant that has these coefficients."""
+        """Return the record or effect of a reference, the effect in the variant with the coefficients of the reference."""
         kind, what = pid
         if kind == "record":
             return self.known.records[what]
@@ -106,7 +106,7 @@ class _Reader(pickle.Unpickler):
 
 
 def with_coefficients(effect: Effect, names: tuple[str, ...]) -> Effect | None:
-    """Return an effect in the variant that has coefficients of these names, the effect itself where they are its own."""
+    """Return an effect in the variant with coefficients of these names; the effect itself where it has them."""
     if names == tuple(c.name for c in effect.coefficients):
         return effect
     form = variant_of(effect, names)

@@ -31,11 +31,11 @@ class Errors(Brief):
         return self.each or (self,)
 
     def over(self, floor: Noise) -> float:
-        """Return the error over the noise floor, both measured channels pooled."""
+        """Return the ratio of the error to the noise floor, pooled over both measured channels."""
         return pooled_over_noise((self.angle_rms_rad, floor.angle), (self.rate_rms_rad_s, floor.rate))
 
     def sized(self, angle: str = "rad", factor: float = 1.0) -> str:
-        """Return the errors of the measured channels in their units, in another unit of angle where factor has rad in it."""
+        """Return, in words, the errors of the measured channels in rad, or in a unit of angle of which `factor` are one rad."""
         parts = ((self.angle_rms_rad, angle), (self.rate_rms_rad_s, f"{angle}/s"))
         return " and ".join(f"{number(factor * rms, 2)} {unit}" for rms, unit in parts if isfinite(rms))
 

@@ -1,8 +1,8 @@
-"""The thresholds that decide a diagnosis, each with its unit: there are no others in this room but those of the numerics.
+"""The thresholds that decide a diagnosis, each with its unit; other constants in this package concern the numerics only.
 
-Log odds are natural logarithms, p probabilities; an error ratio is a free-run error over another, or over the noise floor. What
-20 % more or less of each costs is printed by `python tests/benchmarks/threshold_sensitivity.py`, on cases of the repository's own
-bank and, where its folder is given, of one written by other hands.
+Log odds are natural logarithms, p probabilities; an error ratio is a free-run error over another, or over the noise floor. The
+effect of 20 % more or less of each is printed by `python tests/benchmarks/threshold_sensitivity.py`, on cases of the repository's
+bank and, where its folder is given, of an independent one.
 """
 
 from __future__ import annotations
@@ -25,12 +25,13 @@ RIVAL_PROBABILITY_RATIO = exp(-RIVAL_LOG_ODDS)
 EVIDENCE_TEMPERATURE = 2.0
 """Divisor of the log evidence before it becomes a probability: the evidence of models that are never exact is overstated."""
 UNTRIED_LEAST, UNTRIED_MOST, UNTRIED_POWER = 0.005, 0.6, 3.0
-"""Probability that a named set is not what is there although no set tried says so: UNTRIED_MOST times the share of the squared
-error left that is no noise, to that power, and never less than UNTRIED_LEAST. Of 242 verdicts on all three banks 1 of 181 was
+"""Probability that the effects of the vehicle are in no set tried: UNTRIED_MOST times the power UNTRIED_POWER of the share of the
+remaining squared error that is not noise, and never less than UNTRIED_LEAST. Of 242 verdicts on all three banks 1 of 181 was
 wrong where fitted and unseen runs were left within 1.15 x the noise, 3 of 43 up to 1.6 x, 2 of 5 up to 2.5 x, 6 of 13 above."""
 MIN_TRAINING_GAIN = 4.0
 """Log likelihood on the training runs that an effect with nuisance parameters of each run must gain. On validation runs those
-parameters are fitted too, so that a gain there alone proves nothing. An effect without them must only not lose there."""
+parameters are fitted too, so that a gain there alone proves nothing. For an effect without them it suffices that the training
+runs do not become less likely."""
 
 # ----- what counts as a lower error
 
@@ -47,14 +48,15 @@ EQUAL_ERROR_RATIO = 1.03
 EXPLAINED_ERROR_RATIO = 1.02
 """Error over the floor up to which the error counts as noise."""
 SUFFICIENT_ERROR_RATIO = sufficient.SUFFICIENT_ERROR_RATIO
-"""Error over the floor below which the model is sufficient: the limit of every other room too."""
+"""Error over the floor below which the model is sufficient; all commands use this limit."""
 MISSING_ERROR_RATIO = 1.5
 """Error over the floor above which something is missing, even where no effect in its textbook variant gains evidence; above which
 a fit may be at a local minimum; and which the right effect rarely leaves."""
 FAR_ERROR_RATIO = 4.0
 """Error over the floor above which the textbook variant decides little, and a disturbance alone is implausible."""
 GUSTY_ERROR_RATIO = 2.0
-"""Error over the floor below which only dependence on the motion tells an effect from a disturbance: gusts come in bursts too."""
+"""Error over the floor below which only dependence on the motion separates an effect from a disturbance, since gusts are bursts
+too."""
 MAX_VALIDATION_ERROR_RATIO = 2.0
 """Validation error over training error above which something besides a disturbance is missing: a disturbance is equal on both."""
 MIN_BASE_ERROR_SHARE = 0.02
@@ -65,18 +67,18 @@ ship model in a tank thousands."""
 MIN_COLOUR_RATIO = 0.5
 """Coloured over white sensor noise above which the reported floor includes the coloured part."""
 
-# ----- what a named effect may leave
+# ----- the error that may remain with a named effect
 
 MIN_P_VALUE = 2e-2
 """p below which the residuals are not a disturbance."""
 COLOUR_P_EXPONENT = 0.2
 """Power that the whiteness p is raised to: the model's disturbance has one time constant, a real sea a broader spectrum."""
 MIN_EXPLAINED_SHARE = 0.7
-"""Share of the excess error below which a search takes what it has found for less than what is missing, and looks further."""
+"""Share of the excess error below which a search continues, because the effects found are not all that is missing."""
 LEAST_EXPLAINED_SHARE = 0.3
-"""Share of it asked of the validation runs alone near the noise: an effect that training runs show is in those too. Of 20 effects
-that count there, in cases of three seeds of the second bank, 18 explain 0.58 or more of it, a true lag of a sample 0.28, and a
-step in runs without one 0.10."""
+"""Share of the excess error that must be explained on the validation runs alone, near the noise: an effect acts in all runs. Of
+20 effects that count there, in cases of three seeds of the second bank, 18 explain 0.58 or more of it, a true lag of a sample
+0.28, and a step in runs without one 0.10."""
 MAIN_EXPLAINED_SHARE = 0.5
 """Share of the excess error that an effect explains at least where it explains more than it leaves. Asked where an error near the
 noise floor cannot fall to MAX_ERROR_RATIO while the base, or in a run the model without it, leaves a visible one; in logs without

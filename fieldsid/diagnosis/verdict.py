@@ -42,7 +42,7 @@ from fieldsid.models.model import Noise
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """The word, the effects named, and the rivals where it is undecided."""
+    """The verdict in one word, the effects named, and the rival models where it is `undecided`."""
 
     word: str
     effects: tuple[str, ...]
@@ -56,8 +56,8 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     verdict is `sufficient` if training and validation errors are within SUFFICIENT_ERROR_RATIO; else `disturbed` if the
     innovations pass the tests of a disturbance, and `unexplained` if not. The same two verdicts are given where the effects found
     leave a visible error on the validation runs that is no smaller than without them, or explain less than half of a large error:
-    such an effect may exist and is still not what is missing. Nothing is named where so much is left that what is hidden is more
-    probably in no set tried, see `untried_probability`.
+    such an effect may exist without being the missing one. No effect is named where the remaining error is so large that the
+    missing effect is probably in no set tried, see `untried_probability`.
     """
     floor = reported_noise_floor(search.floor, ml_fit.noise)
     was, now = compared_errors(search.base(), found, floor)
@@ -78,23 +78,23 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
 
 
 def error_left(search: Search, found: ScoredModel, floor: Noise) -> float:
-    """Return the error over a noise floor that a model leaves, at the fitted runs' numbers or at those of all runs."""
+    """Return the smaller error over a noise floor that a model leaves, at the parameters of the fitted runs or of all runs."""
     return min(worst_error(found, floor), compared_error(search.base(), found, floor))
 
 
 def left_of(search: Search, named: ScoredModel, found: ScoredModel, tests: ResidualTests, floor: Noise) -> Left:
-    """Return what a named model leaves over a noise floor; `tests` are those of the model found, which may hold more effects.
+    """Return the error that remains with a named model; `tests` are those of the model found, which may have more effects.
 
     An error that the tests accept as a disturbance is not unexplained, unless it is far larger on the unseen runs or larger than
-    a sea can leave. Where effects are named no disturbance is: above MISSING_ERROR_RATIO what they leave is unexplained too.
+    a sea can leave. Where effects are named, an error above MISSING_ERROR_RATIO is unexplained whatever the tests say.
     """
     ratio = worst_error(named, floor)
     if ratio <= SUFFICIENT_ERROR_RATIO:
         return Left(ratio, unexplained=False)
-    beside_effects = ratio > MISSING_ERROR_RATIO and frozenset(named.names) != search.root
-    odd = named is not found or beside_effects or _is_no_disturbance(named, tests, floor)
+    is_large_with_effects = ratio > MISSING_ERROR_RATIO and frozenset(named.names) != search.root
+    is_unexplained = named is not found or is_large_with_effects or _is_no_disturbance(named, tests, floor)
     moves_with = tests.moves_with if 3.0 * tests.dependence < MIN_P_VALUE else ""
-    return Left(ratio, odd, tests.worst_run, tests.worst_start_s, tests.worst_end_s, tests.worst_ratio, moves_with)
+    return Left(ratio, is_unexplained, tests.worst_run, tests.worst_start_s, tests.worst_end_s, tests.worst_ratio, moves_with)
 
 
 def _unnamed(found: ScoredModel, left: ResidualTests, floor: Noise) -> Verdict:
@@ -120,28 +120,28 @@ def added_effects(search: Search, h: ScoredModel) -> tuple[str, ...]:
     An effect whose removal was not tried comes first.
     """
 
-    def lack(name: str) -> float:
+    def error_without(name: str) -> float:
         without = search.tried.get(frozenset(h.names) - {name})
         return without.error_of_all_runs(search.floor) if without is not None else float("inf")
 
-    return tuple(sorted(names_added(search, h), key=lambda n: -lack(n)))
+    return tuple(sorted(names_added(search, h), key=lambda n: -error_without(n)))
 
 
 def rivals_of(search: Search, found: ScoredModel) -> tuple[ScoredModel, ...]:
-    """Return the models that the evidence cannot tell from the final one: of its size, or larger and ending a visible error.
+    """Return the rivals of the final model by evidence: models of its size, or larger ones that end a visible error.
 
     Their free runs may differ where the training runs leave a parameter undetermined, which the evidence takes into account.
     """
     margin, sums = RIVAL_LOG_ODDS if len(search.records) > 1 else 2.0 * RIVAL_LOG_ODDS, search.evidences()
     best = sums[frozenset(found.names)]
 
-    def stands_for(h: ScoredModel) -> bool:
+    def is_rival(h: ScoredModel) -> bool:
         if len(h.names) > len(found.names):
             return set(found.names) < set(h.names) and settles_error(found, h, search.floor)
         return len(h.names) == len(found.names)
 
     near = (h for h in search.ranked() if best - sums.get(frozenset(h.names), -np.inf) < margin)
-    return tuple(h for h in near if h is not found and stands_for(h))
+    return tuple(h for h in near if h is not found and is_rival(h))
 
 
 def excess_explained(search: Search, h: ScoredModel, floor: Noise | None = None) -> float:
@@ -167,6 +167,6 @@ def probabilities(evidences: Mapping[frozenset[str], float], left: float = 1.0) 
 
 
 def untried_probability(left: float) -> float:
-    """Return the probability that what is hidden is in no set tried, by the error over the noise that the named set leaves."""
+    """Return the probability that the missing effect is in no set tried, from the error over the noise with the named set."""
     share = 1.0 - 1.0 / max(left, 1.0) ** 2
     return float(max(UNTRIED_MOST * share**UNTRIED_POWER, UNTRIED_LEAST))

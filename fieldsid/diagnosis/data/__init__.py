@@ -1,1 +1,1 @@
-"""What a diagnosis is made from: the hold-out, the applicable effects, the noise floor."""
+"""The inputs of a diagnosis: the hold-out, the applicable effects, and the noise floor."""

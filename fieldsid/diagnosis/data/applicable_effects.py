@@ -1,4 +1,4 @@
-"""Which effects of a catalogue can be tried on some runs."""
+"""The effects of a catalogue that can be tried on some runs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def applicable_effects(catalogue: Iterable[Effect], records: Sequence[Record]) -
 
 
 def _why(missing: Sequence[str], records: Sequence[Record]) -> str:
-    """Return why roles are missing, for each reason once."""
+    """Return the distinct reasons why roles are missing."""
     return ", ".join(dict.fromkeys(r.why_without(role) for role in missing for r in records if role not in r.signals))
 
 

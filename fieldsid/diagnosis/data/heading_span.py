@@ -1,4 +1,4 @@
-"""Which effects the headings of some runs can show."""
+"""The effects that the headings of some runs can show."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TURN_RAD = 2.0 * np.pi
 def shown_by_headings(
     effects: Iterable[Effect], records: Sequence[Record], known: Collection[str]
 ) -> tuple[tuple[Effect, ...], dict[str, str]]:
-    """Return the effects that the headings flown can show, and why each other is left out; a known one is never."""
+    """Return the effects that the measured headings can show, and the reason for each one left out; `known` effects are kept."""
     span, effects = heading_span(records), list(effects)
     narrow = {e.name: e.heading_span for e in effects if e.name not in known and span < e.heading_span}
     flown = f"the runs keep within {np.degrees(span):.0f} deg" if any(r.angle_ok.any() for r in records) else "none is measured"
@@ -26,7 +26,7 @@ def shown_by_headings(
 
 
 def heading_span(records: Sequence[Record]) -> float:
-    """Return the least arc of the compass (rad) that holds every heading measured in some runs, zero where none was."""
+    """Return the smallest arc (rad) that contains every measured heading of some runs; zero where none was measured."""
     headings = np.sort(np.mod(np.concatenate([r.angle[r.angle_ok] for r in records]), TURN_RAD))
     if not headings.size:
         return 0.0

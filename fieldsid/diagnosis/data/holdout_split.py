@@ -1,4 +1,4 @@
-"""The hold-out: which runs a model is fitted to and which validate it, where the user named no validation runs."""
+"""The hold-out: the choice of training and validation runs where the user names no validation runs."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ QUIET_RATE_SHARE = 0.15
 
 
 def holdout_split(records: Sequence[Record]) -> tuple[tuple[Record, ...], tuple[Record, ...], tuple[Note, ...]]:
-    """Return training and validation records from one set, and a note that says what was done.
+    """Return training and validation records from one set, and a note on the choice.
 
-    With three runs or more, the run of median speed is the validation run. With fewer, the last third of each run's excitation
-    is. Where that leaves too little to validate on, all runs are used for training, and the note says so.
+    With three runs or more, the run of median speed is the validation run. With fewer runs, the last third of
+    the excitation of each run is. Where that is too short for a validation, all runs are used for training.
     """
     if len(records) >= 3:
         speeds = [nine_digits(r.speed) for r in records]
-        # of runs at one speed the middle one as they were given
+        # runs of equal speed keep their order
         by_speed = sorted(range(len(records)), key=speeds.__getitem__)
         middle = by_speed[len(records) // 2] if np.isfinite(speeds).all() else len(records) - 1
         rest = tuple(r for i, r in enumerate(records) if i != middle)
@@ -42,7 +42,9 @@ def holdout_split(records: Sequence[Record]) -> tuple[tuple[Record, ...], tuple[
 
 
 def _cut(record: Record) -> tuple[Record, Record] | None:
-    """Return both parts of a record, cut where the fin is at rest and its cumulated activity is nearest to TRAINING_SHARE.
+    """Return both parts of a record; None where they are too short.
+
+    The cut is where the fin is at rest and its cumulated activity is nearest to TRAINING_SHARE.
 
     A cut inside a pulse would start the second part with a fin and a hull in motion.
     """
@@ -62,7 +64,7 @@ def _cut(record: Record) -> tuple[Record, Record] | None:
 
 
 def quiet_before(record: Record, off: FloatArray) -> npt.NDArray[np.bool_]:
-    """Return the samples before which the fin was at rest near its median for QUIET_S, (n,)."""
+    """Return the mask (n,) of the samples before which the fin was at rest near its median for QUIET_SPAN_S."""
     moving = off > QUIET_RATE_SHARE * float(off.max())
     last_moved = np.maximum.accumulate(np.where(moving, record.time, record.time[0] - QUIET_SPAN_S))
     return np.asarray(record.time - last_moved >= QUIET_SPAN_S)

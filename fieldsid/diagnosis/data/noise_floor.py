@@ -1,4 +1,4 @@
-"""The noise floor that errors are compared with: the error the sensors' noise alone would leave."""
+"""The noise floor with which errors are compared: the error that sensor noise alone would leave."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def resolution_floor(floor: Noise, errors: Noise) -> Noise:
 def is_noiseless(floor: Noise, least: Noise, records: Sequence[Record]) -> bool:
     """Whether the noise floor is below the given least noise in every measured channel.
 
-    Every channel is asked for, because a jammed fin raises the error of the angle alone.
+    All channels are required, because a jammed fin raises the error of the angle alone.
     """
     angle, rate = (any(bool(r.ok[channel].any()) for r in records) for channel in range(2))
     return (least.angle > floor.angle or not angle) and (least.rate > floor.rate or not rate)

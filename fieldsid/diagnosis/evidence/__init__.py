@@ -1,1 +1,1 @@
-"""How models are compared: likelihood, predictive density, complexity penalty, acceptance rules."""
+"""The comparison of models: likelihood, predictive density, complexity penalty, acceptance rules."""

@@ -42,7 +42,7 @@ def lowers_error(
     may be low because the other parameters are biased towards the training runs. Near the noise floor no effect can lower the
     whole error much; there the effect may instead explain most of the squared error above the floor, provided that some run
     without it has more than `least` times the floor. A validation error at which a model is sufficient is no argument against the
-    effect: the run is too mild to show it. `compared_errors` says which validation error is meant.
+    effect: the run is too mild to show it. The validation error is that of `compared_errors`.
     """
     before, now = compared_errors(without, with_, floor)
     was, left = fitted_errors(without, with_)
@@ -51,18 +51,18 @@ def lowers_error(
     explains = floor is not None and _explains_most((before, was), (now, left), floor, least)
     mild = floor is not None and now.over(floor) <= SUFFICIENT_ERROR_RATIO
     believed = floor is None or _explains_beyond_misfit((before, was), (now, left), floor)
-    return believed and (mild or _keeps(before, now)) and (lowers or explains)
+    return believed and (mild or _does_not_raise(before, now)) and (lowers or explains)
 
 
 def compared_errors(without: ScoredModel, with_: ScoredModel, floor: Noise | None = None) -> tuple[Errors, Errors]:
-    """Return the validation errors that two models are compared by.
+    """Return the validation errors by which two models are compared.
 
     They are the errors at the training runs' parameters. Where the validation runs are likelier with the addition, they may also
     be the errors at the parameters estimated from all runs, if the addition lowers these more: training runs may leave a
     parameter undetermined that one validation run determines, such as the deviation of a compass on headings that were not flown.
     Given a noise floor, this holds only where the training runs, or the validation runs at those parameters, have a visible error
-    without the addition. The moments of the runs' own have in both models the size that the more evident model estimates, because
-    an effect that one model lacks is no trim that differs from run to run.
+    without the addition. The constant moments that differ from run to run have in both models the standard deviation that the
+    model with more evidence estimates, because an effect that one model lacks is not a trim that differs from run to run.
     """
     std = common_own_moment(without, with_)
     first, *settled = zip(without.unseen_under(std), with_.unseen_under(std), strict=True)
@@ -77,13 +77,13 @@ def compared_errors(without: ScoredModel, with_: ScoredModel, floor: Noise | Non
 
 
 def fitted_errors(without: ScoredModel, with_: ScoredModel) -> tuple[Errors, Errors]:
-    """Return the errors of two models on the training runs, with moments of the runs' own as in `compared_errors`."""
+    """Return the errors of two models on the training runs, with the moment of each run as in `compared_errors`."""
     std = common_own_moment(without, with_)
     return without.train_under(std), with_.train_under(std)
 
 
 def common_own_moment(without: ScoredModel, with_: ScoredModel) -> float:
-    """Return the standard deviation (rad/s^2) of the runs' own moments that the more evident of two models tells."""
+    """Return the standard deviation (rad/s^2) of the moments of the runs that the model with more evidence of two estimates."""
     return max((without, with_), key=lambda h: h.log_evidence).own_moment
 
 
@@ -100,7 +100,7 @@ def _explains_most(before: Sequence[Errors], now: Sequence[Errors], floor: Noise
 
 
 def _excess(side: Sequence[Errors], floor: Noise) -> FloatArray:
-    """Return the squared errors over a noise floor less the noise's own, (m,), of each of m errors; zero below it."""
+    """Return the excess (m,) of m squared errors over a squared noise floor, in units of it; zero below it."""
     return np.array([max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in side])
 
 
@@ -108,8 +108,8 @@ def _explains_beyond_misfit(before: Sequence[Errors], now: Sequence[Errors], flo
     """Whether an addition explains enough compared with the misfit that the model still has with it, where that is visible.
 
     Any effect that varies in time can fit a part of the misfit of a wrong hull. So an effect is believed only for what it
-    explains beyond the misfit that remains. On the fitted runs none is larger with it: the motion without it is one of its own,
-    and a free run that follows them less comes of a likelihood that weighs a hull that is hardly stable by its next samples.
+    explains beyond the misfit that remains. On the fitted runs the smaller of the two errors counts as the misfit: for a vehicle
+    that is hardly stable, the likelihood weighs one-step predictions, so that an addition may raise the free-run error there.
     """
     least = now[0], min(before[1], now[1], key=lambda errors: errors.over(floor))
     was, left = (float(_excess(side, floor).mean()) for side in (before, least))
@@ -118,7 +118,7 @@ def _explains_beyond_misfit(before: Sequence[Errors], now: Sequence[Errors], flo
 
 
 def excess_share(before: Sequence[Errors], now: Sequence[Errors], floor: Noise) -> float:
-    """Return the share (0..1) by which the excess squared error over a noise floor falls, that of all runs together."""
+    """Return the share (0..1) by which the excess squared error over a noise floor falls, over all runs together."""
     runs = [len(errors.runs) for errors in before]
     base, left = (float(np.average([errors.over(floor) ** 2 for errors in side], weights=runs)) for side in (before, now))
     excess = base - 1.0
@@ -127,15 +127,15 @@ def excess_share(before: Sequence[Errors], now: Sequence[Errors], floor: Noise) 
 
 def keeps_error(without: ScoredModel, with_: ScoredModel) -> bool:
     """Whether an addition does not raise the validation error, at the training runs' parameters or at those of all runs."""
-    return _keeps(*compared_errors(without, with_))
+    return _does_not_raise(*compared_errors(without, with_))
 
 
-def _keeps(before: Errors, now: Errors) -> bool:
+def _does_not_raise(before: Errors, now: Errors) -> bool:
     return bool(now.mean < EQUAL_ERROR_RATIO * before.mean)
 
 
 def errs_less(h: ScoredModel, other: ScoredModel, ratio: float) -> bool:
-    """Whether a model's errors on training and on validation runs are below a ratio of another's."""
+    """Whether a model's errors on training and on validation runs are below `ratio` times those of another."""
     pairs = ((h.train, other.train), (h.selection_errors, other.selection_errors))
     return all(mine.mean < ratio * others.mean for mine, others in pairs)
 
@@ -151,7 +151,7 @@ def worst_error(h: ScoredModel, floor: Noise) -> float:
 
 
 def compared_error(base: ScoredModel, h: ScoredModel, floor: Noise) -> float:
-    """Return the larger error over a noise floor on unseen and on fitted runs, as a model is compared with the base on them.
+    """Return the larger error over a noise floor on unseen and on fitted runs, as in the comparison of a model with the base.
 
     A model may follow the unseen runs at the fitted runs' parameters by chance, but not at the parameters of all runs.
     """
@@ -159,7 +159,7 @@ def compared_error(base: ScoredModel, h: ScoredModel, floor: Noise) -> float:
 
 
 def compared_share(base: ScoredModel, h: ScoredModel, floor: Noise) -> float:
-    """Return the share (0..1) of the base's excess squared error over a noise floor that a model explains so."""
+    """Return the share (0..1) of the base's excess squared error that a model explains, with the errors of `compared_error`."""
     pairs = compared_errors(base, h, floor), fitted_errors(base, h)
     return excess_share([was for was, _ in pairs], [left for _, left in pairs], floor)
 
@@ -171,25 +171,25 @@ def leaves_error(h: ScoredModel, floor: Noise) -> bool:
 
 def gains_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
     """Whether an addition gains log evidence over all runs, whatever happens to the free-run error."""
-    if _adds_numbers_of_runs(without, with_) and not with_.log_likelihood - without.log_likelihood > MIN_TRAINING_GAIN:
+    if _adds_run_parameters(without, with_) and not with_.log_likelihood - without.log_likelihood > MIN_TRAINING_GAIN:
         return False
     return with_.log_evidence > without.log_evidence
 
 
-def _adds_numbers_of_runs(without: ScoredModel, with_: ScoredModel) -> bool:
-    """Whether an addition has numbers of each run's own, a coefficient or the start of a hidden state."""
+def _adds_run_parameters(without: ScoredModel, with_: ScoredModel) -> bool:
+    """Whether an addition has parameters for each run: a nuisance coefficient or the start of a hidden state."""
     known = {e.name for e in without.effects}
     return any(e.nuisance or e.extra_states for e in with_.effects if e.name not in known)
 
 
 def settles_error(without: ScoredModel, with_: ScoredModel, floor: Noise) -> bool:
-    """Whether an addition that is a rival by log evidence brings the error on all runs down to the noise.
+    """Whether an addition that is a rival by log evidence reduces the error on all runs to the noise.
 
     In the likelihood a slow disturbance can stand for a drift or a current at almost no cost, so that the evidence cannot
-    separate the two; the model whose free run follows all runs to the noise is then preferred. Effects with parameters of each
-    run's own can follow any run, and are excluded.
+    separate the two; the model whose free run follows all runs to the noise is then preferred. Effects with parameters for each
+    run can follow any run, and are excluded.
     """
-    if with_.log_evidence <= without.log_evidence - RIVAL_LOG_ODDS or _adds_numbers_of_runs(without, with_):
+    if with_.log_evidence <= without.log_evidence - RIVAL_LOG_ODDS or _adds_run_parameters(without, with_):
         return False
     return worst_error(with_, floor) <= SUFFICIENT_ERROR_RATIO < worst_error(without, floor)
 

@@ -1,10 +1,10 @@
-"""What the training runs know of a model's parameters: their normal matrix, and how many measurements each rests on.
+"""The information of the training runs on a model's parameters: the normal matrix, and the effective sample sizes.
 
-The effective sample size of a parameter is its information over the largest that one measurement brings,
+The effective sample size of a parameter is its information over the largest information of one measurement,
     n_j = sum_i e_ij^2 / max_i e_ij^2
 with e_j the whitened sensitivity to it less its projection on those to the others: column j of S N^-1, up to a factor. A dead
-band shows in the few samples where the fin crosses it, a steady moment under a slow disturbance about once a minute: 5000 samples
-are not 5000 measurements of either.
+band acts in the few samples in which the fin crosses it, and under a slow disturbance a constant moment is measured about once a
+minute: 5000 samples are not 5000 measurements of either.
 Source: Berger, Bayarri and Pericchi 2014, Econometric Reviews 33, The effective sample size.
 """
 
@@ -21,7 +21,7 @@ from fieldsid.noise.whiten import whiten
 from fieldsid.numerics.arrays import FloatArray
 
 FEWEST = 2.0
-"""Measurements that a parameter rests on at least."""
+"""Smallest effective sample size."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Information:
 
 
 def information(problem: Problem, x: FloatArray, noise: Noise) -> Information:
-    """Return the information on the parameters at x under a noise."""
+    """Return the information on the parameters at x under a noise model."""
     shared = problem.layout.shared
     sizes: FloatArray = np.full(shared, FEWEST)
     cost, normal, _, results = normal_equations(problem, x, noise, range(x.size))

@@ -32,11 +32,11 @@ MAX_ALTERNATIONS = 3
 MAX_GLS_ITERATIONS = 8
 MIN_LIKELIHOOD_GAIN = 0.5
 MAX_REMAINING_GAIN_RATIO = 10.0
-"""Largest gain in log likelihood of all iterations to come, in gains of the last one."""
+"""Largest total gain in log likelihood of all further iterations, as a multiple of the gain of the last one."""
 MAX_OUTPUT_ERROR_ITERATIONS = 25
 OUTPUT_ERROR_COST_TOLERANCE, LIKELIHOOD_COST_TOLERANCE = 1e-4, 1e-5
-"""Share of the sum of squares that an iteration must gain: of output error, whose errors are compared to a percent, and of
-generalised least squares, whose log likelihoods are compared to a half."""
+"""Relative decrease of the sum of squares below which iterations end: of output error, whose errors are compared to a percent,
+and of generalised least squares, whose log likelihoods are compared to 0.5."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,11 +49,11 @@ class FittedProblem:
 
     @property
     def vector(self) -> tuple[ParameterLayout, FloatArray]:
-        """Its parameters, as `carry_parameters` takes them."""
+        """The layout and the parameter vector, as arguments of `carry_parameters`."""
         return self.problem.layout, self.x
 
     def by_output_error(self) -> FittedProblem:
-        """Return the output-error fit that a descent from here comes to."""
+        """Return the output-error fit that starts at x."""
         return fit_output_error(self.problem, self.x, self.weights)
 
     @property
@@ -63,7 +63,7 @@ class FittedProblem:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Their names."""
+        """The names of the effects."""
         return tuple(e.name for e in self.effects)
 
 
@@ -71,7 +71,7 @@ class FittedProblem:
 class LikelihoodFit:
     """A maximum-likelihood fit: generalised least squares under its own noise model, and the log likelihood there.
 
-    It includes the log prior density of the noise, so that a disturbance slower than any sea cannot stand for a missing effect.
+    It includes the log prior density of the noise, so that a disturbance slower than any sea cannot replace a missing effect.
     """
 
     fitted: FittedProblem
@@ -82,12 +82,12 @@ class LikelihoodFit:
 
     @cached_property
     def information(self) -> Information:
-        """What the training runs know of the parameters."""
+        """The information of the training runs on the parameters."""
         return information(self.fitted.problem, self.fitted.x, self.noise)
 
     @cached_property
     def own_moments(self) -> tuple[MomentInformation, ...]:
-        """What each training run tells of a moment of its own."""
+        """The information of each training run on a constant moment in that run."""
         problem, x = self.fitted.problem, self.fitted.x
         return moment_information(problem.records, dynamics_of(problem, x), residuals_of(problem, x), self.noise)
 
@@ -99,7 +99,7 @@ def fit_output_error(
     max_iterations: int = MAX_OUTPUT_ERROR_ITERATIONS,
     tolerance: float = OUTPUT_ERROR_COST_TOLERANCE,
 ) -> FittedProblem:
-    """Return the output-error fit from a start, reweighted once by its own residuals."""
+    """Return the output-error fit from a start, reweighted once by its residuals."""
     found = levenberg_marquardt(problem, start, weights, max_iterations=max_iterations, tolerance=tolerance)
     new = white_weights(problem, found.x)
     if abs(np.log(new.angle / weights.angle)) + abs(np.log(new.rate / weights.rate)) > 0.1:
@@ -113,8 +113,8 @@ def fit_maximum_likelihood(
 ) -> LikelihoodFit:  # fmt: skip
     """Return the maximum-likelihood fit that starts from x.
 
-    Generalised least squares of the parameters and estimation of the noise alternate. `floor` is what the white part of the noise
-    stays near. The fit stops early where it cannot reach the log likelihood `rival`.
+    Generalised least squares of the parameters and estimation of the noise alternate. The white part of
+    the noise is constrained to stay near `floor`. The fit stops early where it cannot reach the log likelihood `rival`.
     """
     noise, likelihood = _noise_at(problem, x, start, floor, noise_kind)
     for _ in range(MAX_ALTERNATIONS):
@@ -139,12 +139,12 @@ def _noise_at(
 
 
 def largest_own_moment(problem: Problem, x: FloatArray) -> float:
-    """Return the largest standard deviation (rad/s^2) of what runs differ by in their trims: that of a fin's middle."""
+    """Return the largest standard deviation (rad/s^2) of the trim moments between runs: that of the zero of a fin, times |b2|."""
     return FIN_REPEATABILITY_RAD * max(abs(problem.base_of(x, run).authority) for run in range(len(problem.records)))
 
 
 def exchange_penalty(ml_fit: LikelihoodFit) -> float:
-    """Return the prior log odds against effects that are at the larger of two equivalent coefficients.
+    """Return the prior log odds against effects whose coefficient is the larger of two equivalent solutions.
 
     A servo slower than the hull it steers is as unusual as a variant other than the textbook's.
     """

@@ -1,8 +1,8 @@
-"""Kinds of noise that models are compared under: a disturbance moment, coloured sensor noise, or both together.
+"""Kinds of noise under which models are compared: a disturbance moment, coloured sensor noise, or both together.
 
-Some logs hold both. A disturbance moves angle and rate together, the angle as the integral of the rate; coloured sensor noise is
-independent in each channel. So the data tell them apart: without sensor colour, adding it gains no likelihood, whatever is
-missing.
+Some logs have both. A disturbance moves angle and rate together, the angle as the integral of the rate; coloured sensor noise is
+independent in each channel. So the data separate them: where there is no coloured sensor noise, a model with it gains no
+likelihood, whatever effect is missing.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def fit_base(fitted: FittedProblem, floor: Noise, resolution_floor: Noise, paral
 def joint_noise_fit(own: LikelihoodFit, parallel: ParallelMap) -> LikelihoodFit:
     """Return the fit of a model under disturbance and sensor colour together, where that is likelier on the training runs.
 
-    The parameters are refitted too: one kind of noise that has to stand for both biases them.
+    The parameters are refitted too, since they are biased where one kind of noise must represent both.
     """
     if own.noise_kind == JOINT_NOISE:
         return own
@@ -48,7 +48,7 @@ def joint_noise_fit(own: LikelihoodFit, parallel: ParallelMap) -> LikelihoodFit:
     )
     if not (has_sensor_colour(own) or has_sensor_colour(other)):
         return own
-    # from what one kind alone has taken of both there may be no way back: from each of them
+    # start from both fits: an optimum under one kind may be a local minimum under the joint noise
     least = own.log_likelihood + ALTERNATIVE_LOG_ODDS
     ends = parallel.map(
         lambda j: fit_maximum_likelihood(problem, j.fitted.x, j.noise, own.floor, JOINT_NOISE, rival=least), (own, other)

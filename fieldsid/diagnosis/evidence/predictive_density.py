@@ -6,10 +6,10 @@ whitened, |e - S d|^2 = e'e - 2 b'd + d'A d, and to first order
 
     log p(run) = -e'e/2 + (Lambda m + b)' (Lambda + A)^-1 (Lambda m + b) / 2 - m' Lambda m / 2 - log det(I + Lambda^-1 A) / 2
 
-after which Lambda <- Lambda + A, and m becomes the posterior mean. A run's own nuisances are projected out of A and b, and take
-their best values under the noise: at gradient g and normal matrix N of theirs, log p <- log p + g' N^-1 g / 2. Those that were
-fitted under the noise of the training runs bend a run's start to balance a drift that this noise has no room for.
-A run's speed is measured with an error e ~ N(0, 1) along c in the shared parameters, which is integrated out first,
+after which Lambda <- Lambda + A, and m becomes the posterior mean. The nuisances of a run are projected out of A and b, and take
+their best values under the noise: with their gradient g and normal matrix N, log p <- log p + g' N^-1 g / 2. Nuisances fitted
+under the noise of the training runs would change a run's start to balance a drift that this noise does not allow for. A run's
+speed is measured with an error e ~ N(0, 1) along c in the shared parameters, which is integrated out first,
     A <- A - A c c'A / (1 + s),  b <- b - A c t / (1 + s),  log p <- log p + t^2 / (2 + 2 s) - log(1 + s) / 2,  s = c'A c, t = c'b
 Source: MacKay 1992, Neural Computation 4(3), Bayesian interpolation; Kass and Raftery 1995, section 4.
 """
@@ -37,17 +37,17 @@ RELATIVE_DIFFERENCE_STEP = 1e-4
 INFORMATION_ROUNDING_SHARE = 1e-14
 """Share of a parameter's information below which what remains after projection is rounding."""
 MIN_PRECISION = 1e-10
-"""Precision added to every combination of parameters, in units of their own."""
+"""Precision added to every combination of normalised parameters."""
 MAX_RESIDUAL_RATIO = 4.0
 """Sum of squares over the noise floor up to which two sets of residuals lead to the same noise."""
 
 
 @dataclass(frozen=True, slots=True)
 class ValidationRun:
-    """A validation run: its one-run problem and x, residual (2, n), and the Jacobian (F, S) by the training parameters.
+    """A validation run: its one-run problem and x, residual (2, n), and Jacobian (F, S) to the training parameters.
 
-    `speed` (F,) is by how much its parameters change with the error of its speed; `linearisation` holds the sensitivities to all
-    its parameters, without noise.
+    `speed` (F,) is the change of its parameters by one standard error of its speed; `linearisation` holds the sensitivities to
+    all its parameters, without noise.
     """
 
     problem: Problem
@@ -63,8 +63,8 @@ def log_predictive_density(
 ) -> tuple[FloatArray, list[FloatArray], float]:
     """Return the log predictive density of each validation run, (R,), in turn, under the noise that all of them support.
 
-    With it, each run's residual (2, n) at the parameters' posterior mean after all runs, and the standard deviation of the runs'
-    own moments (rad/s^2), which training and validation runs tell together.
+    Also return each run's residual (2, n) at the parameters' posterior mean after all runs, and the standard deviation (rad/s^2)
+    of the moments of the runs, estimated from training and validation runs together.
 
     The parameters are those of the training runs. The noise is estimated from the validation runs: that of the training runs
     would penalise a model the more for a small error, the better it fitted there.
@@ -72,22 +72,27 @@ def log_predictive_density(
     dynamics = [(b.damping, b.stiffness) for b in (r.problem.base_of(r.x, 0) for r in runs)]
     known, evaluations = precision(ml_fit), ml_fit.fitted.problem.evaluations
 
-    plain = [r.residual for r in runs]
-    _, led = _under(ml_fit.noise, runs, dynamics, known)
+    at_estimate = [r.residual for r in runs]
+    _, at_posterior_mean = _density_and_residuals(ml_fit.noise, runs, dynamics, known)
     found = []
-    for residuals in (plain, led) if _differ(plain, led, ml_fit.floor) else (plain,):
+    for residuals in (
+        (at_estimate, at_posterior_mean) if _differ(at_estimate, at_posterior_mean, ml_fit.floor) else (at_estimate,)
+    ):
         noise, _ = estimate_noise_of_runs(
             records, dynamics, residuals, ml_fit.noise_kind, ml_fit.noise, ml_fit.floor,
             largest_own_moment(ml_fit.fitted.problem, ml_fit.fitted.x), ml_fit.own_moments, evaluations=evaluations,
         )  # fmt: skip
-        found.append((*_under(noise, runs, dynamics, known), noise.own_moment))
+        found.append((*_density_and_residuals(noise, runs, dynamics, known), noise.own_moment))
     return max(found, key=lambda v: float(v[0].sum()))
 
 
-def _differ(plain: Sequence[FloatArray], led: Sequence[FloatArray], floor: Noise) -> bool:
+def _differ(at_estimate: Sequence[FloatArray], at_posterior_mean: Sequence[FloatArray], floor: Noise) -> bool:
     """Whether two sets of residuals differ by more than the noise could resolve."""
     sigma = np.array([[floor.angle], [floor.rate]])
-    return sum(float(np.sum(((a - b) / sigma) ** 2)) for a, b in zip(plain, led, strict=True)) > MAX_RESIDUAL_RATIO
+    return (
+        sum(float(np.sum(((a - b) / sigma) ** 2)) for a, b in zip(at_estimate, at_posterior_mean, strict=True))
+        > MAX_RESIDUAL_RATIO
+    )
 
 
 def precision(ml_fit: LikelihoodFit) -> FloatArray:
@@ -100,7 +105,7 @@ def precision(ml_fit: LikelihoodFit) -> FloatArray:
 
 
 def parameter_jacobian(ml_fit: LikelihoodFit, frozen: Problem, speed: float) -> FloatArray:
-    """Return the Jacobian (F, S) of the shared parameters of a run's one-run problem by those of the training problem."""
+    """Return the Jacobian (F, S) of the shared parameters of a one-run problem with respect to those of the training problem."""
     layout, x = ml_fit.fitted.problem.layout, ml_fit.fitted.x
     damping = NAMES[layout.axis].damping
     out = np.zeros((frozen.layout.shared, layout.shared))
@@ -118,13 +123,13 @@ def parameter_jacobian(ml_fit: LikelihoodFit, frozen: Problem, speed: float) -> 
     return out
 
 
-def _under(
+def _density_and_residuals(
     noise: Noise, runs: Sequence[ValidationRun], dynamics: Sequence[tuple[float, float]], known: FloatArray
 ) -> tuple[FloatArray, list[FloatArray]]:
     """Return each run's log predictive density under a noise, and its residual at the posterior mean."""
     values, parts = list[float](), list[FloatArray | None]()
     posterior_mean: FloatArray = np.zeros(known.shape[0])
-    # in units of each parameter's own doubt: their sizes differ by ten powers of ten, and some move as one
+    # normalised by the standard error of each parameter: their sizes differ by ten orders, and some are nearly dependent
     unit = 1.0 / np.sqrt(np.diag(known))
     posterior_precision = known * np.outer(unit, unit) + MIN_PRECISION * np.eye(unit.size)
     for run, d in zip(runs, dynamics, strict=True):
@@ -134,8 +139,8 @@ def _under(
         if product is not None:
             shared = run.problem.layout.shared
             a, b = _schur_complement(product[1:, 1:], product[1:, 0], shared)
-            own = product[1 + shared :, 0]
-            likelihood += 0.5 * float(own @ solve_normal_equations(product[1 + shared :, 1 + shared :], own))
+            nuisances = product[1 + shared :, 0]
+            likelihood += 0.5 * float(nuisances @ solve_normal_equations(product[1 + shared :, 1 + shared :], nuisances))
             a, b, averaged = _marginalise_speed(a, b, run.speed)
             likelihood += averaged
             jacobian = run.parameter_jacobian * unit
@@ -146,11 +151,11 @@ def _under(
             likelihood += gain - 0.5 * (_log_det(posterior_precision + a) - _log_det(posterior_precision))
             posterior_mean, posterior_precision = np.asarray(moved), posterior_precision + a
         values.append(likelihood)
-    led = [
+    at_posterior_mean = [
         run.residual if p is None else _posterior_residual(run, p, unit * posterior_mean)
         for run, p in zip(runs, parts, strict=True)
     ]
-    return np.array(values), led
+    return np.array(values), at_posterior_mean
 
 
 def _posterior_residual(run: ValidationRun, product: FloatArray, posterior_mean: FloatArray) -> FloatArray:
@@ -159,14 +164,14 @@ def _posterior_residual(run: ValidationRun, product: FloatArray, posterior_mean:
     step = run.parameter_jacobian @ posterior_mean
     a, b = _schur_complement(normal, product[1:, 0], shared)
     step = step + run.speed * float(run.speed @ (b - a @ step)) / (1.0 + float(run.speed @ a @ run.speed))
-    own = solve_normal_equations(normal[shared:, shared:], product[1 + shared :, 0] - normal[shared:, :shared] @ step)
-    return np.asarray(run.residual - np.tensordot(np.concatenate([step, own]), run.linearisation.sensitivity, axes=1))
+    nuisances = solve_normal_equations(normal[shared:, shared:], product[1 + shared :, 0] - normal[shared:, :shared] @ step)
+    return np.asarray(run.residual - np.tensordot(np.concatenate([step, nuisances]), run.linearisation.sensitivity, axes=1))
 
 
 def _schur_complement(normal: FloatArray, gradient: FloatArray, shared: int) -> tuple[FloatArray, FloatArray]:
     """Return normal matrix and gradient of the shared parameters with the nuisances projected out.
 
-    Computed in units of each parameter's own information: what remains of a nearly dependent parameter is a small difference.
+    Parameters are normalised by their information, since the rest of a nearly dependent parameter is a small difference.
     """
     size = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))
     unit, pull = normal / np.outer(size, size), gradient / size
@@ -179,11 +184,11 @@ def _schur_complement(normal: FloatArray, gradient: FloatArray, shared: int) -> 
 
 
 def _marginalise_speed(a: FloatArray, b: FloatArray, c: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Return normal matrix and gradient with the error of a run's speed integrated out, and what that adds to the log density."""
+    """Return normal matrix and gradient with the error of a run's speed integrated out, and its term of the log density."""
     along, t = a @ c, float(c @ b)
-    room = 1.0 + float(c @ along)
-    gain = 0.5 * (t * t / room - np.log(room))
-    return a - np.outer(along, along) / room, b - along * t / room, gain
+    divisor = 1.0 + float(c @ along)
+    gain = 0.5 * (t * t / divisor - np.log(divisor))
+    return a - np.outer(along, along) / divisor, b - along * t / divisor, gain
 
 
 def _log_det(matrix: FloatArray) -> float:

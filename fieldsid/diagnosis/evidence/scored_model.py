@@ -41,18 +41,18 @@ from fieldsid.numerics.arrays import FloatArray
 
 ValidationFits = tuple[tuple[Problem, FloatArray], ...]
 FREE_RUNS = ("training_runs", "validation_runs", "settled_runs", "errors_by_moment")
-"""What a scored model keeps of its free runs and their errors, whatever moments of their own the runs may have."""
+"""Cached free runs and errors of a scored model that remain valid under another standard deviation of the runs' moments."""
 
 
 @dataclass(frozen=True)
 class ScoredModel:
     """A maximum-likelihood fit with its predictive density, penalty, and validation fits.
 
-    `own_moment` (rad/s^2) is the standard deviation of the moment that each run, of training and validation, has of its own, the
-    mean of its disturbance in it.
-    `settled_residuals` [(2, n)] are those of the validation runs at the parameters that all runs leave together.
-    `output_error_fit` is a fit by output error that is reported in its place where its free run is nearer to the validation runs:
-    of the base model, of what was not found but is shown, and of every model of a log without noise.
+    `own_moment` (rad/s^2) is the standard deviation, over training and validation runs, of a constant moment that differs from
+    run to run: the mean of the disturbance in each. `settled_residuals` [(2, n)] are the residuals of the validation runs at the
+    posterior mean of the parameters after all runs. `output_error_fit` is an output-error fit that is reported instead where its
+    free run is nearer to the validation runs. It is computed for the base model, for models that are shown but were not found,
+    and for every model of a log without noise.
     """
 
     likelihood_fit: LikelihoodFit
@@ -82,7 +82,7 @@ class ScoredModel:
 
     @property
     def errors(self) -> Pair:
-        """Errors on the training and on the validation runs, each run with a start and a moment of its own."""
+        """Errors on the training and on the validation runs, with the initial state and a constant moment fitted for each run."""
         return Pair(self.train, self.validation_errors)
 
     @cached_property
@@ -102,7 +102,7 @@ class ScoredModel:
 
     @cached_property
     def settled_runs(self) -> tuple[FreeRun, ...]:
-        """Free runs on the validation runs at the parameters that all runs leave together."""
+        """Free runs on the validation runs at the posterior mean of the parameters after all runs."""
         return tuple(
             free_run(problem, x, 0, left, white_noise_floor([record]))
             for (problem, x), left, record in zip(self.validation_fits, self.settled_residuals, self.validation, strict=True)
@@ -120,46 +120,46 @@ class ScoredModel:
 
     @cached_property
     def errors_by_moment(self) -> dict[tuple[str, float], Errors]:
-        """The errors computed so far, by the name of their free runs and the runs' own moment (rad/s^2).
+        """The errors computed so far, by the name of their free runs and `own_moment` (rad/s^2).
 
         A search compares each model with many others, under few moments.
         """
         return {}
 
     def _errors_of(self, runs: str, own_moment: float) -> Errors:
-        """Return the errors of free runs, by their name here, where the runs' own moments have a standard deviation (rad/s^2)."""
+        """Return the errors of the free runs of this name, for a standard deviation (rad/s^2) of the runs' moments."""
         known = self.errors_by_moment
         if (runs, own_moment) not in known:
             known[runs, own_moment] = errors_of(getattr(self, runs), own_moment)
         return known[runs, own_moment]
 
     def with_own_moment(self, own_moment: float) -> ScoredModel:
-        """Return the model with another standard deviation (rad/s^2) of the runs' own moments, its free runs kept."""
+        """Return the model with another standard deviation (rad/s^2) of the runs' moments and the same free runs."""
         other = replace(self, own_moment=own_moment)
         other.__dict__.update({name: runs for name, runs in self.__dict__.items() if name in FREE_RUNS})
         return other
 
     def train_under(self, own_moment: float) -> Errors:
-        """Return the errors on the training runs where the runs' own moments have another standard deviation (rad/s^2)."""
+        """Return the errors on the training runs for another standard deviation (rad/s^2) of the runs' moments."""
         return self._errors_of("training_runs", own_moment)
 
     def unseen_under(self, own_moment: float) -> tuple[Errors, ...]:
-        """Return what `unseen_errors` does where the runs' own moments have another standard deviation (rad/s^2)."""
+        """Return `unseen_errors` for another standard deviation (rad/s^2) of the runs' moments."""
         if not self.validation:
             return (self.train_under(own_moment),)
         return self._errors_of("validation_runs", own_moment), self._errors_of("settled_runs", own_moment)
 
     @property
     def selection_errors(self) -> Errors:
-        """The errors that models are selected by: on the validation runs, or on the training runs where there are none."""
+        """The errors by which models are selected: on the validation runs, or on the training runs where there are none."""
         return self.validation_errors if self.validation else self.train
 
     @property
     def unseen_errors(self) -> tuple[Errors, ...]:
-        """The errors that models are compared by: at the training runs' parameters, and at those that all runs leave together.
+        """The errors by which models are compared: at the training runs' parameters, and at the posterior mean after all runs.
 
-        Training runs may leave a parameter open that one validation run settles, as two headings do a current: the first are
-        then those of a chance value.
+        Training runs may leave a parameter undetermined that one validation run determines, such as a current on two headings:
+        the first errors are then those of an arbitrary value.
         """
         return self.unseen_under(self.own_moment)
 
@@ -168,7 +168,7 @@ class ScoredModel:
         return float(np.sqrt(np.mean([run.over(floor) ** 2 for run in self.errors.runs])))
 
     def evaluate_errors(self) -> ScoredModel:
-        """Return itself with its errors computed, so that the process that fitted it computes them too."""
+        """Return the model with its errors computed, so that the process that fitted it also computes them."""
         _ = self.errors
         return self
 
@@ -184,7 +184,7 @@ class ScoredModel:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Their names."""
+        """The names of the effects."""
         return self.likelihood_fit.fitted.names
 
     @property
@@ -195,7 +195,7 @@ class ScoredModel:
 
     @property
     def trial_penalty(self) -> float:
-        """The complexity penalty with the prior log odds once: what is worth trying need not be worth naming."""
+        """The complexity penalty with the prior log odds once, since a trial needs less evidence than naming an effect."""
         return self.complexity_penalty - (EVIDENCE_TEMPERATURE - 1.0) * ALTERNATIVE_LOG_ODDS * len(self.names)
 
     @property
@@ -242,7 +242,7 @@ def validation_fits(model: Model, fitted: FittedProblem, validation: Sequence[Re
 def validation_log_density(
     ml_fit: LikelihoodFit, validation: Sequence[Record], flown: ValidationFits
 ) -> tuple[FloatArray, list[FloatArray], float]:
-    """Return what `log_predictive_density` does; without validation runs none, and the training runs' own moments."""
+    """Return `log_predictive_density`; without validation runs empty results and the moments of the training runs."""
     if not validation:
         return np.zeros(0), [], ml_fit.noise.own_moment
     runs = []
@@ -268,7 +268,7 @@ def free_run_residual(problem: Problem, x: FloatArray, run: int = 0) -> FloatArr
 def with_free_run(h: ScoredModel, fitted: FittedProblem, floor: Noise) -> ScoredModel:
     """Return a model with an output-error fit to be reported, where the free run of that is nearer to the validation runs.
 
-    Generalised least squares is efficient for a model that is right, and may have the worse free run for one that is not.
+    Generalised least squares is efficient for a correct model, but may give a worse free run for a wrong one.
     """
     other = replace(h, output_error_fit=fitted)
     return other if other.selection_errors.over(floor) < h.selection_errors.over(floor) else h
@@ -313,9 +313,9 @@ def bic_penalty(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> float:
 
 
 def price_of_runs(effect: Effect, records: Sequence[Record]) -> float:
-    """Return half the log of the sample size of each number that an effect has of each run's own: all the run's samples.
+    """Return half the log of the sample size of each nuisance of an effect in each run: all samples of the run.
 
-    The start of a hidden state is soon forgotten and speaks on few samples: it costs 1, as Akaike has it.
+    The start of a hidden state decays soon and acts on few samples: it costs 1, as in the criterion of Akaike.
     """
     starts = bool(effect.extra_states) + sum(c.of_start for c in effect.nuisance)
     lasting = len(effect.nuisance) - sum(c.of_start for c in effect.nuisance)
@@ -323,7 +323,7 @@ def price_of_runs(effect: Effect, records: Sequence[Record]) -> float:
 
 
 def errors_of(runs: Sequence[FreeRun], own_moment: float) -> Errors:
-    """Return the errors of free runs, of all and of each, whose own moments have a standard deviation (rad/s^2)."""
+    """Return the errors of free runs, of all and of each, for a standard deviation (rad/s^2) of the runs' moments."""
     squares, counts = np.array([r.squares(own_moment) for r in runs]), np.array([r.counts for r in runs])
     if not runs:
         return Errors(float("nan"), float("nan"))

@@ -1,1 +1,1 @@
-"""What a search does to a model: each move adds, drops or changes one thing, and is fitted and scored on the same grounds."""
+"""The moves of a search: each adds, drops or changes one part of a model, and is fitted and scored under the same conditions."""

@@ -1,4 +1,4 @@
-"""Moves that add one effect to a model: which effects are worth fitting, and from which start."""
+"""Moves that add one effect to a model: the choice of the effects to fit, and of their starts."""
 
 from __future__ import annotations
 
@@ -28,36 +28,37 @@ from fieldsid.rounding import nine_digits
 T = TypeVar("T")
 
 MAX_EFFECTS_AT_BASE, MAX_EFFECTS_LATER = 5, 3
-"""Effects that pass each of the two screens, that of the free run's error and that of the whitened error: of the base, and of a
-model with effects. Of 33 effects beside others that 36 hard cases of the second bank ended with 24 came first in a screen, 6
-second and 3 third."""
+"""Numbers of effects that pass each of the two screens, by the error of the free run and by the whitened error: for the base, and
+for a model with effects. Of the 33 effects, together with others, in the results of 36 hard cases of the second bank, 24 came
+first in a screen, 6 second and 3 third."""
 FOREMOST_EFFECTS = 2
-"""Effects that come first on each screen and are fitted before the others: of those, where the first leave no visible error, what
-they may be mistaken for. Of 257 single effects, 177 of five seeds of the second bank and 80 of the own one, 245 came first on one
-of the base's two screens, 10 second and 2 third."""
+"""Number of effects, the first on each screen, that are fitted before the others. Where these leave no visible error, only those
+of the others are fitted with which they may be confused. Of 257 single effects, 177 of five seeds of the second bank and 80 of
+the own one, 245 came first on one of the base's two screens, 10 second and 2 third."""
 MIN_WHITENED_COST_FALL, MIN_OUTPUT_ERROR_COST_SHARE = 5.0, 0.02
 """Fall of the whitened sum of squares, and share of the output-error sum of squares, below which an effect does not pass the
 screen."""
 MAX_FIRST_ORDER_SHORTFALL = 2.0
-"""Log likelihood that a fit is taken to gain, at most, over what the screen by the whitened cost predicts to first order. Of 204
-moves on a dozen cases of the second bank 24 gained more, 21 of them many times what they had to; of the small ones three, up to
-2.7 times, and none led."""
+"""Largest assumed ratio of the gain in log likelihood of a fit to the first-order prediction of the screen by the whitened cost.
+Of 204 moves on a dozen cases of the second bank 24 gained more, 21 of them many times what was required. Of the small ones three
+did, by up to 2.7 times, and none was the best."""
 MIN_ITERATED_COST_SHARE = 0.05
-"""Share of the output-error sum of squares that a move must have removed after its iterations; an accepted effect removes three
-times that."""
+"""Share of the output-error sum of squares that a move must have removed after its iterations; an accepted effect removes at
+least three times that."""
 EXTRA_ITERATED_EFFECTS, SCREEN_ITERATIONS = 3, 4
-"""Effects beyond `most` that the output-error screen iterates: far from the solution a first-order prediction is unreliable."""
+"""Number of effects beyond `most` that the output-error screen iterates, because a first-order prediction is unreliable far from
+the solution; and the number of iterations."""
 MAX_ITERATED_POINTS = 4
-"""Scan points of an effect that are iterated."""
+"""Largest number of scan points of an effect that are iterated."""
 MIN_EVENT_SEPARATION_SHARE = 0.1
 """Share of a run by which two times of an event must differ to be two separate starts."""
 
 
 @dataclass(frozen=True, slots=True)
 class Addition:
-    """A request to add one of some effects to a model: the `most` best of each screen, and all their starts where that is None.
+    """A request to add one of some effects to a model: the `most` best of each screen, or all with all starts where that is None.
 
-    `flown`: the free run is screened too, where the parent may be far from the measurement.
+    `flown`: the error of the free run is screened too, for a parent that may be far from the measurements.
     """
 
     parent: ScoredModel
@@ -75,7 +76,7 @@ class Addition:
 
 @dataclass(frozen=True, slots=True)
 class SearchMove:
-    """A screened effect, the linearisation it was screened on, whether output error is fitted from it first, and its parent."""
+    """A screened effect, the linearisation of its screen, whether output error is fitted first, and its parent model."""
 
     screened: ScreenResult
     linearisation: Linearisation
@@ -84,19 +85,19 @@ class SearchMove:
 
     @property
     def names(self) -> frozenset[str]:
-        """The effects of the model that it leads to."""
+        """The names of the effects of the model that results."""
         return frozenset((*self.parent.names, self.screened.effect.name))
 
     @property
     def priced_cost(self) -> float:
-        """The predicted cost and what the effect costs, by which moves are ranked."""
+        """The predicted cost plus the price of the effect, by which moves are ranked."""
         return _priced_cost(self.parent, self.screened)
 
 
 def screen_addition(asked: Addition, parallel: ParallelMap) -> list[SearchMove]:
     """Return the moves worth evaluating of an addition: the best of two screens, by output-error and by whitened cost."""
     screens = asked.screens()
-    # all screens at once, then all that is to be followed: at the end of each sharing out one process waits for the other
+    # all screens in one parallel map, then all further computations: at the end of each map one process waits for the other
     pairs = [(i, effect) for i in range(len(screens)) for effect in mechanisms(asked.effects)]
     points = parallel.map(lambda pair: _best_points(screens[pair[0]].linearisation, pair[1]), pairs)
     steps = list[_PendingMove]()
@@ -114,25 +115,25 @@ class _Screen:
     by_output_error: bool
 
     def steps(self, points: Sequence[list[ScreenResult]]) -> list[_PendingMove]:
-        """Return what is to be followed of the scan points of every effect."""
+        """Return the moves to compute from the scan points of every effect."""
         parent, most = self.asked.parent, self.asked.most
         ranked = sorted(points, key=lambda points: _priced_cost(parent, points[0]))
         follows = self.by_output_error and most is not None
         if most is not None:
             first = first_few(ranked, most + follows * EXTRA_ITERATED_EFFECTS, lambda points: points[0].effect)
             ranked = [p for p in first if self.linearisation.cost - p[0].predicted_cost > self._least_fall(p[0].effect)]
-        way = _iterated if follows else _backtracked
-        return [_PendingMove(self, follows, partial(way, self.linearisation, p)) for p in ranked]
+        refine = _iterated if follows else _backtracked
+        return [_PendingMove(self, follows, partial(refine, self.linearisation, p)) for p in ranked]
 
     def _least_fall(self, effect: Effect) -> float:
-        """Return the fall of the cost that an effect must promise."""
+        """Return the smallest predicted fall of the cost for an effect."""
         if self.by_output_error:
             return MIN_OUTPUT_ERROR_COST_SHARE * self.linearisation.cost
         return _least_cost_fall(self.asked.parent, effect)
 
 
 def _worth_evaluating(addition: Addition, taken: Sequence[tuple[_PendingMove, ScreenResult]]) -> list[SearchMove]:
-    """Return the moves of an addition: of those iterated the best, that have lowered the cost enough, and the others."""
+    """Return the moves of an addition: the best iterated ones that lowered the cost enough, and all others."""
     moves = [(s.is_iterated, SearchMove(p, s.screen.linearisation, s.screen.by_output_error, addition.parent)) for s, p in taken]
     best = sorted((move for iterated, move in moves if iterated), key=lambda move: move.priced_cost)
     found = [
@@ -143,18 +144,18 @@ def _worth_evaluating(addition: Addition, taken: Sequence[tuple[_PendingMove, Sc
 
 
 def mechanisms(effects: Sequence[Effect]) -> list[Effect]:
-    """Return effects, and after each it in the variants that do without all of the textbook's coefficients."""
+    """Return effects, each followed by its variants that have none of the textbook's coefficients."""
     found: list[Effect] = []
     for effect in effects:
-        own = {c.name for c in effect.coefficients}
-        found += [effect, *(with_variant(effect, form) for form in effect.variants if own <= set(form.without))]
+        textbook_names = {c.name for c in effect.coefficients}
+        found += [effect, *(with_variant(effect, form) for form in effect.variants if textbook_names <= set(form.without))]
     return found
 
 
 def first_few(ranked: Sequence[T], most: int | None, effect: Callable[[T], Effect]) -> list[T]:
-    """Return the first few of a ranking, and mechanisms beside the textbook's that come before the last of them.
+    """Return the first `most` textbook effects of a ranking, and all variants that are ranked before the last of them.
 
-    These take no place of another effect's: what is tried without them is tried with them.
+    A variant does not displace an effect: all effects that are tried without variants are tried with them.
     """
     places = [i for i, one in enumerate(ranked) if not effect(one).is_formed]
     end = len(ranked) if most is None or len(places) <= most else places[most]
@@ -164,34 +165,34 @@ def first_few(ranked: Sequence[T], most: int | None, effect: Callable[[T], Effec
 def _least_cost_fall(parent: ScoredModel, effect: Effect) -> float:
     """Return the fall of the training runs' whitened cost below which an effect cannot gain log evidence enough.
 
-    That is the prior odds against one and the price of the numbers it has of each run's own; validation runs gain in proportion.
+    It consists of the prior odds and the price of the effect's nuisances; the gain of validation runs is taken as proportional.
     """
     odds = 2.0 * ALTERNATIVE_LOG_ODDS * parent.training_share
     return max(MIN_WHITENED_COST_FALL, (odds + _price(parent, effect)) / MAX_FIRST_ORDER_SHORTFALL)
 
 
 def _priced_cost(parent: ScoredModel, screened: ScreenResult) -> float:
-    """Return the cost that a screened effect is predicted to leave, and its price."""
+    """Return the predicted cost with a screened effect plus the price of the effect."""
     return screened.predicted_cost + _price(parent, screened.effect)
 
 
 def _price(parent: ScoredModel, effect: Effect) -> float:
-    """Return the fall of the training runs' whitened cost that pays for the numbers an effect has of each run's own.
+    """Return the fall of the training runs' whitened cost that pays for the nuisances of an effect in each run.
 
-    Without it an event in each run would always come before the drift that it imitates.
+    Without this price an event in each run would always be ranked before the drift that it imitates.
     """
     records = parent.likelihood_fit.fitted.problem.records
     return 2.0 * price_of_runs(effect, (*records, *parent.validation)) * parent.training_share
 
 
 def _matters(move: SearchMove) -> bool:
-    """Whether a move of the output-error screen has removed a relevant share of the sum of squares after its iterations."""
+    """Return whether a move of the output-error screen removed a relevant share of the sum of squares by its iterations."""
     return move.linearisation.cost - move.screened.predicted_cost > MIN_ITERATED_COST_SHARE * move.linearisation.cost
 
 
 @dataclass(frozen=True, slots=True)
 class _PendingMove:
-    """The computation that a move still needs: some iterations, to be ranked by their cost, or a backtracked start."""
+    """The remaining computation of a move: some iterations, to be ranked by their cost, or a backtracked start."""
 
     screen: _Screen
     is_iterated: bool
@@ -199,7 +200,7 @@ class _PendingMove:
 
 
 def by_effects(found: Iterable[SearchMove]) -> list[list[SearchMove]]:
-    """Return the moves grouped by the effects of the model that they lead to, in their order."""
+    """Return the moves grouped by the effects of the resulting model, in their order."""
     groups: dict[frozenset[str], list[SearchMove]] = {}
     for move in found:
         groups.setdefault(move.names, []).append(move)
@@ -207,7 +208,7 @@ def by_effects(found: Iterable[SearchMove]) -> list[list[SearchMove]]:
 
 
 def foremost(groups: Sequence[Sequence[SearchMove]], most: int) -> list[Sequence[SearchMove]]:
-    """Return the groups of moves of the effects that come first on either screen by the priced cost, `most` of each."""
+    """Return the groups of moves of the `most` effects that are ranked first on each screen by the priced cost."""
     leading = set[str]()
     for plain in (True, False):
         ranked = sorted(
@@ -221,7 +222,7 @@ def foremost(groups: Sequence[Sequence[SearchMove]], most: int) -> list[Sequence
 
 
 def is_redundant_start(move: SearchMove, known: LikelihoodFit) -> bool:
-    """Whether another start of the same model has reached the cost this move predicts, with its events at similar times."""
+    """Return whether a fit of the same model has reached the predicted cost of a move, with its events at similar times."""
     fitted, cost = known.fitted, move.screened.predicted_cost
     if fitted.problem.layout.names == move.screened.problem.layout.names and _starts_apart(move.screened, fitted.x):
         return False
@@ -232,7 +233,7 @@ def is_redundant_start(move: SearchMove, known: LikelihoodFit) -> bool:
 
 
 def _starts_apart(screened: ScreenResult, x: FloatArray) -> bool:
-    """Whether an event of a run starts so far from where x has it that one would not converge to the other."""
+    """Return whether an event of a run starts so far from its time in x that the two would not converge to one."""
     slots = screened.problem.layout.parameters
     return any(abs(a - b) > MIN_EVENT_SEPARATION_SHARE for s, a, b in zip(slots, screened.start, x, strict=True) if s.is_event)
 
@@ -243,7 +244,7 @@ def _output_error_linearisation(parent: ScoredModel) -> Linearisation:
 
 
 def likelihood_linearisation(parent: ScoredModel) -> Linearisation:
-    """Return the linearisation of a model at its maximum-likelihood fit, under the noise of that."""
+    """Return the linearisation of a model at its maximum-likelihood fit, under the noise of that fit."""
     fitted = parent.likelihood_fit.fitted
     return linearise_at(fitted.problem, fitted.x, parent.likelihood_fit.noise)
 
@@ -259,7 +260,7 @@ def _backtracked(linearisation: Linearisation, points: Sequence[ScreenResult]) -
 
 
 def _iterated(linearisation: Linearisation, points: Sequence[ScreenResult]) -> ScreenResult:
-    """Return the best of some scan points after a few Levenberg-Marquardt iterations, its cost the one reached."""
+    """Return the best of some scan points after a few Levenberg-Marquardt iterations, with the cost that was reached."""
     tried = []
     for point in points:
         screened = backtrack(linearisation, point)

@@ -1,4 +1,4 @@
-"""Every model that a search has tried: the best of each set of effects, and what was done with it."""
+"""All models that a search has tried: the best of each set of effects, and the moves that were made from it."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ Names = frozenset[str]
 
 @dataclass(slots=True)
 class Archive(MutableMapping[Names, ScoredModel]):
-    """The model that stands for each set of effects, in the variants, under the law and at the optimum of the most evidence.
+    """The model with the most evidence for each set of effects, over variants, speed laws and optima.
 
-    `known` are the effects of the base. `expanded` are the sets that effects were added to, `thinned` and `varied` the log
-    evidence at which each was fitted without each of its effects and in other variants of some of them.
+    `known` are the effects of the base. `expanded` are the sets to which effects were added. `thinned` and `varied` hold the log
+    evidence of a set when it was last fitted without each of its effects, and with other variants of some of them.
     """
 
     known: Names
@@ -28,15 +28,15 @@ class Archive(MutableMapping[Names, ScoredModel]):
     varied: dict[tuple[Names, Names], float] = field(default_factory=dict)
 
     def __getitem__(self, names: Names) -> ScoredModel:
-        """Return the model that stands for some effects; raises KeyError where none was tried."""
+        """Return the model of a set of effects; raises KeyError where none was tried."""
         return self.models[names]
 
     def __setitem__(self, names: Names, h: ScoredModel) -> None:
-        """Let a model stand for its effects."""
+        """Store the model of a set of effects."""
         self.models[names] = h
 
     def __delitem__(self, names: Names) -> None:
-        """Let no model stand for some effects."""
+        """Delete the model of a set of effects."""
         del self.models[names]
 
     def __iter__(self) -> Iterator[Names]:
@@ -44,11 +44,11 @@ class Archive(MutableMapping[Names, ScoredModel]):
         return iter(self.models)
 
     def __len__(self) -> int:
-        """Return their number."""
+        """Return the number of sets of effects that were tried."""
         return len(self.models)
 
     def children(self, key: Names) -> list[ScoredModel]:
-        """Return the models of one effect more than a set, those of most log evidence first."""
+        """Return the models with one effect more than a set, by decreasing log evidence."""
         children = [h for k, h in self.models.items() if len(k) == len(key) + 1 and key < k]
         return sorted(children, key=lambda h: -h.log_evidence)
 
@@ -61,15 +61,15 @@ class Archive(MutableMapping[Names, ScoredModel]):
         return max(self.models.values(), key=lambda h: h.log_evidence)
 
     def without_each(self, h: ScoredModel) -> list[tuple[str, ScoredModel]]:
-        """Return each effect of a model whose absence was tried, with the model that lacks it."""
+        """Return each effect of a model that was left out in another model tried, with that model."""
         left = ((n, frozenset(h.names) - {n}) for n in h.names if n not in self.known)
         return [(n, self.models[k]) for n, k in left if k in self.models]
 
     def is_varied(self, h: ScoredModel) -> bool:
-        """Whether all effects of a model were tried in other variants at an evidence that it has hardly exceeded since."""
+        """Return whether all effects of a model were tried in other variants, and its evidence has hardly increased since."""
         names = frozenset(h.names)
         return h.log_evidence <= self.varied.get((names, names), -np.inf) + MIN_LIKELIHOOD_GAIN
 
     def is_thinned(self, h: ScoredModel) -> bool:
-        """Whether a model was fitted without each of its effects at an evidence that it has hardly exceeded since."""
+        """Return whether a model was fitted without each of its effects, and its evidence has hardly increased since."""
         return h.log_evidence <= self.thinned.get(frozenset(h.names), -np.inf) + MIN_LIKELIHOOD_GAIN

@@ -1,4 +1,4 @@
-"""The move that drops: a model without each of its effects, fitted from the numbers it has with them."""
+"""The move that drops an effect: a model without each of its effects, fitted from its parameters with them."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ def drop_each(h: ScoredModel, tried: Archive, grounds: Grounds) -> bool:
     """Fit a model without each of its effects, unless that was done; return whether any model was fitted.
 
     An effect added later may have made an earlier one superfluous. A smaller set may so far have been tried only in other
-    variants, or its fit may have ended at a worse optimum than the one the larger model leads to, or that of a part of it.
+    variants, or its fit may have ended at a worse optimum than the one reached from the larger model or from a subset.
     """
     if len(h.names) <= len(tried.known) + 1 or tried.is_thinned(h):
         return False
     tried.thinned[frozenset(h.names)] = h.log_evidence
     effects = [e for e in h.effects if e.name not in tried.known]
-    less = grounds.parallel.map(lambda gone: _without(h, gone, tried, grounds), effects)
+    less = grounds.parallel.map(lambda removed: _without(h, removed, tried, grounds), effects)
     tried.update({frozenset(w.names): w for w in less})
     refit_from_parts(less, tried, grounds)
     return True
 
 
-def _without(h: ScoredModel, gone: Effect, tried: Archive, grounds: Grounds) -> ScoredModel:
-    """Return a model without one of its effects, fitted from the parameters it has with it, the base's where they diverge."""
+def _without(h: ScoredModel, removed: Effect, tried: Archive, grounds: Grounds) -> ScoredModel:
+    """Return a model without one of its effects, fitted from its parameters with it, or from the base's where those diverge."""
     fitted, noise = h.likelihood_fit.fitted, h.likelihood_fit.noise
-    problem = fitted.problem.with_effects([e for e in h.effects if e is not gone])
+    problem = fitted.problem.with_effects([e for e in h.effects if e is not removed])
     starts = [carry_parameters(problem.layout, fitted.vector)]
     if not np.isfinite(cost_of(problem, starts[0], noise)):
-        # a hull that its sway alone holds straight runs away without it, and no descent begins there
+        # a hull that is course-stable only by its sway diverges without it, so that no descent can start there
         starts = [carry_parameters(problem.layout, tried[tried.known].likelihood_fit.fitted.vector, fitted.vector)]
     before = tried.get(frozenset(e.name for e in problem.layout.effects))
     if before is not None and any(e not in before.effects for e in problem.layout.effects):
-        # in its variants the others' numbers may be far from those without it
+        # with the other variants of this model, the parameters may be far from those of the known fit
         starts.append(carry_parameters(problem.layout, before.likelihood_fit.fitted.vector, fitted.vector))
     found = grounds.better(before, grounds.fit(problem, starts[0], noise))
     for start in starts[1:]:

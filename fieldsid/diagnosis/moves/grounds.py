@@ -1,4 +1,4 @@
-"""What all models of a search share: the runs they are scored on, the noise they are fitted under, and the worker process."""
+"""The common conditions of all models of a search: validation runs, noise floor, kind of noise, and the worker process."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ SAME_OPTIMUM = 1e-3
 class Grounds:
     """The common conditions under which models are compared, so that log evidences differ only because the effects differ.
 
-    `floor` is the sensors' noise, `resolution_floor` what the white part of a fit's noise stays near, `noise_kind` the kind of
-    noise of every fit.
+    `floor` is the sensors' noise, `resolution_floor` the value near which the white part of a fit's noise is constrained,
+    `noise_kind` the kind of noise of every fit.
     """
 
     validation: tuple[Record, ...]
@@ -37,23 +37,26 @@ class Grounds:
     report: Callable[[str], None]
 
     def fit(self, problem: Problem, x: FloatArray, noise: Noise, *, rival: float = -np.inf) -> LikelihoodFit:
-        """Return the maximum-likelihood fit from x and a noise; stopped early where it cannot reach a log likelihood, `rival`."""
+        """Return the maximum-likelihood fit from x and a noise; it stops early if it cannot reach the log likelihood `rival`."""
         return fit_maximum_likelihood(problem, x, noise, self.resolution_floor, self.noise_kind, rival=rival)
 
     def fit_from_the_free_run(self, h: ScoredModel) -> LikelihoodFit:
-        """Fit a model from its output-error fit, which no disturbance can lead to an optimum where it does the work."""
+        """Return the maximum-likelihood fit of a model from its output-error fit.
+
+        Output error has no disturbance, so that this start is not at an optimum where the disturbance replaces an effect.
+        """
         fitted = h.likelihood_fit.fitted
         return self.fit(fitted.problem, fitted.by_output_error().x, h.likelihood_fit.noise)
 
     def better(self, known: ScoredModel | None, ml_fit: LikelihoodFit) -> ScoredModel:
-        """Return the model of a fit, or the one known of the same effects where that has more evidence.
+        """Return the scored model of a fit, or the known one of the same effects where that has more evidence.
 
         Where two optima are about equally likely on the training runs, such as an event at two times, the validation runs decide.
         """
         if known is None:
             return score_model(ml_fit, self.validation)
-        lead = ml_fit.log_likelihood - bic_penalty(ml_fit, self.validation) - known.training_evidence
-        if lead <= -RIVAL_LOG_ODDS or abs(lead) <= SAME_OPTIMUM:
+        evidence_gain = ml_fit.log_likelihood - bic_penalty(ml_fit, self.validation) - known.training_evidence
+        if evidence_gain <= -RIVAL_LOG_ODDS or abs(evidence_gain) <= SAME_OPTIMUM:
             return known
         found = score_model(ml_fit, self.validation)
         return found if found.log_evidence > known.log_evidence else known
@@ -63,6 +66,6 @@ class Grounds:
         return h.selection_errors.over(self.floor)
 
     def explained_share(self, before: ScoredModel, h: ScoredModel) -> float:
-        """Return the share of one model's squared error above the noise, on fitted and unseen runs, that another explains."""
+        """Return the share of a model's excess squared error, on fitted and unseen runs, that another model explains."""
         was, left = ((one.selection_errors, one.train) for one in (before, h))
         return excess_share(was, left, self.floor)

@@ -1,4 +1,4 @@
-"""The move that adds an effect: screen all effects, fit those that promise most, and the best of them in other variants."""
+"""The move that adds an effect: screen all effects, fit the most promising, and try other variants of the best."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ from fieldsid.diagnosis.thresholds import (
 from fieldsid.models.effect import Effect
 
 LEADING_CHILDREN = 3
-"""Best children that are tried in other variants."""
+"""Number of best children that are tried in other variants."""
 
 
 @dataclass(frozen=True, slots=True)
 class Growth:
-    """The additions to one model: the archive that they are kept in, and the grounds that they are compared on."""
+    """The additions to one model, the archive that stores them, and the conditions under which they are compared."""
 
     parent: ScoredModel
     effects: Sequence[Effect]
@@ -56,15 +56,15 @@ class Growth:
     grounds: Grounds
     may_refine: Callable[[], bool]
     forced: bool = False
-    """Whether each effect is fitted from all its starts, whatever it promises."""
+    """Whether each effect is fitted from all its starts, without a screen."""
 
     @property
     def key(self) -> Names:
-        """The parent's effects."""
+        """The names of the parent's effects."""
         return frozenset(self.parent.names)
 
     def grow(self) -> None:
-        """Put into the archive the parent with each effect that passes the screens."""
+        """Store in the archive the fits of the parent with each effect that passes the screens."""
         is_root = self.key == self.tried.known
         self.tried.expanded.add(self.key)
         most = None if self.forced else MAX_EFFECTS_AT_BASE if is_root else MAX_EFFECTS_LATER
@@ -77,9 +77,10 @@ class Growth:
             self._try_variants(self._leading())
 
     def _evaluate_foremost(self, groups: Sequence[Sequence[SearchMove]]) -> None:
-        """Fit the effects that promise most, then the others.
+        """Fit the most promising effects, then the others.
 
-        Where the best child already leaves no visible error, only effects that may be mistaken for its own are fitted after it.
+        Where the best child already leaves no visible error, only effects that may be confused with its effects are fitted after
+        it.
         """
         first = foremost(groups, FOREMOST_EFFECTS)
         self.evaluate(first)
@@ -90,7 +91,7 @@ class Growth:
         self.evaluate([g for g in others if not explained or g[0].screened.effect.name in alike])
 
     def evaluate(self, groups: Sequence[Sequence[SearchMove]]) -> None:
-        """Fit the moves to each set of effects, but those whose predicted cost an earlier start has reached.
+        """Fit the moves to each set of effects, except those whose predicted cost an earlier fit has reached.
 
         All are compared with the same rival, so that the result does not depend on their order.
         """
@@ -129,9 +130,9 @@ class Growth:
         names = list(dict.fromkeys(frozenset(h.names) for h in (*children[:LEADING_CHILDREN], *best)))
         if self.key == self.tried.known:
             return [n for n in names if self._is_worth_refining(self.tried[n], children[0])]
-        return [frozenset(h.names) for h in children if self._stays_in_question(h, children[0])]
+        return [frozenset(h.names) for h in children if self._is_undecided(h, children[0])]
 
-    def _stays_in_question(self, h: ScoredModel, best: ScoredModel) -> bool:
+    def _is_undecided(self, h: ScoredModel, best: ScoredModel) -> bool:
         """Whether a model is a rival of its best sibling by log evidence, or has a clearly lower error on fitted and unseen runs.
 
         Its evidence may be lower only because the vehicle has another variant of its effect.
@@ -146,22 +147,22 @@ class Growth:
         Any child may while the sibling leaves a visible error. Otherwise a child that explains less than half of the parent's
         error is not the missing effect in any variant.
         """
-        if worst_error(best, self.grounds.floor) > SUFFICIENT_ERROR_RATIO or self._stays_in_question(h, best):
+        if worst_error(best, self.grounds.floor) > SUFFICIENT_ERROR_RATIO or self._is_undecided(h, best):
             return True
         return self.grounds.explained_share(self.tried[self.key], h) >= MAIN_EXPLAINED_SHARE
 
-    def _is_lost(self, children: Sequence[ScoredModel]) -> bool:
-        """Whether the parent's error is large and no child gains evidence: any child may be the missing effect in a variant."""
+    def _needs_all_variants(self, children: Sequence[ScoredModel]) -> bool:
+        """Return whether the parent's error is large and no child gains evidence, so that all children are tried in variants."""
         large = self.grounds.error_ratio(self.tried[self.key]) > MISSING_ERROR_RATIO
         return large and not any(gains_evidence(self.tried[self.key], child) for child in children)
 
     def _try_variants(self, names: Sequence[Names]) -> None:
-        """Try some children in other variants of the effect added; keep what has more evidence.
+        """Try some children in other variants of the effect added, and store those with more evidence.
 
         Where no child gains evidence over all runs and the parent's error is large, all children are tried.
         """
         tried, parent = self.tried, self.tried[self.key]
-        lost = self._is_lost([tried[n] for n in names])
-        names = [frozenset(c.names) for c in tried.children(self.key)] if lost else names
-        helping = [n for n in names if lost or gains_any_evidence(parent, tried[n])]
-        try_variants([VariantRequest(tried[n], n - self.key) for n in helping], tried, self.grounds)
+        tries_all = self._needs_all_variants([tried[n] for n in names])
+        names = [frozenset(c.names) for c in tried.children(self.key)] if tries_all else names
+        promising = [n for n in names if tries_all or gains_any_evidence(parent, tried[n])]
+        try_variants([VariantRequest(tried[n], n - self.key) for n in promising], tried, self.grounds)

@@ -1,4 +1,4 @@
-"""The better optimum of a set from its parts: no set is less likely than one of one effect fewer."""
+"""Refits of a set of effects from its subsets: a set must be at least as likely as any with one effect fewer."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from fieldsid.fitting.initial.effect_screen import carry_parameters
 
 
 def refit_from_parts(models: Sequence[ScoredModel], tried: Archive, grounds: Grounds) -> bool:
-    """Fit each model again that is less likely than a part of it, from that part; return whether one was better so.
+    """Fit each model that is less likely than a subset of it again, from that subset; return whether any model improved.
 
-    The part was found since, beside other effects, in other variants or under another law; the model has missed that optimum.
+    The fit of the subset is newer, from other variants or another law, and shows an optimum that the model has missed.
     """
     missed = list[tuple[ScoredModel, ScoredModel]]()
     for h in models:
-        part = max((w for _, w in tried.without_each(h)), key=lambda w: w.log_likelihood, default=h)
-        if part.log_likelihood > h.log_likelihood + MIN_LIKELIHOOD_GAIN:
-            missed.append((h, part))
+        subset = max((w for _, w in tried.without_each(h)), key=lambda w: w.log_likelihood, default=h)
+        if subset.log_likelihood > h.log_likelihood + MIN_LIKELIHOOD_GAIN:
+            missed.append((h, subset))
 
-    def again(pair: tuple[ScoredModel, ScoredModel]) -> ScoredModel:
-        h, part = pair
-        found = grounds.better(h, _fit_from_part(h, part, grounds))
+    def refitted(pair: tuple[ScoredModel, ScoredModel]) -> ScoredModel:
+        h, subset = pair
+        found = grounds.better(h, _fit_from_subset(h, subset, grounds))
         return found.evaluate_errors() if found.log_evidence > h.log_evidence + MIN_LIKELIHOOD_GAIN else h
 
-    found = grounds.parallel.map(again, missed)
+    found = grounds.parallel.map(refitted, missed)
     tried.update({frozenset(h.names): h for h in found})
     return any(h.log_evidence > before.log_evidence for h, (before, _) in zip(found, missed, strict=True))
 
 
-def _fit_from_part(h: ScoredModel, part: ScoredModel, grounds: Grounds) -> LikelihoodFit:
-    """Fit a model from a part of it, in that part's variants and under its law; what the part lacks is as the model has it."""
-    whole, of_part = h.likelihood_fit.fitted, part.likelihood_fit.fitted
-    own = {e.name: e for e in part.effects}
-    problem = of_part.problem.with_effects([own.get(e.name, e) for e in h.effects])
-    return grounds.fit(problem, carry_parameters(problem.layout, of_part.vector, whole.vector), part.likelihood_fit.noise)
+def _fit_from_subset(h: ScoredModel, subset: ScoredModel, grounds: Grounds) -> LikelihoodFit:
+    """Fit a model from a subset of it, in the variants and under the law of the subset; other parameters start at the model's."""
+    of_model, of_subset = h.likelihood_fit.fitted, subset.likelihood_fit.fitted
+    subset_effects = {e.name: e for e in subset.effects}
+    problem = of_subset.problem.with_effects([subset_effects.get(e.name, e) for e in h.effects])
+    return grounds.fit(problem, carry_parameters(problem.layout, of_subset.vector, of_model.vector), subset.likelihood_fit.noise)

@@ -45,38 +45,38 @@ class VariantRequest:
         return frozenset(self.model.names), frozenset(self.model.names if self.effects is None else self.effects)
 
 
-def try_variants(asked: Sequence[VariantRequest], tried: Archive, grounds: Grounds) -> bool:
-    """Keep models with their effects in the best variants, changed one by one while a change is accepted; return whether any was.
+def try_variants(requests: Sequence[VariantRequest], tried: Archive, grounds: Grounds) -> bool:
+    """Store models with the best variants of their effects, changed one at a time while accepted; return whether any changed.
 
-    It is accepted where it gains evidence and does not raise the validation error. All are fitted in one parallel map, as the
-    models have different numbers of variants. What was tried before at the same evidence is not tried again.
+    A change is accepted where it gains evidence and does not raise the validation error. All are fitted in one parallel map, as
+    the models have different numbers of variants. A request that was tried before at the same evidence is skipped.
     """
     varied = tried.varied
-    new = [r for r in asked if r.model.log_evidence > varied.get(r.key, -np.inf) + MIN_LIKELIHOOD_GAIN]
-    asked, left = list(new), [i for i, request in enumerate(new) if leaves_error(request.model, grounds.floor)]
+    new = [r for r in requests if r.model.log_evidence > varied.get(r.key, -np.inf) + MIN_LIKELIHOOD_GAIN]
+    requests, left = list(new), [i for i, request in enumerate(new) if leaves_error(request.model, grounds.floor)]
     while left:
-        best = zip(left, _best_variants([asked[i] for i in left], grounds), strict=True)
-        likely = [(i, variant) for i, variant in best if variant is not None and gains_evidence(asked[i].model, variant)]
-        formed = grounds.parallel.map(lambda of: of[1].evaluate_errors(), likely)
-        taken = {i: variant for (i, _), variant in zip(likely, formed, strict=True) if keeps_error(asked[i].model, variant)}
+        best = zip(left, _best_variants([requests[i] for i in left], grounds), strict=True)
+        likely = [(i, variant) for i, variant in best if variant is not None and gains_evidence(requests[i].model, variant)]
+        evaluated = grounds.parallel.map(lambda of: of[1].evaluate_errors(), likely)
+        taken = {i: variant for (i, _), variant in zip(likely, evaluated, strict=True) if keeps_error(requests[i].model, variant)}
         for i, variant in taken.items():
-            asked[i] = replace(asked[i], model=variant)
+            requests[i] = replace(requests[i], model=variant)
         left = [i for i, variant in taken.items() if leaves_error(variant, grounds.floor)]
-    for request, found in zip(new, asked, strict=True):
+    for request, found in zip(new, requests, strict=True):
         tried[frozenset(found.model.names)], varied[request.key] = found.model, found.model.log_evidence
-    return any(found.model is not request.model for request, found in zip(new, asked, strict=True))
+    return any(found.model is not request.model for request, found in zip(new, requests, strict=True))
 
 
-def _best_variants(asked: Sequence[VariantRequest], grounds: Grounds) -> list[ScoredModel | None]:
-    """Return for each model its variant with most evidence, None where no variant gains any."""
-    starts = [_VariantStart.under(request.model, grounds.floor) for request in asked]
+def _best_variants(requests: Sequence[VariantRequest], grounds: Grounds) -> list[ScoredModel | None]:
+    """Return the variant of each model with the most evidence, None where no variant passes."""
+    starts = [_VariantStart.under(request.model, grounds.floor) for request in requests]
     variants = [
         (start, e, variant)
-        for start, request in zip(starts, asked, strict=True)
+        for start, request in zip(starts, requests, strict=True)
         for e in request.model.effects
         if request.effects is None or e.name in request.effects
         for variant in e.variants
-        if with_variant(e, variant) in with_one_cross_state(_exchanged(request.model.effects, e, variant))
+        if with_variant(e, variant) in with_one_cross_state(_with_effect_in_variant(request.model.effects, e, variant))
     ]
     fitted = list(zip(variants, grounds.parallel.map(lambda of: _fit_variant(*of, grounds), variants), strict=True))
     found = [[h for (of, _, _), h in fitted if of is start and h is not None] for start in starts]
@@ -115,12 +115,12 @@ class _VariantStart:
 
 
 def _best_start(h: ScoredModel, effect: Effect, variant: Variant, left: Sequence[FloatArray]) -> tuple[Problem, Minimum]:
-    """Return the variant's problem and the best of its starts after a few iterations under the model's noise.
+    """Return the problem of a variant and the best of its starts after a few iterations under the model's noise.
 
     The edges of an actuator (dead band, limit) are scanned again together with the variant: a cost with edges has local minima.
     """
     fitted, noise = h.likelihood_fit.fitted, h.likelihood_fit.noise
-    problem = fitted.problem.with_effects(_exchanged(h.effects, effect, variant))
+    problem = fitted.problem.with_effects(_with_effect_in_variant(h.effects, effect, variant))
     records = fitted.problem.records
     again = [{}, *_start_points(records, left, effect.initial_guesses, effect.shared)] if effect.stage is Stage.ACTUATOR else [{}]
     points = [
@@ -138,8 +138,8 @@ def _best_start(h: ScoredModel, effect: Effect, variant: Variant, left: Sequence
     )
 
 
-def _exchanged(effects: Sequence[Effect], effect: Effect, variant: Variant) -> list[Effect]:
-    """Return effects with one of them in a variant."""
+def _with_effect_in_variant(effects: Sequence[Effect], effect: Effect, variant: Variant) -> list[Effect]:
+    """Return the effects, one of them in another variant."""
     return [with_variant(e, variant) if e is effect else e for e in effects]
 
 

@@ -1,1 +1,1 @@
-"""What a diagnosis says: sentences, the model for the file, the next maneuver."""
+"""The report of a diagnosis: sentences, the model for the file, the next maneuver."""

@@ -21,8 +21,8 @@ from fieldsid.noise.white_floor import white_noise_floor
 def final_model(h: ScoredModel) -> Model:
     """Return the model whose errors a scored model reports.
 
-    It is the maximum-likelihood one, or the output-error one where that predicts the validation runs better, with its covariance
-    under the noise of the maximum-likelihood fit.
+    It is the maximum-likelihood model, or the output-error model where that predicts the validation runs better, with its
+    covariance under the noise of the maximum-likelihood fit.
     """
     fitted, noise = h.likelihood_fit.fitted, h.likelihood_fit.noise
     return replace(_with_covariance(h, fitted, noise), noise=h.noise)

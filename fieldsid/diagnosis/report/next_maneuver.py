@@ -1,4 +1,4 @@
-"""The next maneuver: one that tells the rivals apart, or excites what these runs could not."""
+"""The next maneuver: one that separates the rivals, a repetition, or a run with a missing signal logged."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ def next_maneuver(
 ) -> NextManeuver | None:
     """Return the next maneuver; None where no question is open.
 
-    For rivals it is the maneuver, within the fin angles already flown, whose refitted predictions differ most. A signal that the
-    logs lack is asked for only where the named effects leave an error above the noise floor.
+    For rivals it is the maneuver, within the fin angles already flown, whose refitted predictions differ most. A missing signal
+    is requested only where the named effects leave an error above the noise floor.
     """
     if verdict.word == "undecided":
-        return _deciding(search, [found, *verdict.rivals][:MOST_RIVALS])
+        return _separating_maneuver(search, [found, *verdict.rivals][:MOST_RIVALS])
     if verdict.word == "unexplained":
         return NextManeuver(
             "repeat the run", "what comes back at the same fin is the vehicle, what does not is the sea or a fault"
@@ -43,7 +43,7 @@ def next_maneuver(
     return None
 
 
-def _deciding(search: Search, rivals: list[ScoredModel]) -> NextManeuver:
+def _separating_maneuver(search: Search, rivals: list[ScoredModel]) -> NextManeuver:
     from fieldsid.planning.discriminate.discriminate import separate
     from fieldsid.planning.safety.envelope import LARGEST_FIN, Envelope
 
@@ -59,17 +59,17 @@ def _deciding(search: Search, rivals: list[ScoredModel]) -> NextManeuver:
         models = [h.likelihood_model for h in rivals]
         found = separate(models, Envelope(fin), speeds=(speed,), fast=True, mapped=search.parallel.map)
     except FieldsidError as error:
-        # nothing inside the limits separates them: what the effects themselves declare is still worth flying
-        return NextManeuver(*_declared(names), **command, note=error.what)
+        # no maneuver inside the limits separates them: propose one that the effects declare to excite them
+        return NextManeuver(*_declared_maneuver(names), **command, note=error.what)
     odds = found.expected_log_odds
     if odds < RIVAL_LOG_ODDS:
         tried = f"no maneuver inside the fin angles flown is expected to give log odds of more than {odds:.1f} for the right one"
-        return NextManeuver(*_declared(names), **command, expected_log_odds=odds, note=tried)
+        return NextManeuver(*_declared_maneuver(names), **command, expected_log_odds=odds, note=tried)
     return NextManeuver(why=f"expected log odds {odds:.0f} for the right one", **body_of(found), **command)
 
 
-def _declared(names: list[str]) -> tuple[str, str]:
-    """Return the maneuver, and why, that most of some effects declare to be excited by."""
+def _declared_maneuver(names: list[str]) -> tuple[str, str]:
+    """Return the maneuver that most of the effects declare to excite them, and the reason in words."""
     votes: dict[str, int] = {}
     for name in names:
         for rank, maneuver in enumerate(effect_named(name).excited_by):

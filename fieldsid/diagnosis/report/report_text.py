@@ -1,4 +1,4 @@
-"""The sentences of a diagnosis, each with its number."""
+"""The sentences of a diagnosis, each with its numbers."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ DISTURBED = 1e-5
 
 
 def evidence(search: Search, h: ScoredModel, errors: Pair, floor: Noise, gain: float) -> str:
-    """Return what speaks for or against a model with these errors and this log evidence over the base, in one sentence."""
+    """Return the evidence for or against a model in one sentence; `gain` is its log evidence over the base."""
     base = search.base()
     kind = "unseen runs" if search.validation else "the runs it was fitted to"
     before, after = (m.selection_errors for m in (base, h))
@@ -40,13 +40,13 @@ def evidence(search: Search, h: ScoredModel, errors: Pair, floor: Noise, gain: f
     )
     fall = f"error on {kind} {size}"
     share = f"{fall} ({100 * excess_explained(search, h, floor):.0f} % of the excess)"
-    said = f"makes it worse: {fall}" if worsens(search, h, floor) else share
+    effect_on_error = f"makes it worse: {fall}" if worsens(search, h, floor) else share
     lower, total = lower_on(errors, base.errors, floor)
-    return f"{said}; log evidence {gain:+.1f}; error lower on {lower} of {total} runs"
+    return f"{effect_on_error}; log evidence {gain:+.1f}; error lower on {lower} of {total} runs"
 
 
 def lower_on(errors: Pair, base: Pair, floor: Noise) -> tuple[int, int]:
-    """Return on how many training and validation runs the error falls by more than EQUAL_ERROR_RATIO, and of how many."""
+    """Return the number of training and validation runs on which the error falls by more than EQUAL_ERROR_RATIO, and of all."""
     pairs = list(zip((*errors.train.each, *errors.validation.each), (*base.train.each, *base.validation.each), strict=True))
     return sum(EQUAL_ERROR_RATIO * now.over(floor) < was.over(floor) for now, was in pairs), len(pairs)
 
@@ -64,65 +64,65 @@ def headline(
 ) -> Sentence:  # fmt: skip
     """Return the verdict in a sentence."""
     if verdict.word in ("effect", "undecided"):
-        return _named(search, verdict, found, left, floor)
+        return _effects_sentence(search, verdict, found, left, floor)
     error, base = found.selection_errors.over(floor), sized(search, search.base(), floor)
     if verdict.word == "sufficient":
         tail = f"; a disturbance of {noise.disturbance:.2g} rad/s^2 is there" if noise.disturbance > DISTURBED else ""
-        says = f"nothing to add: the model predicts {_judged(search)} at {error:.2f} x the noise floor{tail}"
+        says = f"nothing to add: the model predicts {_runs_compared(search)} at {error:.2f} x the noise floor{tail}"
     elif verdict.word == "disturbed":
-        says = _disturbed(search, found, floor, noise, base)
+        says = _disturbed_sentence(search, found, floor, noise, base)
     else:
-        says = _unexplained(search, found, tests, floor, noise)
+        says = _unexplained_sentence(search, found, tests, floor, noise)
     return Sentence(says, says)
 
 
-def _judged(search: Search) -> str:
+def _runs_compared(search: Search) -> str:
     return "unseen runs" if search.validation else "the runs it was fitted to"
 
 
-def _disturbed(search: Search, found: ScoredModel, floor: Noise, noise: Noise, base: str) -> str:
+def _disturbed_sentence(search: Search, found: ScoredModel, floor: Noise, noise: Noise, base: str) -> str:
     minor = names_added(search, found)
     if not minor:
         return f"no effect of the catalogue is missing: what is left, {base}, is {_disturbance(noise)}"
     leaves = "leaves" if len(minor) == 1 else "leave"
-    beside = f"{' and '.join(minor)} may be there besides, and {leaves} {sized(search, found, floor)}"
-    return f"what is left, {base}, is for the most part {_disturbance(noise)}; {beside}"
+    minor_effects = f"{' and '.join(minor)} may be there besides, and {leaves} {sized(search, found, floor)}"
+    return f"what is left, {base}, is for the most part {_disturbance(noise)}; {minor_effects}"
 
 
-def _named(search: Search, verdict: Verdict, found: ScoredModel, left: Left, floor: Noise) -> Sentence:
-    """Return what was found, apart from what every hull has; how the error falls with it; and what is left besides."""
-    unusual, own = apart_from_the_hulls_own(verdict.effects)
-    with_own = f"with the hull's own {', '.join(own)}" if own else ""
-    names = " ".join(part for part in (" and ".join(unusual), with_own) if part) if unusual else " and ".join(own)
-    held = {c.name for e in found.effects for c in e.coefficients}
-    says = "; ".join(what_it_does(n, held) for n in (*unusual, *own))
-    fall = _fall(search, found, floor, _judged(search))
+def _effects_sentence(search: Search, verdict: Verdict, found: ScoredModel, left: Left, floor: Noise) -> Sentence:
+    """Return the sentence on the effects found, the unusual first, the fall of the error, and the error that remains."""
+    unusual, of_every_hull = apart_from_the_hulls_own(verdict.effects)
+    with_hull = f"with the hull's own {', '.join(of_every_hull)}" if of_every_hull else ""
+    names = " ".join(part for part in (" and ".join(unusual), with_hull) if part) if unusual else " and ".join(of_every_hull)
+    coefficients = {c.name for e in found.effects for c in e.coefficients}
+    says = "; ".join(what_it_does(n, coefficients) for n in (*unusual, *of_every_hull))
+    fall = _error_fall(search, found, floor, _runs_compared(search))
     if verdict.word == "undecided":
         others = {"+".join(names_added(search, r)): r for r in verdict.rivals}
         ended = (f", to {sized(search, r, floor)} with {n}" for n, r in others.items() if len(r.names) > len(found.names))
         both = f"{names} or {', '.join(others)}: these data cannot tell them apart; with {names} {fall}{''.join(ended)}"
         return Sentence(both, both)
-    rest = "" if search.is_noiseless else _rest(left)
+    rest = "" if search.is_noiseless else _unexplained_rest(left)
     return Sentence(f"{names} ({says}): {fall}{rest}", f"{names}: {fall}{rest}")
 
 
 def apart_from_the_hulls_own(effects: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the effects that are unusual, and those that every hull has."""
+    """Return the unusual effects, and the effects that every hull has."""
     return tuple(n for n in effects if n not in HULLS_OWN), tuple(n for n in effects if n in HULLS_OWN)
 
 
-def _rest(left: Left) -> str:
-    """Return what is left that nothing in the catalogue explains, and where; empty where nothing is."""
+def _unexplained_rest(left: Left) -> str:
+    """Return the clause on the error that no effect of the catalogue explains, and where it is; empty without such an error."""
     if not left.unexplained:
         return ""
     follows = f", and moves with {left.moves_with}" if left.moves_with else ""
     return f"; {left.ratio:.2g} x is left that nothing in the catalogue explains: it is largest in {left.where}{follows}"
 
 
-def _unexplained(search: Search, found: ScoredModel, left: ResidualTests, floor: Noise, noise: Noise) -> str:
-    """Return what is missing and no effect of the catalogue explains: its size, what takes a part of it, where it is largest.
+def _unexplained_sentence(search: Search, found: ScoredModel, left: ResidualTests, floor: Noise, noise: Noise) -> str:
+    """Return the sentence on an error that no effect of the catalogue explains: its size, partial explanation and place.
 
-    What it moves with is said where a test says so, and that it may be a disturbance where none speaks against one.
+    It names the signal that the error follows where a test shows one, and a possible disturbance where no test excludes one.
     """
     worse = validation_error_ratio(search.base(), search.floor)
     lowers = found.selection_errors.mean < search.base().selection_errors.mean
@@ -135,32 +135,32 @@ def _unexplained(search: Search, found: ScoredModel, left: ResidualTests, floor:
     unseen = f"; unseen runs are {worse:.1f} times worse than the fitted ones" if worse > MAX_VALIDATION_ERROR_RATIO else ""
     return (
         f"no effect of the catalogue explains what is missing: error {sized(search, search.base(), floor)}{partly}; "
-        f"{where}{follows}{calm}{unseen}{_would_end(search, found, floor)}"
+        f"{where}{follows}{calm}{unseen}{_less_likely_explanation(search, found, floor)}"
     )
 
 
-def _would_end(search: Search, found: ScoredModel, floor: Noise) -> str:
-    """Return which set of effects ends the error on all runs although another is likelier; empty where none does."""
+def _less_likely_explanation(search: Search, found: ScoredModel, floor: Noise) -> str:
+    """Return the clause on a set of effects that ends the error on all runs but is less likely; empty without one."""
     if search.is_noiseless:
         return ""
     sums = search.evidences()
 
-    def reached(h: ScoredModel) -> float:
+    def evidence_of(h: ScoredModel) -> float:
         return sums.get(frozenset(h.names), -np.inf)
 
-    likely = [h for h in search.ranked() if h is not found and reached(h) > sums[search.root]]
+    likely = [h for h in search.ranked() if h is not found and evidence_of(h) > sums[search.root]]
     ending = [h for h in likely if worst_error(h, floor) <= SUFFICIENT_ERROR_RATIO]
     if not ending:
         return ""
-    best = max(ending, key=reached)
-    less = sums[frozenset(found.names)] - reached(best)
+    best = max(ending, key=evidence_of)
+    less = sums[frozenset(found.names)] - evidence_of(best)
     return f"; {'+'.join(names_added(search, best))} leaves {sized(search, best, floor)}, but is {less:.0f} log units less likely"
 
 
-def _fall(search: Search, found: ScoredModel, floor: Noise, runs: str) -> str:
-    """Return how the error falls with a model's effects, on the validation runs where it clearly does there.
+def _error_fall(search: Search, found: ScoredModel, floor: Noise, runs: str) -> str:
+    """Return the clause on the fall of the error with a model's effects, on the validation runs where it clearly falls there.
 
-    Where the fitted runs' numbers hardly lower it, those of all runs together may; else it is the fitted runs that tell.
+    Else the error at the parameters of all runs is stated where that falls, and otherwise the errors of fitted and unseen runs.
     """
     base = search.base()
 
@@ -183,7 +183,7 @@ def _fall(search: Search, found: ScoredModel, floor: Noise, runs: str) -> str:
 
 
 def _disturbance(noise: Noise) -> str:
-    """Return what disturbs in words: a moment on the hull, or sensors that wander."""
+    """Return the disturbance in words: a moment on the hull, or coloured sensor noise."""
     if noise.disturbance > DISTURBED:
         lasts = f"{noise.disturbance:.2g} rad/s^2 with a time constant of {noise.disturbance_time:.2g} s"
         return f"a disturbance moment of {lasts} that does not follow the fin or the motion"
@@ -191,10 +191,10 @@ def _disturbance(noise: Noise) -> str:
     return f"sensors that wander by {wander} with a time constant of {noise.coloured_time:.2g} s"
 
 
-def what_it_does(name: str, held: Collection[str]) -> str:
-    """Return what an effect does in a model that holds these coefficients, with its variant where it is not the textbook's."""
+def what_it_does(name: str, coefficients: Collection[str]) -> str:
+    """Return, in words, what an effect does in a model with these coefficients, and its variant if not the textbook's."""
     effect = effect_named(name)
-    form = variant_of(effect, held)
+    form = variant_of(effect, coefficients)
     return effect.says if form is None else f"{effect.says}: {form.says}"
 
 

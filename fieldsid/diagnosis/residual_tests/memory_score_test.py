@@ -1,8 +1,8 @@
-"""Score (Lagrange multiplier) test for an unmodelled lag: a moment that follows the past of the fin or of the motion.
+"""Score (Lagrange multiplier) test for an unmodelled lag: a moment that depends on the past of the fin or of the motion.
 
 Moments proportional to fading means of the fin, its square and the square of the rate are added to the model with coefficients of
 zero. With everything else refitted to first order, the fall of the whitened sum of squares is chi-square distributed if none of
-them is present. The noise model keeps a slow disturbance from being taken for one. Source: Rao 1948.
+them is present. The noise model prevents a slow disturbance from being mistaken for such a moment. Source: Rao 1948.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MEMORY_TIME_CONSTANTS_S = (1.5, 5.0, 12.0)
 
 @dataclass(frozen=True, slots=True)
 class ScoreTest:
-    """The p-value of the test, and the feature that the moment follows best, in words."""
+    """The p-value of the test, and, in words, the feature with which the moment is most correlated."""
 
     p: float
     what: str
@@ -39,7 +39,7 @@ def fading_mean(values: FloatArray, record: Record, memory: float) -> FloatArray
 
 
 def features(record: Record) -> dict[str, FloatArray]:
-    """Return the fading means (n,) by what they follow."""
+    """Return the fading means (n,) by the name of their feature."""
     fin = record.fin - float(np.median(record.fin))
     rate = record.rate if record.rate_ok.any() else np.gradient(record.angle, record.time)
     parts = {"fin": fin, "fin squared": fin**2, "rate squared": rate**2}
@@ -72,11 +72,11 @@ MEMORY = Effect(
     source="score test, Rao 1948",
     terms=terms,
 )
-"""Not part of the catalogue: it claims no physics, only that a moment follows the fin or the motion."""
+"""An effect outside the catalogue: it has no physical meaning except that a moment depends on the fin or the motion."""
 
 
 def memory_score_test(fitted: FittedProblem, noise: Noise) -> ScoreTest:
-    """Return the score test of whether a fit's training residuals follow the past of the fin or of the motion."""
+    """Return the score test for a dependence of a fit's training residuals on the past of the fin or of the motion."""
     linearisation = linearise_at(fitted.problem, fitted.x, noise)
     problem, x = with_effect(fitted.problem, fitted.x, MEMORY, {})
     new = [i for i, s in enumerate(problem.layout.parameters) if s.name in NAMES]

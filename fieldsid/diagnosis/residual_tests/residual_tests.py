@@ -1,9 +1,9 @@
-"""Tests of the final model's innovations, which tell a disturbance from an effect that is not in the catalogue.
+"""Tests of the final model's innovations, which separate a disturbance from an effect that is not in the catalogue.
 
-A disturbance is a stationary Gaussian moment, independent of what the vehicle does. Its innovations under the fitted noise model
+A disturbance is a stationary Gaussian moment, independent of the fin and the motion. Its innovations under the fitted noise model
 are white, of constant variance, and unrelated to the fin and the motion. Three tests look for violations: whiteness (Ljung-Box);
 dependence on fin and motion (F test, the score test of diagnosis/residual_tests/memory_score_test.py, Breusch-Pagan test) and on
-what else was measured (F test); and constant variance (largest windowed energy, homoscedasticity of the windows).
+other measured signals (F test); and constant variance (largest windowed energy, homoscedasticity of the windows).
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class ResidualTests:
 
 @dataclass(frozen=True, slots=True)
 class Innovations:
-    """Innovations (2, n) of one run and the simulated motion they belong to."""
+    """Innovations (2, n) of one run, and its simulated rate (n,)."""
 
     record: Record
     white: FloatArray
@@ -62,7 +62,7 @@ class Innovations:
 
 
 def residual_tests(ml_fit: LikelihoodFit) -> ResidualTests:
-    """Return the tests of a fit's innovations on its training runs, under its own noise.
+    """Return the tests of a fit's innovations on its training runs, under the noise of the fit.
 
     The validation runs are left out: there the errors of the parameters follow the motion and would be taken for a missing
     effect.
@@ -122,10 +122,10 @@ def _dependence(runs: Sequence[Innovations]) -> tuple[float, str]:
 
 
 def _other_signals(runs: Sequence[Innovations]) -> tuple[float, str]:
-    """Return the p-value of an F test of innovations against what else every run measured, and the best feature.
+    """Return the p-value of an F test of innovations against other signals that every run has, and the best feature.
 
-    Roll, depth, speed and thrust enter with their rates and the squares of both with sign: a moment that follows one of them in
-    a way that no effect of the catalogue has is no disturbance.
+    Roll, depth, speed and thrust enter with their rates and the signed squares of both: a moment that depends on one of them, in
+    a form outside the catalogue, is not a disturbance.
     """
     shared = sorted(set.intersection(*(set(run.record.signals) for run in runs)))
     return _regression(runs, lambda run, width: _signal_features(run, width, shared)) if shared else (1.0, "")
@@ -169,7 +169,7 @@ def _slow(run: Innovations, seconds: float) -> tuple[FloatArray, int]:
 
 
 def _breusch_pagan(runs: Sequence[Innovations]) -> tuple[float, str]:
-    """Return the p-value of a variance of slow innovations that grows with the motion or the fin, and with which.
+    """Return the p-value of a test for a variance of slow innovations that grows with the motion or the fin, and the feature.
 
     A missing factor of damping or authority acts in proportion to what it multiplies; a disturbance does not. Score test of
     variance = 1 + g (x / mean x - 1) for g > 0: sum of (x / mean x - 1) (e^2 / mean e^2 - 1), its first three moments those of a

@@ -1,4 +1,4 @@
-"""Which effects of a model are accepted, and the log evidence of each accepted set."""
+"""The accepted effects of models, and the log evidence of each accepted set."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from fieldsid.models.model import Noise
 
 @dataclass(frozen=True, slots=True)
 class AcceptedSets:
-    """The accepted sets of an archive over a noise floor, as it was when they were asked for."""
+    """The accepted sets of an archive over a noise floor, at the time of the call."""
 
     evidences: Mapping[Names, float]
     """The log evidence of each accepted set: log sum exp over the models whose accepted effects are that set."""
 
     @classmethod
     def of(cls, tried: Archive, floor: Noise) -> AcceptedSets:
-        """Return those of an archive that holds the base."""
+        """Return the accepted sets of an archive that contains the base."""
         sums: dict[Names, float] = {}
         for h in tried.ranked():
             core = core_of(h, tried, floor)
@@ -40,23 +40,23 @@ class AcceptedSets:
 def core_of(h: ScoredModel, tried: Archive, floor: Noise) -> Names:
     """Return the accepted effects of a model: effects without which the model is as good are removed, one at a time.
 
-    An effect that gains evidence beside all the others is kept where it lowers the error, even if it gains none after a small
-    effect has been removed, because the disturbance may then fit both. An effect that is a rival by evidence is kept where it
-    ends a visible error.
+    An effect that gains evidence together with all the others is kept where it lowers the error, even if it gains none after a
+    small effect has been removed, because the disturbance may then fit both. An effect that is a rival by evidence is kept where
+    it ends a visible error.
     """
     base = tried[tried.known]
     over = sensor_noise(floor, base)
-    # where the base has a visible error every error above the noise is to be explained, elsewhere a visible one only
+    # where the base has a visible error, any error above the noise must be explained; else only a visible one
     least = EXPLAINED_ERROR_RATIO if worst_error(base, over) > SUFFICIENT_ERROR_RATIO else SUFFICIENT_ERROR_RATIO
     proven = {name for name, w in tried.without_each(h) if is_accepted(w, h, over, least)}
 
-    def stands(name: str, without: ScoredModel) -> bool:
+    def is_needed(name: str, without: ScoredModel) -> bool:
         return (
             is_accepted(without, h, over, least)
             or (name in proven and lowers_error(without, h, over, least))
             or settles_error(without, h, floor)
         )
 
-    while idle := [w for name, w in tried.without_each(h) if not stands(name, w)]:
-        h = max(idle, key=lambda w: w.log_evidence)
+    while superfluous := [w for name, w in tried.without_each(h) if not is_needed(name, w)]:
+        h = max(superfluous, key=lambda w: w.log_evidence)
     return frozenset(h.names)

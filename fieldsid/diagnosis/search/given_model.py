@@ -1,4 +1,4 @@
-"""The base of a search that begins from a model in a file: its optimum is known, whatever a new search for it finds."""
+"""The base of a search from a model in a file, whose optimum is used where a new search would not find it."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from fieldsid.models.model import Model
 def refitted_from(given: Model, h: ScoredModel, grounds: Grounds) -> ScoredModel:
     """Return a model of the same effects refitted from a given model's values, in its forms, where that has more evidence.
 
-    Effects whose cost is not smooth have their scanned start in the given model, not in their declaration; and an optimum that a
-    search has reached from below is not found again from the base.
+    The given values are a better start for effects whose cost is not smooth; and an optimum that a search reached by adding
+    effects may not be found again from the base.
     """
     fitted = h.likelihood_fit.fitted
     groups = fitted.problem.layout.groups

@@ -1,10 +1,10 @@
-"""The search over sets of effects: one best-first queue over one archive, entered from the bare model and from the whole hull.
+"""The search over sets of effects: a best-first queue over one archive, from the bare model and from the whole hull.
 
 A model taken from the queue is expanded: each effect of the catalogue is added to it; the most evident model is then fitted
 without each of its effects, from its free run, under other laws of speed and trim, and with other variants of its effects. The
-search enters from below, at the bare model, and from above, at the whole hull: first beside the effects that were found from
-below and, where that leaves a visible error, without them. Both ways lead to the same sets of effects, and of each set the better
-optimum is kept, whichever way found it. At the end the set found is fitted without each of its effects, until each is needed.
+search starts from below, at the bare model, and from above, at the whole hull: first together with the effects that were found
+from below and, where that leaves a visible error, without them. Both starts lead to the same sets of effects, and the better
+optimum of each set is kept. At the end the set found is fitted without each of its effects, until all are needed.
 
 Where one effect alone comes near the noise, the queue takes one more step from below before the whole hull is fitted. Otherwise a
 servo lag, which gains much evidence and lowers the error little, would hide that effect, and the free cross state of the hull
@@ -58,16 +58,16 @@ from fieldsid.noise.white_floor import lowered_noise_floor, white_noise_floor
 from fieldsid.numerics.arrays import FloatArray
 
 MAX_CANDIDATES = 8
-"""Models that a diagnosis shows beside the base."""
+"""Largest number of models that a diagnosis shows in addition to the base."""
 
 
 @dataclass(slots=True)
 class Search:
     """A search on one set of runs. `known` effects are part of its base; `thorough` is one without a budget.
 
-    `given` is the model that has the known effects, where there is one: the base is fitted from its values too.
+    `given` is the model with the known effects, where there is one: the base is also fitted from its values.
 
-    `floor` is the sensors' noise as far as it has been seen, `is_noiseless` whether the base's error is more than fifty times
+    `floor` is the lowest estimate of the sensors' noise so far, `is_noiseless` whether the base's error is more than fifty times
     that in every measured channel.
     """
 
@@ -89,7 +89,7 @@ class Search:
     _accepted: tuple[tuple[object, ...], AcceptedSets] | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
-        """Compare models down to the sensors' noise until the error of the base model is known."""
+        """Set the resolution floor to the sensors' noise, until the error of the base model is known."""
         both = (*self.records, *self.validation)
         self.resolution_floor = self.floor = white_noise_floor(both)
         self.tried = Archive(self.root)
@@ -100,7 +100,7 @@ class Search:
     def best(self) -> ScoredModel:
         """Return the accepted set of effects with the highest log evidence."""
         self.expand(self.base())
-        if self.leaves_visible_error() and self._nears_from_below() and (leading := self._next_to_expand()) is not None:
+        if self.leaves_visible_error() and self._one_effect_nears_noise() and (leading := self._next_to_expand()) is not None:
             self.expand(leading)
         for h in dict.fromkeys((frozenset(self.best_admissible().names), self.root)):
             if self.leaves_visible_error():
@@ -112,13 +112,13 @@ class Search:
         return found
 
     def enter_from_above(self, h: ScoredModel) -> None:
-        """Fit a model with the whole hull beside its effects, then without each of them."""
+        """Fit a model with the effects of the whole hull added, then without each of its effects."""
         hull = self.refined(whole_hull(h, self.catalogue, self.tried, self.grounds))
         drop_each(hull, self.tried, self.grounds)
         self.share_own_moments()
 
-    def _nears_from_below(self) -> bool:
-        """Whether some model with one effect comes near the noise: that effect may be all that is missing beside a small one."""
+    def _one_effect_nears_noise(self) -> bool:
+        """Return whether a model with one effect comes near the noise: apart from a small effect, nothing else may be missing."""
         return any(worst_error(h, self.floor) <= MISSING_ERROR_RATIO for h in self.tried.children(self.root))
 
     def _eliminate(self, found: ScoredModel) -> bool:
@@ -128,7 +128,7 @@ class Search:
         return drop_each(found, self.tried, self.grounds) or self._refit_leading()
 
     def _refit_leading(self) -> bool:
-        """Fit the models of the table again from any subset that is likelier than they are; return whether one became better."""
+        """Fit the models of the report again from any subset that is likelier; return whether one improved."""
         leading = [self.best_admissible(), *self.tried.ranked()[:MAX_CANDIDATES]]
         return refit_from_parts(list({frozenset(h.names): h for h in leading}.values()), self.tried, self.grounds)
 
@@ -142,7 +142,7 @@ class Search:
         self.lower_floor(self.best_admissible())
 
     def refined(self, h: ScoredModel) -> ScoredModel:
-        """Return a model fitted from its free run, under another law, in other variants, each where that gains evidence."""
+        """Return a model refitted from its output-error fit, under another law and in other variants, if each gains evidence."""
         if not self.tried.is_varied(h):
             h = self.tried[frozenset(h.names)] = self.grounds.better(h, self.grounds.fit_from_the_free_run(h))
             under_other_law(h, self.tried, self.grounds)
@@ -178,11 +178,11 @@ class Search:
         is_new = frozenset(h.names) not in self.tried.expanded
         return is_new and bool(np.isfinite(h.log_evidence)) and leaves_error(h, self.floor)
 
-    # ----- the first entry
+    # ----- the base
 
     @property
     def root(self) -> Names:
-        """The effects of the base."""
+        """The names of the effects of the base."""
         return frozenset(self.known)
 
     def base(self) -> ScoredModel:
@@ -211,7 +211,7 @@ class Search:
                 self.tried[self.root] = refitted_from(self.given, self.tried[self.root], self.grounds)
         return self.tried[self.root]
 
-    # ----- the grounds that models are compared on
+    # ----- the conditions under which models are compared
 
     @property
     def grounds(self) -> Grounds:
@@ -228,22 +228,22 @@ class Search:
             self.floor = lowered_noise_floor(self.floor, self.records, residuals_of(problem, x))
 
     def share_own_moments(self) -> None:
-        """Give every model the standard deviation of the runs' own moments that the most evident model estimates.
+        """Set, in every model, the standard deviation of the runs' moments that the most evident model estimates.
 
         The runs are the same for all models, and a model that lacks an effect mistakes part of it for trims that differ by run.
         """
-        told = self.tried.most_evident().own_moment
-        others = {name: h.with_own_moment(told) for name, h in self.tried.items() if h.own_moment != told}
+        estimated = self.tried.most_evident().own_moment
+        others = {name: h.with_own_moment(estimated) for name, h in self.tried.items() if h.own_moment != estimated}
         self.tried.update(others)
 
     # ----- what is found
 
     def may_go_on(self) -> bool:
-        """Whether evaluations are left."""
-        return self.budget.remains(self._misses_something)
+        """Return whether evaluations remain."""
+        return self.budget.remains(self._leaves_error_unexplained)
 
     def leaves_visible_error(self) -> bool:
-        """Whether the best accepted set leaves more than a sufficient model may, on fitted or on unseen runs."""
+        """Return whether the best accepted set has a larger error than a sufficient model, on fitted or on unseen runs."""
         return worst_error(self.best_admissible(), self.floor) > SUFFICIENT_ERROR_RATIO
 
     def leaves_unexplained(self) -> bool:
@@ -254,8 +254,8 @@ class Search:
         is_visible = worst_error(base, self.floor) > SUFFICIENT_ERROR_RATIO
         return is_visible and compared_share(base, best, self.floor) < MIN_EXPLAINED_SHARE
 
-    def _misses_something(self) -> bool:
-        """Whether the best accepted set leaves an unexplained error, also where only the verdict's comparison shows it."""
+    def _leaves_error_unexplained(self) -> bool:
+        """Return whether the best accepted set leaves an unexplained error, by its errors or by the comparison of the verdict."""
         if self.leaves_unexplained():
             return True
         return compared_error(self.base(), self.best_admissible(), self.floor) > SUFFICIENT_ERROR_RATIO
@@ -265,7 +265,7 @@ class Search:
         return self._accepted_sets().evidences
 
     def _accepted_sets(self) -> AcceptedSets:
-        """Return the accepted sets, worked out again only where a model or the floor has changed."""
+        """Return the accepted sets, recomputed only where a model or the floor has changed."""
         at, known = (self.floor, *self.tried.values()), self._accepted
         if known is None or len(at) != len(known[0]) or any(a is not b for a, b in zip(at, known[0], strict=True)):
             known = self._accepted = at, AcceptedSets.of(self.tried, self.floor)

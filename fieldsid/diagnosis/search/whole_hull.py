@@ -1,9 +1,9 @@
-"""The second entry of a search: the whole hull, with the effects that every vehicle has, fitted at once.
+"""The second start of a search: the whole hull, with the effects that every vehicle has.
 
 Every real hull has a cross state (sway or heave), a servo lag, drag that grows with the square of the rate, and loses speed in a
-turn. Steps from the bare model go astray among the four, because each effect alone fits a part of the others. So all four are
-added one after another, whatever each gains alone, each from its few most promising scan points at the fit before it. Which of
-them the data do not show is found by leaving each out.
+turn. Single additions to the bare model mislead among the four, because each effect alone fits a part of the others. So all four
+are added one after another, whatever each gains, from the few most promising scan points at the previous fit. Then the model is
+fitted without each, which removes those that the data do not show.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from fieldsid.fitting.initial.effect_screen import ScreenResult, backtrack, scre
 from fieldsid.models.effect import Effect
 
 HULLS_OWN = ("sway_coupling", "heave_coupling", "servo_lag", "quadratic_damping", "speed_varying")
-"""The effects that every hull has, in the order in which they are added: the cross state changes the others' numbers most."""
+"""The effects that every hull has, in the order of addition: the cross state changes the other parameters most."""
 STARTS = 3
-"""Scan points, those that promise most to first order, that each of them is fitted from."""
+"""Number of scan points, the best to first order, from which each of them is fitted."""
 
 
 def whole_hull(base: ScoredModel, effects: Sequence[Effect], tried: Archive, grounds: Grounds) -> ScoredModel:
-    """Return the base with the effects of HULLS_OWN that are among some effects; every set on the way is kept in the archive."""
+    """Return the base with those of the given effects that are in HULLS_OWN; store every intermediate set in the archive."""
     h = base
-    own = (e for e in effects if e.name in HULLS_OWN and e.name not in base.names)
-    for effect in sorted(own, key=lambda e: HULLS_OWN.index(e.name)):
+    hull_effects = (e for e in effects if e.name in HULLS_OWN and e.name not in base.names)
+    for effect in sorted(hull_effects, key=lambda e: HULLS_OWN.index(e.name)):
         fits = [fit for fit in _fits_with(h, effect, grounds) if np.isfinite(fit.log_likelihood)]
         if fits:
             key = frozenset((*h.names, effect.name))

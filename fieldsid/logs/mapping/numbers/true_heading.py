@@ -60,9 +60,9 @@ def better_heading(runs: Sequence[Run], names: Sequence[str]) -> tuple[int, Note
     leads = {i: lead for i, run in enumerate(runs) if (lead := lead_of(run)) is not None and lead.is_clear}
     if not leads:
         return None
-    best, ahead = max(leads.items(), key=lambda found: found[1].seconds)
+    best, most = max(leads.items(), key=lambda found: found[1].seconds)
     why = (
-        f"in turns it is {ahead.seconds:.2f} +/- {ahead.error:.2f} s ahead of the course of x_m and y_m, as a hull that slides is; "
+        f"in turns it is {most.seconds:.2f} +/- {most.error:.2f} s ahead of the course of x_m and y_m, as a hull that slides is; "
         f"the other is that course ({other.seconds:.2f} +/- {other.error:.2f} s)"
     )
     return best, _taken(names, best, why)
