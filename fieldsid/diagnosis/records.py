@@ -61,7 +61,7 @@ class Pair(Brief):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Candidate(Displayed):
-    """One model: its effects, probability beside what was tried and what was not, parameters, errors, its evidence in a sentence.
+    """One model: its effects, its probability among the sets tried or not, parameters, errors, and the evidence in a sentence.
 
     `explained` is the share of the excess error it removes, 0..1; `worse` says that it raises the error instead.
     `confusable_with` are models of comparable probability that remove as much.
@@ -89,7 +89,7 @@ class Candidate(Displayed):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Left(Brief):
-    """What remains beside the named effects, or of the base where none is named.
+    """The error that remains with the named effects, or with the base where none is named.
 
     `ratio`: the free-run error over the noise floor, of fitted or of unseen runs, whichever is larger. `unexplained`: it is
     visible, and its innovations are no disturbance's. It is largest in `run` from `start_s` to `end_s`, `burst` times the
@@ -144,7 +144,7 @@ class Diagnosis(Plotted):
     """The verdict, what led to it, and the model with the named effects added.
 
     `says` is the verdict in a sentence, `short` the same with the effects by their names alone.
-    `noiseless`: the logs show almost no noise, so that errors are told in their units and not over the noise floor.
+    `noiseless`: the logs show almost no noise, so that errors are stated in their units and not over the noise floor.
     """
 
     axis: Annotated[Axis, Key("The plane.")]

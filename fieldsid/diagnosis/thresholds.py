@@ -19,7 +19,7 @@ law of the speed than the usual: 400 to 1, as dozens of each are tried. An effec
 evidence, which is divided by that before it becomes a probability: a prior is not overstated. Of an effect's few variants one
 pays it once. On cases of the second bank that mended five of one effect too many, and cost the second effect of two."""
 RIVAL_LOG_ODDS = 3.0
-"""Log odds. Two models are rivals within it, and a maneuver that tells them apart is worth a dive from it on: 20 to 1."""
+"""Log odds, 20 to 1. Two models within it are rivals, and a maneuver is proposed where it is expected to give more."""
 RIVAL_PROBABILITY_RATIO = exp(-RIVAL_LOG_ODDS)
 """The same as a ratio of two probabilities."""
 EVIDENCE_TEMPERATURE = 2.0
@@ -80,12 +80,12 @@ LEAST_EXPLAINED_SHARE = 0.3
 20 effects that count there, in cases of three seeds of the second bank, 18 explain 0.58 or more of it, a true lag of a sample
 0.28, and a step in runs without one 0.10."""
 MAIN_EXPLAINED_SHARE = 0.5
-"""Share of the excess error that an effect explains at least where it explains more than it leaves. Asked where an error near the
-noise floor cannot fall to MAX_ERROR_RATIO while the base, or in a run the model without it, leaves a visible one; in logs without
-noise: no p-value decides there, since without noise whatever is left is significant; and of one that leaves an error above
-MISSING_ERROR_RATIO, whatever the tests say: of 702 cases of the second bank three named less, two a lag of 20 ms beside a moment
-in no catalogue and one half of a pair that alone lowered nothing."""
+"""Smallest share of the excess error that an effect must explain, so that it explains more than it leaves. It is required in
+three cases: where an error near the noise floor cannot fall to MAX_ERROR_RATIO while the base, or the model without the effect in
+some run, leaves a visible one; in logs without noise, where every residual is significant, so that p-values decide nothing; and
+of a model that leaves an error above MISSING_ERROR_RATIO, whatever the tests say. Of 702 cases of the second bank three would
+name an effect below it: two a lag of 20 ms together with a moment in no catalogue, and one half of a pair that alone lowered
+nothing."""
 BELIEVED_SHARE_OF_MISFIT = 0.2
-"""Squared error above the noise that an effect must explain, over that which the model leaves with it: of 29 effects named in
-cases of all three banks that were there, one explained less than 0.4 times that; of nine that were not there four explained less
-than 0.3."""
+"""Smallest ratio of the excess squared error that an effect explains to the excess that remains with it. Of 29 correctly named
+effects in cases of all three banks one had a ratio below 0.4; of nine wrongly named ones four had a ratio below 0.3."""

@@ -98,7 +98,7 @@ class Pressure:
 
 @dataclass(frozen=True, slots=True)
 class ChannelMap:
-    """The whole mapping of a log: sources by canonical signal, the time column of a table, frames, clocks, depth.
+    """The complete mapping of a log: sources by canonical signal, the time column of a table, frames, clocks, depth.
 
     A signal that is the sum of several sources has one entry for each, such as `rudder_rad[0]` and `rudder_rad[1]`; see
     `signal_of`.

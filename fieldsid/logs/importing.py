@@ -64,7 +64,7 @@ def runs_under_way(load: Callable[[tuple[float, float], float], Run], max_gap_s:
 class Importer:
     """The options of one import, the same for all its logs; `joined` are the other tables where a run consists of several tables.
 
-    `otherwise` is the mapping for a log that has none of its own; see `load_run`.
+    `otherwise` is the mapping for a log without one; see `load_run`.
     """
 
     mapping: ChannelMap | None = None

@@ -69,7 +69,7 @@ class FittedProblem:
 
 @dataclass(frozen=True)
 class LikelihoodFit:
-    """A maximum-likelihood fit: generalised least squares under its own noise model, and the log likelihood there.
+    """A maximum-likelihood fit: generalised least squares under the noise model estimated with it, and the log likelihood.
 
     It includes the log prior density of the noise, so that a disturbance slower than any sea cannot replace a missing effect.
     """

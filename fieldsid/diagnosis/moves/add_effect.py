@@ -94,29 +94,29 @@ class SearchMove:
         return _priced_cost(self.parent, self.screened)
 
 
-def screen_addition(asked: Addition, parallel: ParallelMap) -> list[SearchMove]:
+def screen_addition(addition: Addition, parallel: ParallelMap) -> list[SearchMove]:
     """Return the moves worth evaluating of an addition: the best of two screens, by output-error and by whitened cost."""
-    screens = asked.screens()
+    screens = addition.screens()
     # all screens in one parallel map, then all further computations: at the end of each map one process waits for the other
-    pairs = [(i, effect) for i in range(len(screens)) for effect in mechanisms(asked.effects)]
+    pairs = [(i, effect) for i in range(len(screens)) for effect in mechanisms(addition.effects)]
     points = parallel.map(lambda pair: _best_points(screens[pair[0]].linearisation, pair[1]), pairs)
     steps = list[_PendingMove]()
     for i, screen in enumerate(screens):
         steps += screen.steps([p for (at, _), p in zip(pairs, points, strict=True) if at == i])
-    return _worth_evaluating(asked, list(zip(steps, parallel.map(lambda step: step.evaluate(), steps), strict=True)))
+    return _worth_evaluating(addition, list(zip(steps, parallel.map(lambda step: step.evaluate(), steps), strict=True)))
 
 
 @dataclass(frozen=True, slots=True)
 class _Screen:
     """A screen of an addition's effects: the parent's linearisation, by output error or under its noise."""
 
-    asked: Addition
+    addition: Addition
     linearisation: Linearisation
     by_output_error: bool
 
     def steps(self, points: Sequence[list[ScreenResult]]) -> list[_PendingMove]:
         """Return the moves to compute from the scan points of every effect."""
-        parent, most = self.asked.parent, self.asked.most
+        parent, most = self.addition.parent, self.addition.most
         ranked = sorted(points, key=lambda points: _priced_cost(parent, points[0]))
         follows = self.by_output_error and most is not None
         if most is not None:
@@ -129,7 +129,7 @@ class _Screen:
         """Return the smallest predicted fall of the cost for an effect."""
         if self.by_output_error:
             return MIN_OUTPUT_ERROR_COST_SHARE * self.linearisation.cost
-        return _least_cost_fall(self.asked.parent, effect)
+        return _least_cost_fall(self.addition.parent, effect)
 
 
 def _worth_evaluating(addition: Addition, taken: Sequence[tuple[_PendingMove, ScreenResult]]) -> list[SearchMove]:

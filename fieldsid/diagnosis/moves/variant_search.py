@@ -28,7 +28,7 @@ MAX_STARTS, SCREEN_ITERATIONS, MAX_CONTINUED_STARTS, CONTINUED_ITERATIONS, COST_
 """Starts of a variant that are iterated, their iterations, how many of them continue, for how many iterations before the best is
 fitted by maximum likelihood; and the share of the cost an iteration must gain."""
 MIN_VARIANT_LIKELIHOOD_GAIN = 0.4
-"""Log likelihood, under the model's own noise, that a variant must have gained by then: the remaining iterations gain no more,
+"""Log likelihood, under the noise of the model, that a variant must gain in these iterations: the remaining ones gain no more,
 and coefficients near zero change nothing on the validation runs."""
 
 

@@ -91,13 +91,13 @@ def _swapped(run: Run, angle: str, rate: str) -> list[Note]:
         return []
     slope, trust = (0.0, 0.0) if own is None else slope_of(*own[:2])
     if one == rate:
-        said = f"{rate} changes as {angle} says, in place of the other way round"
+        statement = f"{rate} changes as {angle} says, in place of the other way round"
     elif one == angle:
-        said = f"{angle} changes as {of} says, and not as {rate}"
+        statement = f"{angle} changes as {of} says, and not as {rate}"
     else:
-        said = f"{one} changes as {rate} says, and {angle} does not"
+        statement = f"{one} changes as {rate} says, and {angle} does not"
     seen = "it hardly moves" if own is None else f"correlation {trust:.2f}, slope {slope:.3g}, should be 1"
-    message = f"{said} ({seen}): two columns are swapped"
+    message = f"{statement} ({seen}): two columns are swapped"
     signals = list(dict.fromkeys((angle, rate, one, of)))
     return [Note("swapped", message, {"signal": angle, "signals": signals, "value": trust, "limit": STRONG})]
 
@@ -283,8 +283,8 @@ def _in_degrees(large: str, unit: str, small: str, stated: Stated) -> tuple[str,
     wrong = [] if stated.is_si(small) else [f"{small} is not in `{stated.units[small]}`"]
     if not stated.is_si(large):
         return " or ".join(wrong) or f"taken as `{stated.units[large]}` already: check which ones they are", {}
-    said = " or ".join([f"{large} is probably in {unit}: set `unit: {unit}`", *wrong])
-    return said, {} if wrong else {"unit": unit}
+    statement = " or ".join([f"{large} is probably in {unit}: set `unit: {unit}`", *wrong])
+    return statement, {} if wrong else {"unit": unit}
 
 
 def _lag_findings(angle: str, rate: str, a: FloatArray, b: FloatArray, step: float, stated: Stated) -> list[Note]:

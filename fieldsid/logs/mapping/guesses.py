@@ -83,7 +83,7 @@ def quaternion_of(names: Sequence[str], columns: Mapping[str | int, FloatArray])
     """Return the line of a quaternion: four columns with names that differ in the component only, and of norm one; else None.
 
     Where the components are numbered, the real one is first or last. A vehicle is upright more often than on its side, so the
-    components of roll and pitch are small, which tells the two orders apart.
+    components of roll and pitch are small, which identifies the order.
     """
     stems: dict[tuple[str, str], dict[str, str]] = {}
     for pattern in _PARTS_OF_QUATERNION:

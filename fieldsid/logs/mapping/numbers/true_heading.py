@@ -57,10 +57,10 @@ def better_heading(runs: Sequence[Run], names: Sequence[str]) -> tuple[int, Note
     other = lead_of(runs[0])
     if np.isfinite(misfits[0]) or other is None or other.is_clear:
         return None
-    leads = {i: lead for i, run in enumerate(runs) if (lead := lead_of(run)) is not None and lead.is_clear}
-    if not leads:
+    clear_leads = {i: lead for i, run in enumerate(runs) if (lead := lead_of(run)) is not None and lead.is_clear}
+    if not clear_leads:
         return None
-    best, most = max(leads.items(), key=lambda found: found[1].seconds)
+    best, most = max(clear_leads.items(), key=lambda found: found[1].seconds)
     why = (
         f"in turns it is {most.seconds:.2f} +/- {most.error:.2f} s ahead of the course of x_m and y_m, as a hull that slides is; "
         f"the other is that course ({other.seconds:.2f} +/- {other.error:.2f} s)"

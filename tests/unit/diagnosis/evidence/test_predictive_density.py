@@ -11,8 +11,8 @@ from truth.paper import YAW, paper_run
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit, fit_output_error
 from fieldsid.diagnosis.evidence.predictive_density import (
     ValidationRun,
+    _density_and_residuals,
     _schur_complement,
-    _under,
     parameter_jacobian,
     precision,
 )
@@ -59,7 +59,7 @@ def test_it_is_the_likelihood_averaged_over_what_the_training_runs_leave_open(ju
     run = unseen(judged, record(YAW[1], 7, speed=speed))
     dynamics = [(b.damping, b.stiffness) for b in [run.problem.base_of(run.x, 0)]]
     known = precision(judged)
-    value, led = _under(NOISE, [run], dynamics, known)
+    value, residuals = _density_and_residuals(NOISE, [run], dynamics, known)
     shared = run.problem.layout.shared
     rng = np.random.default_rng(3)
     drawn = rng.multivariate_normal(np.zeros(known.shape[0]), np.linalg.inv(known), 600)
@@ -70,23 +70,23 @@ def test_it_is_the_likelihood_averaged_over_what_the_training_runs_leave_open(ju
         costs.append(levenberg_marquardt(run.problem, x, NOISE, free=range(shared, x.size), max_iterations=4).cost)
     plain = cost_of(run.problem, run.x, NOISE)
     averaged = np.log(np.mean(np.exp(-0.5 * (np.array(costs) - plain))))
-    at_estimate = _under(NOISE, [replace(run, speed=0.0 * run.speed)], dynamics, 1e12 * known)[0]
+    at_estimate = _density_and_residuals(NOISE, [replace(run, speed=0.0 * run.speed)], dynamics, 1e12 * known)[0]
     assert value[0] - at_estimate[0] == pytest.approx(averaged, abs=0.3)
     assert abs(averaged) > 0.5
-    assert np.sum((led[0] / 0.01) ** 2) < plain
+    assert np.sum((residuals[0] / 0.01) ** 2) < plain
 
 
 def test_a_start_that_was_fitted_under_another_noise_costs_nothing(judged):
     run = unseen(judged, record(YAW[1], 7))
     dynamics, known = [(b.damping, b.stiffness) for b in [run.problem.base_of(run.x, 0)]], precision(judged)
-    expected, led = _under(NOISE, [run], dynamics, known)
+    expected, residuals = _density_and_residuals(NOISE, [run], dynamics, known)
     bent = run.x.copy()
     bent[run.problem.layout.shared :] += 0.02
     moved = replace(run, x=bent, residual=free_run_residual(run.problem, bent), linearisation=run.problem.linearise(bent, 0))
     assert np.sum(moved.residual**2) > 1.5 * np.sum(run.residual**2)
-    value, left = _under(NOISE, [moved], dynamics, known)
+    value, left = _density_and_residuals(NOISE, [moved], dynamics, known)
     assert value[0] == pytest.approx(expected[0], abs=0.1)
-    np.testing.assert_allclose(left[0], led[0], atol=1e-4)
+    np.testing.assert_allclose(left[0], residuals[0], atol=1e-4)
 
 
 def test_the_shared_slots_of_a_run_move_as_the_law_says(judged):
