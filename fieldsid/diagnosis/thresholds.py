@@ -14,10 +14,11 @@ from fieldsid.comparison import sufficient
 # ----- prior odds
 
 ALTERNATIVE_LOG_ODDS = 6.0
-"""Log odds. Prior against one effect of the catalogue, one variant other than the textbook's, another kind of noise, or another
-law of the speed than the usual: 400 to 1, as dozens of each are tried. An effect pays it EVIDENCE_TEMPERATURE times in the log
-evidence, which is divided by that before it becomes a probability: a prior is not overstated. Of an effect's few variants one
-pays it once. On cases of the second bank that mended five of one effect too many, and cost the second effect of two."""
+"""Log odds, 400 to 1. Prior against one effect of the catalogue, one variant other than the textbook's, another kind of noise, or
+another speed law than the usual, since dozens of each are tried. An effect pays it EVIDENCE_TEMPERATURE times in the log
+evidence, which is divided by that before it becomes a probability, because a prior, unlike the evidence, is not overstated. A
+variant pays it once, since an effect has few. On cases of the second bank this removed a superfluous effect in five, and a true
+second effect in two."""
 RIVAL_LOG_ODDS = 3.0
 """Log odds, 20 to 1. Two models within it are rivals, and a maneuver is proposed where it is expected to give more."""
 RIVAL_PROBABILITY_RATIO = exp(-RIVAL_LOG_ODDS)
@@ -30,8 +31,7 @@ remaining squared error that is not noise, and never less than UNTRIED_LEAST. Of
 wrong where fitted and unseen runs were left within 1.15 x the noise, 3 of 43 up to 1.6 x, 2 of 5 up to 2.5 x, 6 of 13 above."""
 MIN_TRAINING_GAIN = 4.0
 """Log likelihood on the training runs that an effect with nuisance parameters of each run must gain. On validation runs those
-parameters are fitted too, so that a gain there alone proves nothing. For an effect without them it suffices that the training
-runs do not become less likely."""
+parameters are fitted too, so that a gain there alone proves nothing. An effect without them may gain on validation runs only."""
 
 # ----- what counts as a lower error
 
@@ -60,9 +60,9 @@ too."""
 MAX_VALIDATION_ERROR_RATIO = 2.0
 """Validation error over training error above which something besides a disturbance is missing: a disturbance is equal on both."""
 MIN_BASE_ERROR_SHARE = 0.02
-"""Smallest noise that models are compared under, as a share of the base model's error. A filtered log shows almost no noise; then
-the smallest inconsistency of its sensors would outweigh everything the base model fails to follow. In 112 cases of two banks the
-base model leaves at most 33 times the noise of a channel; in an aircraft's filtered pitch 83 and 154 times, in the log of a
+"""Smallest noise under which models are compared, as a share of the base model's error. A filtered log shows almost no noise;
+then the smallest inconsistency of its sensors would outweigh everything the base model fails to follow. In 112 cases of two banks
+the base model leaves at most 33 times the noise of a channel; in an aircraft's filtered pitch 83 and 154 times, in the log of a
 ship model in a tank thousands."""
 MIN_COLOUR_RATIO = 0.5
 """Coloured over white sensor noise above which the reported floor includes the coloured part."""
@@ -72,7 +72,7 @@ MIN_COLOUR_RATIO = 0.5
 MIN_P_VALUE = 2e-2
 """p below which the residuals are not a disturbance."""
 COLOUR_P_EXPONENT = 0.2
-"""Power that the whiteness p is raised to: the model's disturbance has one time constant, a real sea a broader spectrum."""
+"""Exponent of the p-value of whiteness: the model's disturbance has one time constant, a real sea a broader spectrum."""
 MIN_EXPLAINED_SHARE = 0.7
 """Share of the excess error below which a search continues, because the effects found are not all that is missing."""
 LEAST_EXPLAINED_SHARE = 0.3
