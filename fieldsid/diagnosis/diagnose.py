@@ -126,7 +126,7 @@ def _search_result(work: Search, found: ScoredModel, ml_fit: LikelihoodFit, verd
     base, ranked = work.base(), _leading(work, found)
     shown, beyond = ranked[:MAX_CANDIDATES], ranked[MAX_CANDIDATES:]
 
-    def flown(h: ScoredModel) -> ScoredModel:
+    def with_errors(h: ScoredModel) -> ScoredModel:
         """Return a model with the errors to report; its fit is by output error where that predicts the validation runs better."""
         if h is found or h.output_error_fit is not None:
             return h.evaluate_errors()
@@ -141,7 +141,7 @@ def _search_result(work: Search, found: ScoredModel, ml_fit: LikelihoodFit, verd
         partial(refitted, found),
         partial(residual_tests, ml_fit),
         partial(where_of, base, work.validation or work.records),
-        *(partial(flown, h) for h in shown),
+        *(partial(with_errors, h) for h in shown),
         *([partial(refitted, base)] if found is not base else []),
     ]
     done = work.parallel.map(lambda part: part(), parts)
@@ -160,7 +160,7 @@ def _diagnosis(
     """
     work, found, verdict, base = end.work, end.found, end.verdict, end.work.base()
     named = found if verdict.word in ("effect", "undecided") else base
-    (base_model, _), (model, flown) = end.models if named is found else (end.models[0], end.models[0])
+    (base_model, _), (model, model_notes) = end.models if named is found else (end.models[0], end.models[0])
     floor = reported_noise_floor(work.floor, end.ml_fit.noise)
     where, diverged = end.places
     left = left_of(work, named, found, end.residual_tests, floor)
@@ -184,7 +184,7 @@ def _diagnosis(
         notes=(
             *notes,
             *diverged,
-            *flown,
+            *model_notes,
             *([SEARCH_ENDED] if work.budget.is_exhausted and work.leaves_unexplained() else []),
         ),
         noiseless=work.is_noiseless,

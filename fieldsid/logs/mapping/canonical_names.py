@@ -79,7 +79,7 @@ def words_of(name: str) -> list[str]:
     return list(tokens)
 
 
-def unit_stated(name: str, dimensions: tuple[str, ...]) -> Unit | None:
+def unit_among_words(name: str, dimensions: tuple[str, ...]) -> Unit | None:
     """Return the unit, of one of the given dimensions, that a name states in brackets or among its words; None where none fits.
 
     A compound unit is not taken for one of its parts: `heading_deg_s` is not in `deg`.
@@ -168,10 +168,12 @@ def unit_in_name(name: str, signal: str, unit_text: str | None = None) -> str | 
     stated, dimensions = canonical(name), fitting(signal)
     if stated is not None and stated.signal == signal and stated.unit != "1":
         return stated.unit
-    found = unit_stated(name, dimensions) or (unit_stated(name, ("time", "ratio")) if signal in FINS else None)
+    found = unit_among_words(name, dimensions) or (unit_among_words(name, ("time", "ratio")) if signal in FINS else None)
     if found is not None and (found.dimension in dimensions or found.name in BY_UNIT):
         return "rad/s" if found.name == "rev/s" and signal != "propeller_rpm" else found.name
-    unit_without_time = unit_stated(name, (OF_CHANGES[dimensions[0]],)) if dimensions and dimensions[0] in OF_CHANGES else None
+    unit_without_time = (
+        unit_among_words(name, (OF_CHANGES[dimensions[0]],)) if dimensions and dimensions[0] in OF_CHANGES else None
+    )
     by_second = None if unit_without_time is None else find_unit(f"{unit_without_time.name}/s")
     return by_second.name if by_second is not None else stated_unit(unit_text, signal) if unit_text else None
 

@@ -6,7 +6,7 @@ import re
 
 from fieldsid.logs.channels import ANGLES
 from fieldsid.logs.doctor.angle_and_rate import PAIRS
-from fieldsid.logs.mapping.canonical_names import canonical, unit_stated, words_of
+from fieldsid.logs.mapping.canonical_names import canonical, unit_among_words, words_of
 from fieldsid.logs.mapping.vocabulary import (
     COMMANDED,
     EULER,
@@ -45,5 +45,7 @@ def meaning_of(name: str, span: Span | None = None) -> tuple[str, int] | None:
     if best[0] == 2 and is_abbreviation(words_of(re.split(r"[/ .]", name.strip())[-1])):
         return None
     signal = best[1].signal
-    is_rate = signal in RATES and unit_stated(name, ("angle",)) is None and unit_stated(name, ("angle rate",)) is not None
+    is_rate = (
+        signal in RATES and unit_among_words(name, ("angle",)) is None and unit_among_words(name, ("angle rate",)) is not None
+    )
     return as_command_or_measurement(RATES[signal] if is_rate else signal, best[0], set(words))
