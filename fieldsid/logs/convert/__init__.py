@@ -1,1 +1,1 @@
-"""From a log's own units, frames and clocks to SI, north-east-down and one clock."""
+"""Conversion of a log's units, frames and clocks to SI, north-east-down and one clock."""

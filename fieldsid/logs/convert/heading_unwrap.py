@@ -1,13 +1,15 @@
-"""A heading that was interpolated across its wrap, mended before it is unwrapped.
+"""Repair a heading that was interpolated across its wrap, before it is unwrapped.
 
-A logger that brings a wrapped heading to its own rate draws a straight line from one end of the range to the other,
-the long way round: 3.13, 0.00, -3.13. Its samples are true - 2 pi s, s the share of the way, which the log does not
-tell, so they are lost. They are known by their neighbours: the step over them is the motion, a turn apart, and each
-step among them is faster than a vehicle turns. The motion is that of the measured rate where it agrees with the
-heading, else that of the steps around. Where the range ends does not matter.
+A logger that resamples a wrapped heading interpolates from one end of the range to the other, the long way round:
+3.13, 0.00, -3.13. Such a sample is the true heading minus 2 pi s, with s the fraction of the interval, which the log
+does not contain; the true heading cannot be recovered, so the samples are replaced. They are detected by their
+neighbours: the step across them differs from the motion by one turn, and each step among them is faster than a
+vehicle turns. The motion is the integral of the measured rate if that agrees with the heading, else it is estimated
+from the steps around. Where the range ends does not matter.
 
-A heading held at the wrap also goes there and back (3.14, 0.01, 0.00, 3.14): then the step over the lost samples is
-no turn apart, and they are told from a spike by both ends of the range beside them.
+A vehicle that keeps its heading at the wrap gives excursions there and back (3.14, 0.01, 0.00, 3.14). The step across
+such samples does not contain a turn; they are distinguished from a spike by the samples before and after them, which
+lie at the ends of the range.
 """
 
 from __future__ import annotations
@@ -29,34 +31,34 @@ from fieldsid.numerics.trapezoid import trapezoid_integral
 from fieldsid.numerics.white_noise import robust_white_noise_std
 
 FASTEST_RAD_S = 3.0
-"""A step faster than this is no motion; a way round that takes longer than a turn at it is a real one."""
+"""A faster step is no motion of a vehicle; a sweep of one turn that takes longer than a turn at this rate is a real turn."""
 SLACK_RAD_S = 0.5
-"""How far the rate at a crossing may be from that of the steps around it."""
+"""Largest difference of the rate at a crossing of the wrap from that of the steps around it."""
 MIN_JUMP_RAD = 0.03
 NOISES = 6.0
-"""What stands out is more than this many standard deviations of the noise, and more than `MIN_JUMP_RAD`."""
+"""A step is significant above this many standard deviations of the noise, and above `MIN_JUMP_RAD`."""
 NEIGHBOURS = 8
-"""Steps on each side that say what the motion is."""
+"""Number of steps on each side from which the motion is estimated."""
 HELD_S = 1.0
-"""A heading held at the wrap comes back to it within this time."""
+"""A heading that is kept at the wrap comes back to it within this time."""
 ALIKE = (0.7, 1.4)
-"""Ratios of what two sensors say of one motion between which they agree: the next unit is further off."""
+"""Ratios of two sensors' readings of one motion between which they agree; a wrong unit gives a ratio further off."""
 RARE = 0.02
-"""Share of samples that bend, below which they tell no noise."""
+"""Share of samples with a nonzero second difference, up to which these do not show the level of the noise."""
 
 
 def unwrapped_over(heading: Track, rate: Track | None = None, gap_factor: float = GAP_FACTOR) -> tuple[Track, list[Note]]:
     """Return a heading (n,) in rad without jumps of a turn, and a note where samples were interpolated across its wrap.
 
-    Those samples come to lie straight between their neighbours, or are NaN where these are further apart than
-    `gap_factor` median periods. All others keep their value up to whole turns.
+    Those samples are replaced by linear interpolation between their neighbours, or are NaN where these are further apart
+    than `gap_factor` median periods. All others keep their value up to whole turns.
     """
-    lost = _interpolated(heading, rate)
-    values = unwrapped(np.where(lost, np.nan, heading.values))
-    if not lost.any():
+    replaced = _interpolated(heading, rate)
+    values = unwrapped(np.where(replaced, np.nan, heading.values))
+    if not replaced.any():
         return Track(heading.time, values, heading.label), []
-    values[lost] = straight(Track(heading.time, values), heading.time[lost], gap_factor)
-    return Track(heading.time, values, heading.label), [_note(heading.time[lost], int(np.isnan(values[lost]).sum()))]
+    values[replaced] = straight(Track(heading.time, values), heading.time[replaced], gap_factor)
+    return Track(heading.time, values, heading.label), [_note(heading.time[replaced], int(np.isnan(values[replaced]).sum()))]
 
 
 def _note(times: FloatArray, missing: int) -> Note:
@@ -74,21 +76,26 @@ def _note(times: FloatArray, missing: int) -> Note:
 
 
 def _interpolated(heading: Track, rate: Track | None) -> npt.NDArray[np.bool_]:
-    """Return which samples (n,) are a line across the wrap."""
-    lost = np.zeros(heading.values.size, dtype=bool)
+    """Return a mask (n,) of the samples that were interpolated across the wrap."""
+    replaced = np.zeros(heading.values.size, dtype=bool)
     seen = np.flatnonzero(np.isfinite(heading.values))
-    # Garbage in a damaged log may be near the largest float; what overflows then is no turn.
+    # Values of a damaged log may be near the largest float; a step that overflows is no turn.
     with np.errstate(over="ignore", invalid="ignore"):
         path = _path(heading.time[seen], heading.values[seen], rate) if seen.size > 2 else None
         if path is not None:
             for first, last in _crossings(path):
-                lost[seen[first + 1 : last]] = True
-    return lost
+                replaced[seen[first + 1 : last]] = True
+    return replaced
 
 
 @dataclass(frozen=True, slots=True)
 class _Path:
-    """A heading as logged (n,), what of its steps is motion, which steps (n-1,) are none, and whether it is seen to wrap."""
+    """A heading as logged (n,) with its steps (n-1,) divided into motion and jumps.
+
+    least: the smallest significant step in rad. swept: the integral (n,) of the measured rate, None without a usable one.
+    rates: the steps within half a turn per second. calm, jumps: indices of the steps that are motion and of those that are
+    not. covers_turn: whether the values cover a range of one turn, so that the heading is known to wrap.
+    """
 
     time: FloatArray
     values: FloatArray
@@ -97,13 +104,13 @@ class _Path:
     rates: FloatArray
     calm: npt.NDArray[np.intp]
     jumps: npt.NDArray[np.intp]
-    is_whole: bool
+    covers_turn: bool
 
     def duration(self, first: int, last: int) -> float:
         return float(self.time[last] - self.time[first])
 
     def excess(self, first: int, last: int) -> float:
-        """What the heading makes between two samples beyond the motion, in rad, turns counted."""
+        """Return the change of the heading between two samples minus the motion, in rad, whole turns included."""
         made = float(self.values[last] - self.values[first])
         if self.swept is not None:
             return made - float(self.swept[last] - self.swept[first])
@@ -111,13 +118,13 @@ class _Path:
         around = self.calm[max(low - NEIGHBOURS, 0) : high + NEIGHBOURS]
         return made - (float(np.median(self.rates[around])) * self.duration(first, last) if around.size else 0.0)
 
-    def bar(self, first: int, last: int) -> float:
-        """What stands out as excess between two samples, in rad."""
+    def limit_of_excess(self, first: int, last: int) -> float:
+        """Return the excess in rad above which the change between two samples is significant."""
         return self.least + SLACK_RAD_S * self.duration(first, last)
 
-    def stands_out(self, step: int, sign: float) -> bool:
-        """Whether a step makes more than the motion does, with a sign."""
-        return sign * self.excess(step, step + 1) > self.bar(step, step + 1)
+    def is_significant(self, step: int, sign: float) -> bool:
+        """Whether a step exceeds the motion significantly, in the direction of `sign`."""
+        return sign * self.excess(step, step + 1) > self.limit_of_excess(step, step + 1)
 
 
 def _path(time: FloatArray, values: FloatArray, rate: Track | None) -> _Path | None:
@@ -136,64 +143,64 @@ def _path(time: FloatArray, values: FloatArray, rate: Track | None) -> _Path | N
 
 
 def within_half_turn(angle: FloatArray) -> FloatArray:
-    """Return angles (n,) in rad within half a turn."""
+    """Return angles (n,) in rad reduced to the range from -pi to pi."""
     return np.asarray(angle - math.tau * np.round(angle / math.tau))
 
 
 def noise_of_steps(turned: FloatArray) -> float:
-    """Return the standard deviation of white noise on a heading from its steps (n-1,), NaN where they are no motion."""
+    """Return the standard deviation of the white noise on a heading, from its steps (n-1,), of which jumps are NaN."""
     bends = np.abs(np.diff(turned))
     bends = bends[np.isfinite(bends)]
-    # A value that is held bends only now and then, by a step each time: its noise is in those, unless they are the exception.
+    # A value repeated over several samples has second differences only where it changes: those show its noise, unless rare.
     some = bends[bends > 1e-9]
     return 0.0 if some.size <= RARE * bends.size else robust_white_noise_std(some, 2)
 
 
 def _swept(time: FloatArray, turned: FloatArray, calm: npt.NDArray[np.intp], rate: Track | None) -> FloatArray | None:
-    """Return the integral (n,) of a measured rate, or None where it does not clearly agree with the heading's steps."""
+    """Return the integral (n,) in rad of a measured rate, or None where it does not clearly agree with the heading's steps."""
     seen = np.isfinite(rate.values) if rate is not None else np.zeros(0, dtype=bool)
     if rate is None or seen.sum() < 2 or calm.size < 2:
         return None
-    own, values = rate.time[seen], rate.values[seen]
-    swept = np.interp(time, own, trapezoid_integral(own, values))
-    said, made = np.diff(swept)[calm], turned[calm]
-    power = float(said @ said)
+    stamps, values = rate.time[seen], rate.values[seen]
+    swept = np.interp(time, stamps, trapezoid_integral(stamps, values))
+    integrated, logged = np.diff(swept)[calm], turned[calm]
+    power = float(integrated @ integrated)
     if not (0.0 < power < math.inf):
         return None
-    slope = float(said @ made) / power
-    error = float(np.std(made - slope * said)) / math.sqrt(power)
+    slope = float(integrated @ logged) / power
+    error = float(np.std(logged - slope * integrated)) / math.sqrt(power)
     return swept if ALIKE[0] < slope < ALIKE[1] and error < 0.1 else None
 
 
 def _crossings(path: _Path) -> Iterator[tuple[int, int]]:
-    """Yield the samples on both sides of each line across the wrap, in order."""
+    """Yield, in order, the last sample before and the first one after each interpolation across the wrap."""
     done = 0
     for jump in path.jumps.tolist():
         if jump < done:
             continue
-        found = _line(path, jump) or (_there_and_back(path, jump) if path.is_whole else None)
+        found = _line(path, jump) or (_there_and_back(path, jump) if path.covers_turn else None)
         if found is not None:
             yield found
             done = found[1]
 
 
 def _line(path: _Path, jump: int) -> tuple[int, int] | None:
-    """Return the ends of the run of steps about a jump that stand out with its sign, if together they are a turn."""
+    """Return the ends of the significant steps of one sign around a jump, if their sum is one turn; else None."""
     sign = math.copysign(1.0, path.values[jump + 1] - path.values[jump])
     first, last = jump, jump + 1
-    while first > 0 and path.stands_out(first - 1, sign):
+    while first > 0 and path.is_significant(first - 1, sign):
         first -= 1
-    while last < path.time.size - 1 and path.stands_out(last, sign):
+    while last < path.time.size - 1 and path.is_significant(last, sign):
         last += 1
     off = abs(path.excess(first, last) - sign * math.tau)
-    whole = last - first > 1 and path.duration(first, last) <= math.tau / FASTEST_RAD_S
-    return (first, last) if whole and off <= path.bar(first, last) else None
+    is_possible = last - first > 1 and path.duration(first, last) <= math.tau / FASTEST_RAD_S
+    return (first, last) if is_possible and off <= path.limit_of_excess(first, last) else None
 
 
 def _there_and_back(path: _Path, jump: int) -> tuple[int, int] | None:
-    """Return the samples at the ends of the range about an excursion from there that no motion makes.
+    """Return the samples at the ends of the range before and after an excursion that is too fast to be motion; else None.
 
-    One that the log begins or ends in has -1 or n for the sample it does not hold.
+    Where the log begins or ends inside the excursion, the missing sample is -1 or n.
     """
     low, high = float(path.values.min()), float(path.values.max())
     start, stop = np.searchsorted(path.time, (path.time[jump] - HELD_S, path.time[jump] + HELD_S)).tolist()

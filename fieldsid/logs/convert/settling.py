@@ -1,6 +1,7 @@
-"""What a signal behind a first-order lag settles to, and how fast, by variable projection.
+"""Estimate the pole and the final value of a signal behind a first-order lag, by variable projection.
 
-Source: Golub and Pereyra 2003, Inverse Problems 19(2). Nothing is compiled here: a run in memory asks it.
+Source: Golub and Pereyra 2003, Inverse Problems 19(2). The code is not compiled, because it is also called for runs in memory,
+which must not wait for a compiler.
 """
 
 from __future__ import annotations
@@ -10,13 +11,16 @@ import numpy as np
 from fieldsid.numerics.arrays import FloatArray
 
 POLES = (1e-3, 20.0)
-"""Poles in 1/s that are looked through."""
-TOLD = 0.5
-"""Share of the squares left by a signal that settles at once, below which it is told how fast it does."""
+"""Range in 1/s in which the pole is searched."""
+MOST_RESIDUAL = 0.5
+"""The pole is identified if the residual sum of squares is below this share of that of a model without a lag."""
 
 
 def settling_of(time: FloatArray, values: FloatArray, *, integrated: bool = False) -> tuple[float, float] | None:
-    """Return pole (1/s) and end of a signal (n,), or of the rate of an angle (n,); None where they cannot be told."""
+    """Return pole (1/s) and final value of a signal (n,), or, with `integrated`, of the rate of an angle (n,).
+
+    Returns None where the pole cannot be identified.
+    """
     from scipy.optimize import minimize_scalar
 
     if time.size < 4:
@@ -24,16 +28,16 @@ def settling_of(time: FloatArray, values: FloatArray, *, integrated: bool = Fals
     t = time - time[0]
 
     def columns(pole: float) -> FloatArray:
-        gone = -np.expm1(-pole * t)
-        return np.column_stack([np.ones(t.size), t - gone / pole, gone / pole] if integrated else [gone, 1.0 - gone])
+        settled = -np.expm1(-pole * t)
+        return np.column_stack([np.ones(t.size), t - settled / pole, settled / pole] if integrated else [settled, 1.0 - settled])
 
-    def left(matrix: FloatArray) -> float:
+    def residual(matrix: FloatArray) -> float:
         return float(np.sum((values - matrix @ np.linalg.lstsq(matrix, values)[0]) ** 2))
 
-    found = minimize_scalar(lambda x: left(columns(float(np.exp(x)))), bounds=tuple(np.log(POLES).tolist()), method="bounded")
-    at_once = left(np.column_stack([np.ones(t.size), t]) if integrated else np.ones((t.size, 1)))
-    if not found.fun < TOLD * at_once:
+    found = minimize_scalar(lambda x: residual(columns(float(np.exp(x)))), bounds=tuple(np.log(POLES).tolist()), method="bounded")
+    without_lag = residual(np.column_stack([np.ones(t.size), t]) if integrated else np.ones((t.size, 1)))
+    if not found.fun < MOST_RESIDUAL * without_lag:
         return None
     pole = float(np.exp(found.x))
-    own = np.linalg.lstsq(columns(pole), values)[0]
-    return pole, float(own[1] if integrated else own[0])
+    coefficients = np.linalg.lstsq(columns(pole), values)[0]
+    return pole, float(coefficients[1] if integrated else coefficients[0])
