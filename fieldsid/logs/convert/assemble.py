@@ -1,4 +1,4 @@
-"""From what a reader found to a Run: units, signs, frames, one clock, unwrapped headings, findings."""
+"""Convert the signals that a reader found to a Run: units, signs, frames, one clock, unwrapped headings, findings."""
 
 from __future__ import annotations
 
@@ -28,12 +28,15 @@ WHOLE = (-np.inf, np.inf)
 
 
 def part_between(start: float | None, end: float | None) -> tuple[float, float]:
-    """Return the part of a log from one time to another in s, to its own start or end where one is None."""
+    """Return the part of a log between two times in s; None stands for the start or the end of the log."""
     return (WHOLE[0] if start is None else start, WHOLE[1] if end is None else end)
 
 
-BESIDE = 0.5
-"""Share of a signal's numbers beside which the fastest angle or rate has one, below which it has rows of its own."""
+ON_BASE_ROWS = 0.5
+"""Smallest share of a signal's numbers that are in rows in which the fastest angle or rate also has a number.
+
+Below it the table has a separate row for each reading of a sensor.
+"""
 
 
 def assemble(
@@ -47,15 +50,15 @@ def assemble(
 ) -> Run:
     """Return the Run of a raw log between two times in s.
 
-    Raises LogError or MappingError for what cannot be meant, DataError where the part is empty. What lies outside of it is
-    not judged.
+    Raises LogError or MappingError for a log or mapping that cannot be right, DataError where the part is empty. Gaps outside
+    of the part are not checked.
     """
     options = options or ReadOptions()
     if raw.finished:
         time = next(iter(raw.series.values())).time if raw.series else np.zeros(0)
         run = Run(raw.name, time, {s: v.values for s, v in raw.series.items()}, path, raw.notes)
         return run if part == WHOLE else run.between(*part)
-    raw = _by_reading(raw)
+    raw = _split_by_sensor(raw)
     notes = list(raw.notes)
     tracks: dict[str, Track] = {}
     for signal, series in raw.series.items():
@@ -74,9 +77,9 @@ def assemble(
             f"{mapping.place} maps no signal", found="an empty `signals`", hint=f"map one of those that {_inspect(path)} shows"
         )
     for name in [n for n in tracks if n in SENSED]:
-        values, held = without_repeats(name, tracks[name].values)
-        values, fills = without_dropouts(name, values)
-        tracks[name], notes = replace(tracks[name], values=values), notes + held + fills
+        values, repeats = without_repeats(name, tracks[name].values)
+        values, dropouts = without_dropouts(name, values)
+        tracks[name], notes = replace(tracks[name], values=values), notes + repeats + dropouts
     if "yaw_rad" in tracks:
         tracks["yaw_rad"], fills = without_fills(tracks["yaw_rad"])
         tracks["yaw_rad"], lines = unwrapped_over(tracks["yaw_rad"], tracks.get("yaw_rate_rad_s"), mapping.gap_factor)
@@ -96,7 +99,7 @@ def assemble(
 
 
 def _counted(time: FloatArray, notes: Sequence[Note]) -> str:
-    """Return how many samples are left, and what became of the others."""
+    """Return in words how many samples have a time, and why others were left out."""
     left_out = "; ".join(n.message for n in notes if n.code == "time_order")
     counted = f"{time.size} sample{'s' * (time.size != 1)} with a time, at least 2 are needed"
     return f"{counted}; {left_out}" if left_out else counted
@@ -106,18 +109,19 @@ def _inspect(path: Path | None) -> str:
     return f"`sysid inspect {'LOG' if path is None else quote(str(path))}`"
 
 
-def _by_reading(raw: RawLog) -> RawLog:
-    """Return a table of one row a reading as signals on clocks of their own; any other log as it is.
+def _split_by_sensor(raw: RawLog) -> RawLog:
+    """Return a log whose table has a separate row for each sensor's reading with a clock for each signal; others unchanged.
 
-    Most cells of such a table are blank. A table of one row for all has blanks too where a sensor is slower or fails: there what
-    the slower one has stands beside the faster one's number. Here it does not: no clock is that of the rows.
+    Most cells of such a table are blank. A table with one row for all sensors also has blanks, where a sensor is slower or fails,
+    but there the numbers of the slower sensor are in rows in which the faster one has a number too. In a table of separate rows
+    they are not, so that the times of the rows are the clock of no sensor.
     """
     seen = {signal: _rows_of(series) for signal, series in raw.series.items()}
     filled = {signal: rows for signal, rows in seen.items() if rows.any()}
     if not raw.one_clock or not filled or all(rows.all() for rows in filled.values()):
         return raw
     base = max([s for s in (ATTITUDE, *ANGLES_AND_RATES) if s in filled] or filled, key=lambda s: int(filled[s].sum()))
-    if all((rows & filled[base]).sum() >= BESIDE * rows.sum() for rows in filled.values()):
+    if all((rows & filled[base]).sum() >= ON_BASE_ROWS * rows.sum() for rows in filled.values()):
         return raw
     series = {
         s: replace(raw.series[s], time=raw.series[s].time[rows], values=raw.series[s].values[rows]) for s, rows in filled.items()
@@ -126,7 +130,7 @@ def _by_reading(raw: RawLog) -> RawLog:
 
 
 def _rows_of(series: Series) -> BoolArray:
-    """Return the rows (n,) with a number of a signal."""
+    """Return a mask (n,) of the rows in which a signal has a number."""
     return np.asarray(np.isfinite(series.values.reshape(series.time.size, -1)).all(axis=1))
 
 
@@ -140,23 +144,23 @@ def _on_one_clock(
 
 
 def _tracks(signal: str, series: Series, mapping: ChannelMap, notes: list[Note], options: ReadOptions) -> dict[str, Track]:
-    """Return one source's signals in SI and our frames, their time in order."""
+    """Return the signals of one source in SI, NED and FRD, with increasing times; append to `notes` what was found."""
     source = mapping.sources[signal]
     label = series.label.partition(".")[0] if source.topic else "the time column"
     rows, found = in_order(series.time, label, options)
     notes += found
-    # An index that takes all rows would still copy them, once for each signal of a long log.
-    is_whole = rows.size == series.time.size
-    picked = series if is_whole else replace(series, time=series.time[rows], values=series.values[rows])
+    # Indexing with all rows would still copy them, once for each signal of a long log.
+    is_complete = rows.size == series.time.size
+    picked = series if is_complete else replace(series, time=series.time[rows], values=series.values[rows])
     refuse_impossible_steps(picked.time, label)
     with np.errstate(over="ignore", invalid="ignore"):
-        given = _position if signal == POSITION else _quaternion if picked.values.ndim == 2 else _scalar
+        convert = _position if signal == POSITION else _quaternion if picked.values.ndim == 2 else _scalar
         counted = counts_unit(signal, source.unit or series.unit)
         if counted is not None:
             angles, found = turned_from_counts(signal, picked.values, counted, source.centre, source.scale)
             picked, source = replace(picked, values=angles, unit=None), replace(source, unit=None, scale=None)
             notes += found
-        values = {name: possible(name, v) for name, v in given(signal, picked, source, mapping).items()}
+        values = {name: possible(name, v) for name, v in convert(signal, picked, source, mapping).items()}
     notes += [note for _, found in values.values() for note in found]
     return {name: Track(picked.time, v, series.label) for name, (v, _) in values.items()}
 
@@ -180,13 +184,13 @@ def _in_si(signal: str, series: Series, source: Source, mapping: ChannelMap) -> 
     if signal == "depth_m" and pick_unit(unit).dimension == "pressure":
         pascal = scaled(series.values, pick_unit(unit).factor)
         return depth_of_pressure(pascal, density=mapping.pressure.density, surface_pa=mapping.pressure.surface_pa)
-    # The scale of an entry of a sum turns whatever its number is in to the unit of the sum.
+    # The scale of a term of a sum converts its number, in whatever unit, to the unit of the sum.
     factor = pick_unit(unit).factor if PART in signal and source.scale is not None else factor_to(signal_of(signal), unit)
     return scaled(series.values, factor)
 
 
 def _check_swap(signal: str, source: Source, mapping: ChannelMap) -> None:
-    """In ENU, x is east: mapping it alone would give y without saying so."""
+    """Raise MappingError where only one of x and y is mapped in ENU: x is east there, and would silently become y."""
     partner = SWAPPED_BY_WORLD.get(signal)
     if partner is None or (source.frame or mapping.frame).world == "NED":
         return

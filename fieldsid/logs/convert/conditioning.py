@@ -1,4 +1,4 @@
-"""Repair and refusal before a log becomes a Run: time that repeats or goes back, and long runs of missing samples."""
+"""Repair or refuse a log before it becomes a Run: time that repeats or goes back, and long gaps."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from fieldsid.logs.run import FINS, Note
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 MAX_GAP_S = 2.0
-"""A main signal missing for longer than this inside a run is refused unless the user raises the limit."""
+"""A run in which a main signal is missing for longer than this is refused, unless the user raises the limit."""
 
 WORTH_TAKING = 10
-"""Samples above which a part without a gap is named in a hint."""
+"""A part without a gap is proposed in a hint if it has more samples than this."""
 ROUNDING = 1.01
-"""What a gap of just the limit may be over it, by the rounding and the jitter of the times."""
+"""Tolerance of the limit for rounding and jitter of the times, as a factor."""
 
 MAIN = ("yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s", *FINS)
-"""Signals that identification stands on."""
+"""Signals that identification depends on."""
 
 
 MAX_PLAUSIBLE_VALUE = 1e9
-"""What is larger in SI was never measured: a damaged cell, or no number of this signal."""
+"""A larger value in SI is no measurement: the cell is damaged, or the column is not this signal."""
 STEPS_S = (1e-7, 1e5)
-"""Between these a log's steps of time lie, whatever vehicle and logger."""
+"""Smallest and largest plausible median step of a log's time, for any vehicle and logger."""
 
 
 def possible(signal: str, values: FloatArray) -> tuple[FloatArray, list[Note]]:
-    """Return a signal (n,) without what no sensor gives, infinite numbers among them, and a note where there were some."""
+    """Return a signal (n,) with implausibly large and infinite values as NaN, and a note where there were some."""
     beyond = ~np.isnan(values) & ~(np.abs(values) <= MAX_PLAUSIBLE_VALUE)
     if not beyond.any():
         return values, []
@@ -43,13 +43,13 @@ def possible(signal: str, values: FloatArray) -> tuple[FloatArray, list[Note]]:
 
 
 def likely_unit(step_s: float) -> str:
-    """Return the unit of time in which a median step is that of a log, with the words to set it; nothing where there is none."""
+    """Return the hint to set the unit of time in which a median step is plausible; empty where there is no such unit."""
     unit = unit_of_step(step_s)
     return f"set its unit, probably `unit: {unit}`" if unit else ""
 
 
 def refuse_impossible_steps(time: FloatArray, label: str) -> None:
-    """Raise LogError where the median step of a time (n,) is none of a log."""
+    """Raise LogError where the median step of a time (n,) is not plausible for a log."""
     step = float(np.median(np.diff(time))) if time.size > 1 else 1.0
     if not STEPS_S[0] <= step <= STEPS_S[1]:
         raise LogError(
@@ -61,7 +61,7 @@ def refuse_impossible_steps(time: FloatArray, label: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """Missing samples between two that are there: from `start_s` to `end_s`, `count` of them."""
+    """A run of `count` missing samples between two present ones at `start_s` and `end_s`."""
 
     start_s: float
     end_s: float
@@ -69,14 +69,14 @@ class Gap:
 
     @property
     def length_s(self) -> float:
-        """Time the missing samples would have stood for: between those on both sides, less a step."""
+        """Duration of the missing samples: the time between the present samples on both sides, less one step."""
         return (self.end_s - self.start_s) * self.count / (self.count + 1)
 
 
 def in_order(time: FloatArray, label: str, options: ReadOptions | None = None) -> tuple[npt.NDArray[np.intp], list[Note]]:
-    """Return the rows (m,) with which time increases strictly, and a note where others were left out.
+    """Return the indices (m,) of the rows with which time increases strictly, and a note where others were left out.
 
-    Rows without a time are left out. Unless it is asked to salvage, raises LogError where time goes back or repeats.
+    Rows without a time are left out. Raises LogError where time goes back or repeats, unless the options say to salvage.
     """
     options = options or ReadOptions()
     rows = np.flatnonzero(np.isfinite(time))
@@ -106,14 +106,17 @@ def _disorder(stamps: FloatArray, label: str, options: ReadOptions, *, left: flo
 
 
 def gaps_in(time: FloatArray, values: FloatArray) -> list[Gap]:
-    """Return the runs of missing samples inside a signal, those at its two ends left out."""
+    """Return the gaps inside a signal, without those at its two ends."""
     seen = np.flatnonzero(np.isfinite(values))
     wide = np.flatnonzero(np.diff(seen) > 1)
     return [Gap(float(time[seen[i]]), float(time[seen[i + 1]]), int(seen[i + 1] - seen[i] - 1)) for i in wide]
 
 
 def long_gaps(time: FloatArray, signals: Mapping[str, FloatArray], limit_s: float) -> list[tuple[Gap, str, float]]:
-    """Return the gaps of main signals (n,) above a limit in s, which a few of a slow signal's own steps raise; each with both."""
+    """Return the long gaps of the main signals (n,), each with its signal and the limit in s that applies to it.
+
+    For a slow signal the limit is raised to a few of its median steps.
+    """
     found = []
     for signal in (s for s in MAIN if s in signals):
         steps = np.diff(time[np.isfinite(signals[signal])])
@@ -125,7 +128,7 @@ def long_gaps(time: FloatArray, signals: Mapping[str, FloatArray], limit_s: floa
 def refuse_long_gaps(
     time: FloatArray, signals: Mapping[str, FloatArray], options: ReadOptions | None = None, *, limit_s: float = MAX_GAP_S
 ) -> None:
-    """Raise LogError naming the longest of the long gaps."""
+    """Raise LogError for the longest of the long gaps, if there is one."""
     options = options or ReadOptions()
     found = long_gaps(time, signals, limit_s)
     if not found:
@@ -154,6 +157,6 @@ def _longest_without(time: FloatArray, gaps: Sequence[Gap]) -> tuple[float, floa
 
 
 def blocks_of(mask: BoolArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """Return where the blocks of a mask (n,) begin, and where the samples behind them are."""
+    """Return the first index of each block of a mask (n,), and the index after its last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return edges[::2], edges[1::2]

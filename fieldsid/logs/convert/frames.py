@@ -1,4 +1,4 @@
-"""World and body frames of logs, converted to north-east-down and forward-starboard-down.
+"""Convert the world and body frames of logs to north-east-down (NED) and forward-starboard-down (FRD).
 
 ROS logs are east-north-up and forward-left-up (REP 103). With E -> N, N -> E, U -> -D: yaw_ned = pi/2 - yaw_enu,
 x and y change places, depth = -z. With left -> -starboard, up -> -down: pitch, pitch rate, yaw rate, sway and
@@ -22,7 +22,7 @@ TURNED_BY_BODY = frozenset({"pitch_rad", "pitch_goal_rad", "pitch_rate_rad_s", "
 """Signals that change sign between forward-left-up and forward-starboard-down."""
 
 SHORTEST, LONGEST = 1e-3, 1e3
-"""Lengths between which four numbers are taken for a quaternion that is only not normalised."""
+"""Norms between which four numbers are taken for a quaternion that is not normalised."""
 
 SWAPPED_BY_WORLD = {"x_m": "y_m", "y_m": "x_m"}
 """Signals that change places between east-north-up and north-east-down."""
@@ -37,12 +37,12 @@ class Frame:
 
 
 def heading_of_enu(yaw_rad: FloatArray) -> FloatArray:
-    """Return the heading (n,) from north, clockwise, of an angle from east, counterclockwise; its own inverse."""
+    """Return the heading (n,) clockwise from north of an angle counterclockwise from east, or the reverse: pi/2 - angle."""
     return np.asarray(0.5 * math.pi - yaw_rad)
 
 
 def to_ned_frd(signal: str, values: FloatArray, frame: Frame, *, is_height: bool = False) -> tuple[str, FloatArray]:
-    """Return the name and values (n,) of one signal in our frames.
+    """Return the name and values (n,) of one signal in NED and FRD.
 
     is_height: the number mapped to `depth_m` is a z coordinate, which points up in ENU.
     """
@@ -60,7 +60,7 @@ def to_ned_frd(signal: str, values: FloatArray, frame: Frame, *, is_height: bool
 def angles_of_quaternion(xyzw: FloatArray, frame: Frame) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return yaw, pitch and roll (n,) in rad, NED and FRD, of body-to-world quaternions (n, 4) in the log's frame.
 
-    Quaternions are normalised first; one that vanishes (no estimate) or is absurdly long gives NaN.
+    Quaternions are normalised first; one of zero norm (no estimate) or of an implausible norm gives NaN.
     """
     with np.errstate(over="ignore"):
         length = np.linalg.norm(xyzw, axis=1)
@@ -80,7 +80,7 @@ def angles_of_quaternion(xyzw: FloatArray, frame: Frame) -> tuple[FloatArray, Fl
 
 
 def unwrapped(angle_rad: FloatArray) -> FloatArray:
-    """Return an angle (n,) without jumps of a turn, gaps left as NaN; steps below half a turn stay untouched."""
+    """Return an angle (n,) without jumps of a turn; gaps stay NaN, and steps below half a turn are not changed."""
     seen = np.isfinite(angle_rad)
     result = np.array(angle_rad, dtype=np.float64)
     result[seen] = np.unwrap(result[seen])
@@ -88,9 +88,9 @@ def unwrapped(angle_rad: FloatArray) -> FloatArray:
 
 
 def about_level(angle_rad: FloatArray) -> FloatArray:
-    """Return a roll or pitch (n,) that its logger wraps, as 359 deg for -1 or -179 beside 180, without jumps, and about level.
+    """Return a wrapped roll or pitch (n,), such as 359 deg for -1 or -179 next to 180, unwrapped and centred about level.
 
-    What goes beyond a turn is no wrapped angle and stays.
+    An angle with values beyond a turn is not wrapped and is returned unchanged.
     """
     seen = np.isfinite(angle_rad)
     if not seen.any() or np.abs(angle_rad[seen]).max() > 2.0 * math.pi:
@@ -104,9 +104,9 @@ ECCENTRICITY_2 = 6.69437999014e-3
 
 
 def north_and_east(degrees: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return x and y (n,) in m of latitudes and longitudes (n, 2) in deg, from the first fix; NaN where there is none.
+    """Return x and y (n,) in m from the first fix, of latitudes and longitudes (n, 2) in deg; NaN where there is no fix.
 
-    A fix of just zero and zero, or outside of the globe, is none.
+    Exactly zero and zero, or angles outside of the globe, are no fix. Uses the radii of curvature of WGS 84 at the first fix.
     """
     latitude, longitude = degrees.T
     bad = (np.abs(latitude) > 90.0) | (np.abs(longitude) > 360.0) | ((latitude == 0.0) & (longitude == 0.0))

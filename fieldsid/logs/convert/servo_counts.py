@@ -1,8 +1,8 @@
-"""Fins and motors logged in a servo's counts: a byte about 128, or the microseconds of a pulse about 1500.
+"""Convert fins and motors logged in counts of a servo: a byte about 128, or the microseconds of a pulse about 1500.
 
-A fin's angle is (count - centre) x scale. The scale is the servo's: its range in rad over its range in counts. Where nobody
-has said it, the full travel of a count is taken for `FULL_RAD`; what is fitted to such a fin is an authority per count, and
-heading, rates, time constants and what follows from them do not depend on it.
+A fin's angle is (count - centre) x scale. The scale is that of the servo: its range in rad over its range in counts. Where the
+scale is not stated, the full travel is assumed to be `FULL_RAD`. The authority identified with such a fin (b2, d2) is then one
+per count; heading, rates, time constants and the results that follow from them do not depend on the scale.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from fieldsid.numerics.arrays import FloatArray
 COUNTS = "counts"
 COUNTED = (*FINS, "thrust", "thrust_ratio")
 SUMMED = (*FINS, *MOTORS)
-"""What several fins or motors may make up together."""
+"""Signals that may be the sum of several fins or motors."""
 FULL_RAD = math.radians(30.0)
-"""What the full travel of a servo is taken for where its range is not said."""
+"""Assumed deflection at full travel of a servo whose range is not stated."""
 
 
 @dataclass(frozen=True, slots=True)
 class Servo:
-    """A kind of counts: its name, the count at zero, the counts to full travel, and the least and largest there are."""
+    """A kind of counts: its name, the count at zero, the counts to full travel, and the least and largest possible count."""
 
     says: str
     centre: float
@@ -43,11 +43,11 @@ BY_UNIT: Mapping[str, Servo] = MappingProxyType({
     "%": Servo("percent of its range", 0.0, 100.0, -100.0, 100.0),
     "1": Servo("shares of its range", 0.0, 1.0, -1.0, 1.0),
 })  # fmt: skip
-"""What the units of a pulse, and those of a share, are on a fin."""
+"""Kinds of counts by the unit that a fin's mapping states: a pulse's length, or a share of the range."""
 
 
 def counts_unit(signal: str, unit: str | None) -> str | None:
-    """Return the unit of a servo that is meant at a signal: `counts`, on a fin also `us`, `1` and `%`; None for any other."""
+    """Return the unit of counts that is stated for a signal: `counts`, or for a fin also `us`, `1` and `%`; None for others."""
     signal = signal_of(signal)
     if unit is None or signal not in COUNTED or unit == COUNTS:
         return unit if signal in COUNTED else None
@@ -58,7 +58,7 @@ def counts_unit(signal: str, unit: str | None) -> str | None:
 def servo_of(values: FloatArray) -> Servo | None:
     """Return the kind of counts that numbers (n,) are, by their size; None where they are none.
 
-    Counts are whole, lie to one side of zero, and about the centre of their kind.
+    Counts are whole numbers that are not negative, and their mean is near the centre of their kind.
     """
     seen = values[np.isfinite(values)]
     if not seen.size or float(np.ptp(seen)) == 0.0 or not bool((seen == np.round(seen)).all()):
@@ -74,7 +74,7 @@ def servo_of(values: FloatArray) -> Servo | None:
 def turned_from_counts(
     signal: str, values: FloatArray, unit: str, centre: float | None, scale: float | None
 ) -> tuple[FloatArray, list[Note]]:
-    """Return the angle (n,) in rad of a fin's counts, or a motor's counts from its centre, and a note on what was taken."""
+    """Return the angle (n,) in rad of a fin's counts, or a motor's counts from its centre, and a note on an assumed scale."""
     servo = BY_UNIT.get(unit) or next((s for s in SERVOS if s.centre == centre), None) or servo_of(values)
     middle = centre if centre is not None else servo.centre if servo is not None else 0.0
     if signal_of(signal) not in FINS:
@@ -82,13 +82,13 @@ def turned_from_counts(
     if scale is not None:
         return (values - middle) * scale, []
     travel = servo.travel if servo is not None else max(float(np.nanmax(np.abs(values - middle), initial=0.0)), 1.0)
-    taken = FULL_RAD / travel
+    guess = FULL_RAD / travel
     message = (
-        f"{signal} is in {_called(unit, middle)}, and what one is worth is not known: taken as {math.degrees(taken):.3g} deg; "
+        f"{signal} is in {_in_words(unit, middle)}, and what one is worth is not known: taken as {math.degrees(guess):.3g} deg; "
         "the fin's authority is per count then: set `scale`, in rad a count, from the servo's range"
     )
-    return (values - middle) * taken, [Note(COUNTS, message, {"signal": signal, "centre": middle, "scale": taken})]
+    return (values - middle) * guess, [Note(COUNTS, message, {"signal": signal, "centre": middle, "scale": guess})]
 
 
-def _called(unit: str, middle: float) -> str:
+def _in_words(unit: str, middle: float) -> str:
     return f"counts about {middle:g}" if unit == COUNTS else f"{BY_UNIT[unit].says}"

@@ -1,4 +1,4 @@
-"""Units of logs and their conversion to SI and radians, once, at import.
+"""Units of logs and their conversion to SI and radians, which is done once, at import.
 
 A unit is a dimension and a factor: value in SI = factor x value. Column names may end in a unit
 (`yaw_deg`, `yaw_rate_deg_s`, `surge_kn`), which is then converted without a mapping.
@@ -35,12 +35,12 @@ class Unit:
 
 
 UNIT_LIMIT = 0.15
-"""By how much of itself a ratio may be off that of a unit, and the signal still be in it."""
+"""Largest relative difference of a measured ratio from the factor of a unit at which the signal may still be in that unit."""
 CLEARLY = 2.0
-"""How many times as near, or as much explained, as by the next the best must be: a unit, a heading, a fin (4.8 to 20 times on six
-zigzags of ships)."""
+"""Factor by which the best candidate (a unit, a heading, a fin) must be better than the second best to be taken. On six zigzags
+of ships it was 4.8 to 20."""
 
-_PLAIN: Mapping[str, Mapping[str, tuple[float, str]]] = {
+_SIMPLE: Mapping[str, Mapping[str, tuple[float, str]]] = {
     "angle": {
         "rad": (1.0, "radian radians rads"),
         "deg": (DEGREE, "degree degrees degs grad"),
@@ -85,7 +85,7 @@ _PLAIN: Mapping[str, Mapping[str, tuple[float, str]]] = {
     "ratio": {"1": (1.0, "- ratio"), "%": (1e-2, "percent percentage pct perc")},
     "force": {"N": (1.0, "newton newtons"), "kN": (1e3, ""), "kgf": (GRAVITY, "")},
 }
-"""Units by dimension: the factor to SI, and how else they are spelled."""
+"""Units by dimension: the factor to SI, and other spellings."""
 _QUOTIENTS: Mapping[str, Mapping[str, str]] = {
     "angle rate": {
         "rad/s": "", "deg/s": "dps", "mrad/s": "", "mdeg/s": "mdps", "cdeg/s": "", "deg/min": "dpm", "deg/h": "dph",
@@ -95,7 +95,7 @@ _QUOTIENTS: Mapping[str, Mapping[str, str]] = {
         "m/s": "", "cm/s": "", "mm/s": "", "km/h": "kph", "ft/s": "fps", "ft/min": "fpm", "m/min": "",
     },
 }  # fmt: skip
-"""Units that are one by a time; their spellings are those of both, with `/`, `p`, `per` or nothing between."""
+"""Units divided by a unit of time; their spellings combine those of both, with `/`, `p`, `per` or nothing between."""
 _NAMED: Mapping[str, Mapping[str, tuple[float, str]]] = {
     "angle rate": {"rpm": (math.pi / 30, "1/min rev/min revs/min rpms")},
     "speed": {"kn": (KNOT, "kt kts kns knot knots nmi/h"), "mph": (1609.344 / 3600.0, "mi/h mile/h miles/h")},
@@ -104,13 +104,13 @@ _ORDER = ("angle", "angle rate", "speed", "length", "pressure", "time", "ratio",
 
 
 def _spelled() -> Iterator[tuple[Unit, set[str]]]:
-    """Yield every unit with its spellings, folded."""
-    plain = {name: (*of, dimension) for dimension, units in _PLAIN.items() for name, of in units.items()}
+    """Yield every unit with its spellings in the form of `folded`."""
+    simple = {name: (*of, dimension) for dimension, units in _SIMPLE.items() for name, of in units.items()}
     for dimension in _ORDER:
-        for name, (factor, others) in {**_PLAIN.get(dimension, {}), **_NAMED.get(dimension, {})}.items():
+        for name, (factor, others) in {**_SIMPLE.get(dimension, {}), **_NAMED.get(dimension, {})}.items():
             yield Unit(name, dimension, factor), {folded(name), *others.split()}
         for name, others in _QUOTIENTS.get(dimension, {}).items():
-            above, below = (plain[part] for part in name.split("/"))
+            above, below = (simple[part] for part in name.split("/"))
             over, under = ({part, *of[1].split()} for part, of in zip(name.split("/"), (above, below), strict=True))
             made = {f"{a}{by}{b}" for a in over for b in under for by in ("/", "", "p")}
             yield Unit(name, dimension, above[0] / below[0]), made | set(others.split())
@@ -124,7 +124,7 @@ _MULTIPLE = re.compile(r"(?P<number>\d*\.?\d+(?:[eE][+-]?\d+)?)\s*[*x·]?\s*(?P<
 
 
 def folded(text: str) -> str:
-    """Return a unit's spelling without what writers differ in: case, blanks, `per`, `^-1`, degree sign and micro."""
+    """Return a unit's spelling in one common form of case, blanks, `per`, `^-1`, degree sign and micro."""
     plain = text.strip().lower()
     for mark, word in _MARKS:
         plain = plain.replace(mark, word)
@@ -137,13 +137,13 @@ UNITS: Mapping[str, Unit] = MappingProxyType({unit.name: unit for unit, _ in _AL
 SPELLINGS: Mapping[str, Mapping[str, Unit]] = MappingProxyType(
     {d: MappingProxyType({text: u for u, texts in _ALL if u.dimension == d for text in texts}) for d in _ORDER}
 )
-"""Units by dimension and folded spelling: `ms` is of a time what it is not of a speed."""
+"""Units by dimension and folded spelling, because `ms` of a time means another unit than `ms` of a speed."""
 
 _DIMENSION_OF = {"rad": "angle", "rad/s": "angle rate", "m": "length", "m/s": "speed", "1": "ratio", "1/min": "angle rate"}
 
 
 def pick_unit(name: str, dimension: str | None = None) -> Unit:
-    """Return a unit by name or common spelling (`degrees`, `°/s`, `knots`), of a dimension where it is of several.
+    """Return a unit by name or common spelling (`degrees`, `°/s`, `knots`), of `dimension` where several have that spelling.
 
     Raises MappingError with the near matches.
     """
@@ -154,9 +154,9 @@ def pick_unit(name: str, dimension: str | None = None) -> Unit:
 
 
 def find_unit(name: str, dimension: str | None = None) -> Unit | None:
-    """Return a unit by name or common spelling, or a multiple of one, as `0.1 deg`; None where it is none.
+    """Return a unit by name or common spelling, or a multiple of one, such as `0.1 deg`; None where the text is no unit.
 
-    Of a spelling that several dimensions have, as `ms`, that of the one given is taken.
+    Where several dimensions have the spelling, such as `ms`, the unit of `dimension` is returned.
     """
     plain, spelling = name.strip(), folded(name)
     if dimension is not None and spelling in SPELLINGS[dimension]:
@@ -168,14 +168,14 @@ def find_unit(name: str, dimension: str | None = None) -> Unit | None:
 
 
 def dimension_of(signal: str) -> str | None:
-    """Return the dimension of a canonical signal, or an entry of its sum; None for `thrust`, of any unit, and what is none."""
+    """Return the dimension of a canonical signal or of a term of its sum; None for `thrust`, which takes any unit, and others."""
     return _DIMENSION_OF.get(COLUMNS.get(signal_of(signal), ""))
 
 
 def factor_to(signal: str, unit: str) -> float:
-    """Return the factor from a unit to a canonical signal's own; raises MappingError where the unit cannot be meant.
+    """Return the factor from a unit to that of a canonical signal; raises MappingError where the dimensions differ.
 
-    `thrust` takes any unit and is left as it is. Pressure for `depth_m` is not a factor: see depth_of_pressure.
+    `thrust` takes any unit and has the factor 1. Pressure for `depth_m` is not a factor: see depth_of_pressure.
     """
     dimension = dimension_of(signal)
     if dimension is None:
@@ -202,6 +202,6 @@ def depth_of_pressure(pressure_pa: FloatArray, *, density: float, surface_pa: fl
 
 
 def unit_of_ratio(ratio: float, units: Mapping[str, float]) -> str | None:
-    """Return the unit whose factor the ratio of what is true to what is said is near to, and clearly nearer than to others'."""
+    """Return the unit whose factor is near to the ratio of true to stated values, and clearly nearer than that of any other."""
     off = sorted((abs(ratio / factor - 1.0), name) for name, factor in units.items())
     return off[0][1] if off[0][0] < min(UNIT_LIMIT, off[1][0] / CLEARLY) else None

@@ -1,1 +1,1 @@
-"""Numbers of a log that are no measurements: spikes, and what a logger writes where a sensor has nothing."""
+"""Find numbers of a log that are no measurements: spikes, repeats, and fill values of a sensor without a reading."""

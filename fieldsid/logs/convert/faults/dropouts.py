@@ -1,9 +1,9 @@
-"""A sensor that falls to one and the same number, time and again: zeros of a lost lock, -999 and 9999 of a logger.
+"""Find drop-outs: one fill value to which a sensor jumps repeatedly, such as 0 without a satellite fix, or -999 of a logger.
 
-What moves with noise comes back to one number to the last bit by chance only where its digits are few. A number to which a signal
-jumps, from beyond what its noise explains, and from which it jumps back is no measurement, where it does so oftener than chance:
-how many numbers there are to land on is told by how often the other jumps land on the same one, and a number at which the signal
-rests is one that many jumps end at.
+A noisy signal returns to exactly the same number by chance only where its digits are few. A number is a fill value if the signal
+jumps to it and back by more than its noise explains, and more often than by chance. The chance follows from how many different
+numbers the jumps could reach, which is estimated from how often the other jumps reach equal numbers. A number that the signal
+often has, because it rests there, is expected at the end of many jumps, and is no fill value.
 """
 
 from __future__ import annotations
@@ -18,34 +18,34 @@ from fieldsid.logs.run import FINS, MEASURED, SIGNALS, Note
 from fieldsid.numerics.arrays import FloatArray
 
 MOST_CHANCE = 1e-3
-"""Chance, of any number at all, that jumps land on it as often, above which it is one of few digits."""
+"""Largest probability of so many jumps to one number by chance at which that number is a fill value."""
 FEWEST = 3
-"""Jumps to one number from which on it is a drop-out; a spike may stand alone."""
+"""Smallest number of jumps to one number for a drop-out; fewer may be spikes."""
 SENSED = MEASURED - {*FINS}
-"""A fin jumps, and to the same angles."""
+"""Signals that are searched for drop-outs: not the fins, which jump to the same angles again and again."""
 
 
 def _chance(count: int, others: npt.NDArray[np.intp]) -> float:
-    """Return the chance that some number is landed on `count` times, where others are by `others` (k,) times each.
+    """Return the probability that any number ends `count` jumps by chance, where each other number ends `others` (k,) jumps.
 
-    Of N jumps to V equally likely numbers, N (N - 1) / V ordered pairs land on the same: that gives V.
+    Of N jumps to V equally likely numbers, N (N - 1) / V ordered pairs end at the same number, which gives V.
     """
     jumps, pairs = int(others.sum()), int((others * (others - 1)).sum())
     if pairs == 0:
         return 0.0
     numbers = jumps * (jumps - 1) / pairs
-    return numbers * _as_many(count, (jumps + count) / numbers)
+    return numbers * _chance_of_as_many(count, (jumps + count) / numbers)
 
 
-def _as_many(count: int, usual: float) -> float:
-    """Return the chance of `count` events or more where `usual` are expected (Poisson)."""
-    return max(1.0 - sum(math.exp(-usual + i * math.log(usual) - math.lgamma(i + 1)) for i in range(count)), 0.0)
+def _chance_of_as_many(count: int, expected: float) -> float:
+    """Return the probability of `count` or more events with a mean number of `expected` (Poisson)."""
+    return max(1.0 - sum(math.exp(-expected + i * math.log(expected) - math.lgamma(i + 1)) for i in range(count)), 0.0)
 
 
 def _note(name: str, number: float, count: int, samples: int) -> Note:
     """Return the finding that a signal jumps to one number and back so often, and how many samples it has."""
     unit, shown = SIGNALS[name], f"{number:.6g}"
-    if unit in ("rad", "rad/s"):  # most logs have it in degrees
+    if unit in ("rad", "rad/s"):  # most logs have the number in degrees
         shown += f" {unit} ({math.degrees(number):.6g} {unit.replace('rad', 'deg')})"
     message = (
         f"{name} jumps to exactly {shown} and back {count} times, {samples} samples in all (limit {FEWEST}): what "
@@ -65,21 +65,21 @@ def without_dropouts(name: str, values: FloatArray) -> tuple[FloatArray, list[No
 
 @np.errstate(over="ignore", invalid="ignore")
 def _dropout_of(values: FloatArray) -> tuple[float, int, int] | None:
-    """Return the number to which a signal (n,) without gaps jumps and back again, how often, and its samples; None for none."""
+    """Return the fill value of a signal (n,) without gaps, its number of jumps and of samples; None where there is none."""
     if values.size < 20:
         return None
     steps = np.diff(values)
-    usual = float(np.median(np.abs(np.diff(values, 2))))
-    limit = max(SPREADS * OF_MEDIAN * usual, DIGITS * last_digit(values), 1e-12)
+    bend = float(np.median(np.abs(np.diff(values, 2))))
+    limit = max(SPREADS * OF_MEDIAN * bend, DIGITS * last_digit(values), 1e-12)
     far = np.flatnonzero(np.abs(steps) > limit)
     if far.size < 2 * FEWEST:
         return None
-    numbers, counts = np.unique(values[far + 1] + 0.0, return_counts=True)  # a zero has no sign
+    numbers, counts = np.unique(values[far + 1] + 0.0, return_counts=True)  # + 0.0 makes -0.0 equal to 0.0
     k = int(np.argmax(counts))
     number, count = float(numbers[k]), int(counts[k])
-    left = int(np.count_nonzero(values[far] == number))
+    jumps_back = int(np.count_nonzero(values[far] == number))
     samples = int(np.count_nonzero(values == number))
-    chance = max(_chance(count, np.delete(counts, k)), _as_many(count, far.size * samples / values.size))
-    if count < FEWEST or left < FEWEST - 1 or chance > MOST_CHANCE:
+    chance = max(_chance(count, np.delete(counts, k)), _chance_of_as_many(count, far.size * samples / values.size))
+    if count < FEWEST or jumps_back < FEWEST - 1 or chance > MOST_CHANCE:
         return None
     return number, count, samples

@@ -1,9 +1,9 @@
-"""An end of the heading's range, 0 or 360 deg, that stands where a compass read failed, told from a heading that is there.
+"""Find fill values of a compass at an end of the heading's range, 0 or 360 deg, and distinguish them from true headings.
 
-A heading comes to an end of its range and goes on behind it: seen around the circle it makes no jump. One that stands there for
-nothing jumps there and back time and again, always to the same number, and the samples between, by themselves, go on as if
-it were not there. A heading held at its wrap and interpolated the long way round (`heading_unwrap.py`) does not: there what lies
-between two visits of the end goes on from nothing.
+A true heading that reaches an end of its range continues at the other end: modulo one turn it does not jump. A fill value makes
+the heading jump to the same number and back again and again, while the samples between the fills, taken alone, form a
+continuous heading. This does not hold for a heading that stays near its wrap and was interpolated the long way round
+(`heading_unwrap.py`): the samples between its visits of the end do not continue one another.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 END_RAD = 1e-6
-"""How far from a multiple of a right angle, which every frame makes of it, an end of the range may be."""
+"""Largest distance of a fill value from a multiple of a right angle; every frame turns an end of the range into one."""
 GOES_ON = 0.8
-"""Share of them over which the other samples must go on."""
+"""Smallest share of the jumps across which the other samples must form a continuous heading."""
 MOSTLY = 0.5
-"""Share of the samples between the first and the last visit from which on the heading itself is at the end."""
+"""Largest share of fill values among the samples from the first to the last; above it the vehicle is on that heading."""
 FAST = 0.95
-"""Share of the steps below the fastest motion that is reckoned with; half of it again is allowed."""
+"""Quantile of the heading's rates that is taken for the fastest motion; 1.5 times as fast is still allowed."""
 
 
 def without_fills(heading: Track) -> tuple[Track, list[Note]]:
@@ -58,7 +58,7 @@ def _note(end: float, count: int, of: int) -> Note:
 
 @np.errstate(over="ignore", invalid="ignore")
 def _fills(time: FloatArray, values: FloatArray, end: float) -> BoolArray:
-    """Return which samples (n,) are a fill at an end of the range."""
+    """Return a mask (n,) of the samples that are fill values at an end of the range."""
     at_end = values == end
     begins, stops = blocks_of(at_end)
     inside = (begins > 0) & (stops < values.size)
@@ -73,14 +73,14 @@ def _fills(time: FloatArray, values: FloatArray, end: float) -> BoolArray:
         np.abs(within_half_turn(values[after] - end)) > least + FASTEST_RAD_S * (time[after] - time[after - 1])
     )
     fastest = 1.5 * float(np.quantile(np.abs(steps) / dt, FAST))
-    over = np.abs(within_half_turn(values[after] - values[before])) <= least + fastest * (time[after] - time[before])
-    if jumped.sum() < FEWEST or over[jumped].mean() < GOES_ON:
+    across = np.abs(within_half_turn(values[after] - values[before])) <= least + fastest * (time[after] - time[before])
+    if jumped.sum() < FEWEST or across[jumped].mean() < GOES_ON:
         return none
     return np.asarray(at_end & _far(values, others, end, least))
 
 
 def _far(values: FloatArray, others: npt.NDArray[np.intp], end: float, least: float) -> BoolArray:
-    """Return the samples (n,) beside which, before or after, the heading was away from an end of its range."""
+    """Return a mask (n,) of the samples whose neighbours, not counting fills, include one away from that end of the range."""
     low = np.searchsorted(others, np.arange(values.size)).clip(1, others.size - 1)
     off = np.abs(within_half_turn(values[others] - end))
     return np.asarray((off[low - 1] > least) | (off[low] > least))

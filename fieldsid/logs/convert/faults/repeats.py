@@ -1,6 +1,7 @@
-"""A sensor slower than its table's rows, whose last number is repeated until the next: a repeat is no measurement.
+"""Find the repeats of a sensor that is slower than the rows of its table; a repeated number is no new measurement.
 
-Fitted as one, the signal would be late by half of its own step, and its noise would count several times.
+If the repeats were fitted as measurements, the signal would be late by half a step of the sensor, and the noise of each
+measurement would be counted several times.
 """
 
 from __future__ import annotations
@@ -12,31 +13,31 @@ from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
 FEWEST = 10
-"""Changes from which on their places are judged."""
+"""Smallest number of changes from which the sensor's interval is estimated."""
 
 
 def without_repeats(name: str, values: FloatArray) -> tuple[FloatArray, list[Note]]:
-    """Return a signal (n,) with the repeats of its slower sensor missing, and the note that says so; itself where it has none."""
+    """Return a signal (n,) with the repeats of its slower sensor as NaN, and a note; unchanged where it has none."""
     seen = np.flatnonzero(np.isfinite(values))
     changed = np.flatnonzero(np.diff(values[seen]) != 0.0)
-    every = _held_for(changed)
+    every = _rows_per_measurement(changed)
     if every == 1:
         return values, []
-    own = np.full(values.shape, np.nan)
+    measured = np.full(values.shape, np.nan)
     fresh = seen[(changed[0] + 1) % every :: every]
-    own[fresh] = values[fresh]
+    measured[fresh] = values[fresh]
     message = (
         f"{name} changes at every {every}th sample only ({changed.size} times): it was taken at a lower rate, and repeated until "
         "the next; the repeats are missing now"
     )
-    return own, [Note("repeated", message, {"signal": name, "value": every, "count": changed.size})]
+    return measured, [Note("repeated", message, {"signal": name, "value": every, "count": changed.size})]
 
 
-def _held_for(changed: npt.NDArray[np.intp]) -> int:
-    """Return for how many samples numbers are held, by the places (k,) before a change; 1 where it is not for always as many.
+def _rows_per_measurement(changed: npt.NDArray[np.intp]) -> int:
+    """Return the number of rows per measurement, by the indices (k,) before each change; 1 where it is not constant.
 
-    That k changes fall on every m-th sample by chance has the probability m^(1-k): ten are no chance. A number that comes twice
-    is held for twice as long.
+    k changes fall on multiples of m rows by chance with the probability m^(1-k), which is negligible for ten. Two equal
+    measurements in succession give an interval of 2 m rows, so that m is the greatest common divisor of the intervals.
     """
     if changed.size < FEWEST:
         return 1

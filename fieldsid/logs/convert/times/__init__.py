@@ -1,1 +1,1 @@
-"""Times of a table as seconds that go on."""
+"""Convert the times of a table to seconds that increase throughout."""

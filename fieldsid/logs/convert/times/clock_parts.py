@@ -1,7 +1,7 @@
-"""A time whose parts are columns of their own: `hours`, `minutes` and `seconds`, `hhmm` and `seconds`, `secs` and `nsecs`.
+"""Combine a time whose parts are in separate columns: `hours`, `minutes`, `seconds`; `hhmm`, `seconds`; `secs`, `nsecs`.
 
-A form names the part of each column, as `hh+mm+ss`: the time is their sum. Of a clock in parts the lower one falls back where
-the higher goes on by one, which tells it from columns that are only called so, as the hours that a battery lasts.
+A form such as `hh+mm+ss` names the part in each column, and the time is their sum. In a clock the lower part falls back where
+the higher one increases by one; columns that only have the name of a part, such as the hours that a battery lasts, do not.
 """
 
 from __future__ import annotations
@@ -17,14 +17,23 @@ import numpy.typing as npt
 
 from fieldsid.errors import MappingError
 from fieldsid.logs.convert.number_cells import as_numbers
-from fieldsid.logs.convert.times.clock_text import DAY_S, FORMS, HOUR_S, MINUTE_S, Clock, clock_of_digits, clock_of_text, going_on
+from fieldsid.logs.convert.times.clock_text import (
+    DAY_S,
+    FORMS,
+    HOUR_S,
+    MINUTE_S,
+    Clock,
+    clock_of_digits,
+    clock_of_text,
+    made_continuous,
+)
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """What a number of a column is worth in s, and the s after which the column starts again."""
+    """The duration in s of one unit of a column, and the period in s after which the column starts again from zero."""
 
     worth_s: float
     period_s: float
@@ -45,14 +54,17 @@ PARTS: Mapping[str, Part] = MappingProxyType(
         **{form: Part(1.0, period) for form, period in FORMS.items()},
     }
 )
-"""What a column may be of a time that several make up: `s` are seconds that do not start again, `ss` those of a minute."""
+"""Parts of a time in several columns: `s` are seconds that never start again, `ss` are the seconds of a minute."""
 PLUS = "+"
 MOSTLY = 0.9
-"""Share of the places where a part falls back or goes on at which their sum must go on: in a damaged log not at each."""
+"""Smallest share, among the changes of the upper part and the falls of the lower one, at which their sum must not decrease.
+
+It is below one because a damaged log has exceptions.
+"""
 
 
 def parts_of(form: str | None, columns: Sequence[str | int], place: str = "the mapping") -> tuple[str, ...]:
-    """Return the part that each column is, of a form as `hh+mm+ss`; raises MappingError where it does not fit."""
+    """Return the part in each column by a form such as `hh+mm+ss`; raises MappingError where the form does not fit."""
     parts = tuple(part.strip() for part in (form or "").split(PLUS))
     unknown = [part for part in parts if part not in PARTS]
     if not unknown and len(parts) == len(columns):
@@ -66,7 +78,7 @@ def parts_of(form: str | None, columns: Sequence[str | int], place: str = "the m
 
 
 def seconds_of_part(cells: npt.NDArray[Any], part: str) -> FloatArray:
-    """Return what a column (n,) adds to a time in s, NaN where a cell is no number."""
+    """Return the seconds (n,) that a column adds to a time, NaN where a cell is no number."""
     if part in FORMS:
         clock = clock_of_text(cells, part) if cells.dtype.kind == "O" and part != "hhmmss" else None
         return clock.seconds if clock is not None else clock_of_digits(as_numbers(cells)[0]).seconds
@@ -78,15 +90,15 @@ def seconds_of_part(cells: npt.NDArray[Any], part: str) -> FloatArray:
 
 
 def clock_of_parts(columns: Sequence[npt.NDArray[Any]], parts: Sequence[str]) -> Clock:
-    """Return the clock that several columns (n,) make up, the one that counts longest first."""
+    """Return the clock that is the sum of several columns (n,)."""
     seconds = sum((seconds_of_part(cells, part) for cells, part in zip(columns, parts, strict=True)), np.zeros(columns[0].size))
     return Clock(np.asarray(seconds), max(PARTS[part].period_s for part in parts))
 
 
 def carries(upper: FloatArray, lower: FloatArray, upper_period_s: float, lower_period_s: float) -> bool:
-    """Whether one part of a clock (n,) in s goes on where a lower one falls back, and nowhere else but over gaps.
+    """Whether an upper part of a clock (n,) in s increases where a lower one falls back, and elsewhere only across gaps.
 
-    The upper one is a whole number of the lower's rounds, and the lower lies within one.
+    The upper part must be a multiple of the lower one's period, and the lower part must lie within one period.
     """
     seen = np.isfinite(upper) & np.isfinite(lower)
     high, low = upper[seen] / lower_period_s, lower[seen]
@@ -94,7 +106,7 @@ def carries(upper: FloatArray, lower: FloatArray, upper_period_s: float, lower_p
         return False
     if float(low.min()) < 0.0 or float(low.max()) > lower_period_s:
         return False
-    steps = np.diff(going_on(upper[seen] + low, upper_period_s)[0])
+    steps = np.diff(made_continuous(upper[seen] + low, upper_period_s)[0])
     falls, changes = np.diff(low) < -0.5 * lower_period_s, np.diff(high) != 0.0
     either = falls | changes
     if not either.any():
@@ -104,7 +116,7 @@ def carries(upper: FloatArray, lower: FloatArray, upper_period_s: float, lower_p
 
 
 def put_together(names: Sequence[str], parts: Sequence[str], dates: Sequence[str]) -> Note:
-    """Return the note that says of which columns a time is the sum."""
+    """Return the note that states which columns were added up to a time."""
     columns = [f"`{name}` ({part})" for name, part in zip(names, parts, strict=True)]
     days = f", and the days from {', '.join(f'`{name}`' for name in dates)}" if dates else ""
     message = f"the time is put together from {', '.join(columns)}{days}"

@@ -1,10 +1,10 @@
-"""Times written as on a clock: `hh:mm:ss.s`, `mm:ss.s` that starts again each hour, dates before or beside them.
+"""Read times written as on a clock: `hh:mm:ss.s`, or `mm:ss.s` that starts again each hour, with or without dates.
 
-What a clock leaves out is put back by its going on: where it falls back by more than half of what it counts to (a day, or an
-hour where a spreadsheet has dropped the hours), the next one has begun. So do numbers of time that start again with each minute,
-hour, day or week, or where a counter of 16 or 32 bits is full. What has passed between the last number and the first of the next
-round is a step of the log like its others, which tells such a round from a clock that was set back: of two logs in one file the
-second starts anywhere.
+A clock that starts again is made continuous: where it falls back by more than half of its period (a day, or an hour where a
+spreadsheet has dropped the hours), the next period has begun. The same is done for numbers of time that start again with each
+minute, hour, day or week, or at the overflow of a counter of 16 or 32 bits. There the step across the restart must be like the
+other steps of the log. This distinguishes a restart from a clock that was set back, and from two logs in one file, of which the
+second may start at any time.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from fieldsid.numerics.arrays import FloatArray
 MINUTE_S, HOUR_S, DAY_S, WEEK_S = 60.0, 3600.0, 86400.0, 604800.0
 STAMP = "yyyymmddhhmmss"
 FORMS = {"hh:mm:ss": DAY_S, "mm:ss": HOUR_S, "hh:mm": DAY_S, "hhmmss": DAY_S, STAMP: np.inf}
-"""How a clock may be written where a mapping says so as the unit of time, and the seconds after which it starts again."""
+"""Forms of a clock that a mapping may state as the unit of time, each with the period in s after which it starts again."""
 CLOCK = re.compile(
     r"(?:(\d+) days? )?(?:(\d{1,3}):)?(\d{1,3}):(\d{1,2}(?:[.,]\d*|:\d{3})?)"
     r"\s*(?:([AaPp])\.?[Mm]\.?)?\s*(?:Z|[A-Z]{3,4})?"
 )
-"""Days that have passed, hours, minutes, seconds, half of the day, and a time zone, which all cells share."""
+"""Elapsed days, hours, minutes, seconds, am or pm, and a time zone, which is ignored because all cells have the same."""
 IN_WORDS = (
     "%a %b %d %H:%M:%S %Y", "%b %d, %Y %I:%M:%S.%f %p", "%b %d, %Y %I:%M:%S %p", "%b %d, %Y %H:%M:%S.%f", "%b %d, %Y %H:%M:%S",
     "%a, %d %b %Y %H:%M:%S",
@@ -39,14 +39,14 @@ IN_WORDS = (
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """Seconds (n,) that a clock shows, NaN where a cell is none, and those after which it starts again."""
+    """The readings (n,) of a clock in s, NaN where a cell is none, and the period in s after which it starts again."""
 
     seconds: FloatArray
     period_s: float
 
 
 def clock_of_text(cells: npt.NDArray[Any], form: str | None = None) -> Clock | None:
-    """Return what a column of clock readings shows; None where less than half of the cells are readings."""
+    """Return the clock of a column of readings; None unless more than half of the cells are readings."""
     parts = texts(cells).str.extract(f"^{CLOCK.pattern}$")
     numbers = (parts[i].str.replace(r"[,:]", ".", regex=True) for i in range(4))
     day, first, second, third = (n.astype("float64").to_numpy(na_value=np.nan) for n in numbers)
@@ -63,7 +63,7 @@ def clock_of_text(cells: npt.NDArray[Any], form: str | None = None) -> Clock | N
 
 
 def clock_of_digits(numbers: FloatArray) -> Clock:
-    """Return what readings written as one number show: 142018.5 is 14:20:18.5."""
+    """Return the clock of readings written as one number: 142018.5 is 14:20:18.5."""
     hours, minutes = np.floor(numbers / 1e4), np.floor(numbers / 1e2) % 100.0
     return Clock(HOUR_S * hours + 60.0 * minutes + numbers % 100.0, DAY_S)
 
@@ -71,7 +71,7 @@ def clock_of_digits(numbers: FloatArray) -> Clock:
 def clock_of_stamps(cells: npt.NDArray[Any]) -> Clock | None:
     """Return the clock of dates and times as one number, as 20240301142018.5, or 20240301142018500 with milliseconds.
 
-    None where less than half are dates.
+    None where less than half of the cells are dates.
     """
     numbers = cells if cells.dtype.kind in "iu" else as_numbers(cells)[0]
     worth = 1000 if float(np.nanmax(numbers)) > 1e15 else 1
@@ -82,20 +82,20 @@ def clock_of_stamps(cells: npt.NDArray[Any]) -> Clock | None:
     return Clock(DAY_S * days + clock.seconds + (numbers % worth / worth if worth > 1 else 0.0), np.inf)
 
 
-def going_on(seconds: FloatArray, period_s: float) -> tuple[FloatArray, int]:
-    """Return a clock (n,) that does not start again each `period_s`, and how often it did."""
+def made_continuous(seconds: FloatArray, period_s: float) -> tuple[FloatArray, int]:
+    """Return the readings (n,) of a clock made continuous over its restarts each `period_s`, and the number of restarts."""
     seen = np.isfinite(seconds)
     steps = np.diff(seconds[seen], prepend=seconds[seen][:1])
     rounds = np.cumsum(steps < -0.5 * period_s)
     if not rounds.size or not rounds[-1]:
         return seconds, 0
-    whole = seconds.copy()
-    whole[seen] += period_s * rounds
-    return whole, int(rounds[-1])
+    continuous = seconds.copy()
+    continuous[seen] += period_s * rounds
+    return continuous, int(rounds[-1])
 
 
 def stamps_of_text(cells: npt.NDArray[Any]) -> FloatArray | None:
-    """Return the seconds (n,) since 1970 of cells with a date and a clock in one; None where less than half are."""
+    """Return the seconds (n,) since 1970 of cells with a date and a clock; None where less than half of the cells are such."""
     halves = _halves(cells)
     days = days_of(halves[0]) if halves is not None else None
     clock = _of_a_day(halves[1]) if halves is not None and days is not None else None
@@ -103,20 +103,20 @@ def stamps_of_text(cells: npt.NDArray[Any]) -> FloatArray | None:
 
 
 def clock_behind_dates(cells: npt.NDArray[Any]) -> Clock | None:
-    """Return the clock (n,) behind dates that no calendar has, as 31 November: of a logger that was never told the day."""
+    """Return the clock (n,) after impossible dates such as 31 November, which a logger writes whose date was never set."""
     halves = _halves(cells)
     is_dated = halves is not None and texts(halves[0]).str.fullmatch(DATE.pattern).mean() > MOSTLY
     return _of_a_day(halves[1]) if halves is not None and is_dated else None
 
 
 def _halves(cells: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], npt.NDArray[Any]] | None:
-    """Return what stands before the first blank between digits of cells, and what behind it (n,); None where there is none."""
+    """Return the parts (n,) of cells before and after the first blank or T between digits; None where there is none."""
     parts = texts(cells).str.split(r"(?<=\d)[ T_]+(?=\d)", n=1, regex=True, expand=True)
     return None if parts.shape[1] != 2 else (parts[0].to_numpy(dtype=object), parts[1].to_numpy(dtype=object))
 
 
 def _of_a_day(cells: npt.NDArray[Any]) -> Clock | None:
-    """Return the clock behind a date, which counts hours whether it tells seconds or not, or is digits alone."""
+    """Return the clock after a date: hours and minutes with or without seconds, or digits alone; None where it is none."""
     clock = clock_of_text(cells)
     if clock is not None:
         return clock if clock.period_s != HOUR_S else clock_of_text(cells, "hh:mm")
@@ -125,33 +125,33 @@ def _of_a_day(cells: npt.NDArray[Any]) -> Clock | None:
 
 
 def _in_words(cells: npt.NDArray[Any]) -> FloatArray | None:
-    """Return the seconds (n,) since 1970 of dates that name the month before the day; None where less than half are."""
+    """Return the seconds (n,) since 1970 of dates in the forms of IN_WORDS; None where less than half of the cells are such."""
     stamps = stamps_in(texts(cells), IN_WORDS)
     return None if stamps is None else np.where(np.isnat(stamps), np.nan, stamps.astype(np.int64) / 1e6)
 
 
 def lost_hours(name: str, times: int, period_s: float) -> Note:
-    """Return the note that hours, or minutes too, were added to a clock without them."""
+    """Return the note that a clock has no hours, or no minutes, and how often the next one was assumed to begin."""
     counts, lacks = ("minutes and seconds", "hour") if period_s == HOUR_S else ("seconds", "minute")
     again = f"; it starts again {times} time{'s' * (times != 1)}, each taken for the next {lacks}" if times else ""
     return Note("lost_hours", f"`{name}` counts {counts}, the {lacks} is not in it{again}", {"count": times})
 
 
 FEW_STEPS = 5.0
-"""Steps of a log, or of a signal's own, that are no gap, however long they are: so many may be missing."""
+"""Multiple of the median step of a log or of a signal up to which a step is no gap, however long it is in s."""
 ROUNDS_S = {"minute": MINUTE_S, "hour": HOUR_S, "day": DAY_S, "week": WEEK_S}
 COUNTERS = {"16 bits": 2.0**16, "32 bits": 2.0**32}
-"""Numbers after which a counter starts again, whatever its unit."""
+"""Numbers after which a counter overflows, whatever its unit."""
 
 
 Round = tuple[str, float]
-"""What a time starts again with, in words, and after which number."""
+"""The period after which a time starts again: in words, and in the unit of the numbers."""
 
 
 def round_of(values: npt.NDArray[Any], factor: float) -> Round | None:
-    """Return the shortest round in which numbers (n,) of time start again, `factor` s each; None where they do not.
+    """Return the shortest period after which numbers (n,) of time start again, in units of `factor` s; None where they do not.
 
-    At most of the places where they fall back, the next round must go on with a step like the log's others.
+    At more than half of the restarts, the step into the next period must be like the other steps of the log.
     """
     steps = np.diff(values.astype(np.float64))
     ahead = steps[steps > 0.0]
@@ -166,9 +166,9 @@ def round_of(values: npt.NDArray[Any], factor: float) -> Round | None:
     return None
 
 
-def gone_on(values: FloatArray, found: Round, name: str) -> tuple[FloatArray, Note]:
-    """Return numbers (n,) of time that do not start again, and the note that says how often they did."""
+def without_restarts(values: FloatArray, found: Round, name: str) -> tuple[FloatArray, Note]:
+    """Return numbers (n,) of time made continuous over their restarts, and the note that says how often they started again."""
     words, period = found
-    whole, times = going_on(values, period)
+    continuous, times = made_continuous(values, period)
     message = f"`{name}` starts again {words}, {times} time{'s' * (times != 1)}: taken for one time that goes on"
-    return whole, Note("starts_again", message, {"count": times, "period": period})
+    return continuous, Note("starts_again", message, {"count": times, "period": period})

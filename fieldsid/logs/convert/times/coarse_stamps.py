@@ -1,9 +1,9 @@
-"""Stamps with too few digits, whose samples share them: the even steps of the logger that they were rounded from.
+"""Rebuild stamps with too few digits, which several samples share, from the even steps of the logger.
 
-A logger of an even step writes t0 + k T, rounded to a digit: whole seconds of an epoch, or three digits of a number that has
-grown. If one t0 and T explain every stamp of a stretch within its last digit, the samples lie there; no digit is invented
-where they do not. Steps of a clock that drifts are taken where each stamp is followed by the next one of that digit: then the
-samples of one stamp are spread to the next.
+A logger with a constant step writes t0 + k T, rounded to its last digit: whole seconds of an epoch, or three digits of a number
+that has grown. If one t0 and T explain every stamp of a stretch within its last digit, the stamps are replaced by t0 + k T; else
+they are left unchanged. For a clock that drifts no such t0 and T exist; if its stamps increase by one last digit at a time, the
+samples of each stamp are spread evenly up to the next stamp.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ from fieldsid.numerics.arrays import FloatArray
 
 FEWEST = 10
 WORN_OUT = 0.05
-"""Share of a last digit that a number's last bit may be worth, above which any number would pass for whole."""
+"""Largest share of a last digit that the last bit of a number may be worth; above it any number would count as whole."""
 DIGITS = range(2, 8)
 DECIMALS = range(-9, 9)
 WITHIN = 1.0 + 1e-6
-"""Last digits by which a stamp may be off: half of one where it was rounded, up to one where it was cut."""
+"""Largest error of a stamp in units of its last digit: half of one where it was rounded, up to one where it was truncated."""
 ROUGH = 0.25
-"""Share of a step from which on the last digit of its stamps makes steps uneven that are not."""
+"""Smallest last digit, as a share of the median step, that makes even steps look uneven."""
 SAME = 1e-3
-"""Share of a step within which stamps are at even steps already: 0.2, 0.4, 0.6 has all the digits that it needs."""
+"""Share of a step within which stamps are already at even steps: 0.2, 0.4, 0.6 have all the digits that they need."""
 MOST = 99.0
-"""Percentile of the steps up to which they tell the usual one: what is longer may be a gap."""
+"""Percentile of the steps up to which they are averaged to the usual step: longer ones may be gaps."""
 SHORT = 3.0
-"""Last digits that a stretch must go on by to tell its own step."""
+"""Smallest length of a stretch, in units of the last digit, from which its step is estimated from its stamps."""
 IN_TURN = 0.9
-"""Share of the changes of a stamp that are one last digit, from which on a clock that drifts is taken for coarse."""
+"""Smallest share of changes by exactly one last digit for the stamps of a drifting clock to be spread."""
 
 
 def rebuilt(time: FloatArray, name: str) -> tuple[FloatArray, list[Note]]:
-    """Return times (n,) with too few digits at the logger's even steps, and the note that says so; else as they are.
+    """Return times (n,) with too few digits replaced by the even steps of the logger, and a note; else the times unchanged.
 
-    `time` is in the column's own unit, from its own zero: its digits tell what it was rounded to. A row whose time is missing
-    counts as a step, where that explains the others.
+    `time` is in the unit of the column and from its zero, because its digits show how it was rounded. A row whose time is missing
+    counts as a step, if the other stamps are explained that way.
     """
     seen = np.flatnonzero(np.isfinite(time))
     stamps = time[seen]
@@ -55,9 +55,9 @@ def rebuilt(time: FloatArray, name: str) -> tuple[FloatArray, list[Note]]:
         if even is not None:
             if not shared and float(np.max(np.abs(even - stamps))) < SAME * float(np.median(steps)):
                 return time, []
-            whole = time.copy()
-            whole[seen] = even
-            return whole, [_note(name, stamps)]
+            rebuilt_time = time.copy()
+            rebuilt_time[seen] = even
+            return rebuilt_time, [_note(name, stamps)]
     return time, []
 
 
@@ -75,7 +75,10 @@ def _note(name: str, stamps: FloatArray) -> Note:
 
 
 def _last_digits(stamps: FloatArray) -> list[FloatArray]:
-    """Return what the last digit (n,) of each stamp may be worth: of so many digits in all, or behind the point."""
+    """Return candidates of the value (n,) of each stamp's last digit: by a fixed number of significant digits or decimals.
+
+    A third candidate is the smallest step, if all steps are multiples of it.
+    """
     found = []
     size = np.abs(stamps)
     with np.errstate(divide="ignore"):
@@ -92,36 +95,36 @@ def _last_digits(stamps: FloatArray) -> list[FloatArray]:
     steps = np.diff(stamps)
     ahead = steps[steps > 0.0]
     if FEWEST <= ahead.size <= 0.5 * steps.size and _whole(ahead / (least := float(ahead.min()))):
-        found.append(np.full(stamps.size, least))  # samples that were sent together have the stamp of their message
+        found.append(np.full(stamps.size, least))  # samples sent together share the stamp of their message
     return found
 
 
 def _whole(numbers: FloatArray, last_bit: float = 0.0) -> bool:
-    """Whether numbers are whole within what their last bit is worth, and not all zero for being counted in too large a unit."""
+    """Whether numbers are whole within `last_bit`, the value of their last bit, and not all zero in too large a unit."""
     if not bool(np.abs(numbers).max() >= 1.0) or last_bit > WORN_OUT:
         return False
     return bool(np.all(np.abs(numbers - np.round(numbers)) <= 1e-6 + last_bit + 1e-12 * np.abs(numbers)))
 
 
 def _even(stamps: FloatArray, last: FloatArray, rows: npt.NDArray[np.intp]) -> FloatArray | None:
-    """Return the even steps (n,) of each stretch between gaps, of stamps in these rows (n,); None where one has none."""
-    whole, steps = np.empty_like(stamps), np.diff(stamps)
+    """Return the even times (n,) of stamps in some rows (n,), for each stretch between gaps; None where a stretch has none."""
+    even, steps = np.empty_like(stamps), np.diff(stamps)
     usual = float(np.mean(steps[steps <= np.percentile(steps, MOST)]))
     gaps = [int(i) + 1 for i in np.flatnonzero(steps > 2.0 * last[1:] + FEW_STEPS * usual)]
     for begin, end in pairwise([0, *gaps, stamps.size]):
-        part = _of_stretch(stamps[begin:end], last[begin:end], usual, rows[begin:end] - rows[begin])
+        part = _even_in_stretch(stamps[begin:end], last[begin:end], usual, rows[begin:end] - rows[begin])
         if part is None:
             return None
-        whole[begin:end] = part
-    return whole if bool((np.diff(whole) > 0.0).all()) else None
+        even[begin:end] = part
+    return even if bool((np.diff(even) > 0.0).all()) else None
 
 
-def _of_stretch(stamps: FloatArray, last: FloatArray, usual: float, rows: npt.NDArray[np.intp]) -> FloatArray | None:
+def _even_in_stretch(stamps: FloatArray, last: FloatArray, usual: float, rows: npt.NDArray[np.intp]) -> FloatArray | None:
     count = rows.astype(np.float64)
     if stamps[-1] - stamps[0] < SHORT * last[-1]:
         even = stamps[0] + usual * count
     else:
-        # A stamp weighs as its last digit allows: the early ones of a number that grows are the finer ones.
+        # The weight of a stamp is the inverse of its last digit: with a fixed number of digits the early stamps are finer.
         slope, start = np.polyfit(count, stamps, 1, w=1.0 / last)
         even = start + slope * count
     if bool((np.abs(even - stamps) <= WITHIN * last).all()):
@@ -130,7 +133,7 @@ def _of_stretch(stamps: FloatArray, last: FloatArray, usual: float, rows: npt.ND
 
 
 def _spread(stamps: FloatArray, last: FloatArray) -> FloatArray | None:
-    """Return the samples of each stamp spread to the next one (n,), where the stamps follow each other digit by digit."""
+    """Return the times (n,) of samples spread evenly from each stamp to the next; None unless stamps rise by one last digit."""
     steps = np.diff(stamps)
     changed = np.flatnonzero(steps > 0.0) + 1
     if changed.size < 2 or float(np.isclose(steps[changed - 1], last[changed], rtol=1e-6).mean()) < IN_TURN:

@@ -1,4 +1,4 @@
-"""Dates as days: in one cell with any separator or as digits, or as year, month and day in columns of their own."""
+"""Convert dates to days since 1970: in one cell, with any separator or as digits, or as year, month and day in columns."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ OF_WEEK_OR_YEAR = r"\d{4}-(?:W\d\d-\d|\d{3})"
 """2024-W09-5, the fifth day of a week, and 2024-061, the 61st day of a year."""
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 MOSTLY = 0.5
-"""Share of the cells that must be of a form for a column to be taken for it."""
+"""A column has a form if more than this share of its cells has it."""
 LONGEST_YEAR = 4
 YEARS = (1970.0, 2120.0)
-"""Years of a log, the last one not among them."""
+"""Plausible years of a log, the last one excluded."""
 
 
 def days_of(cells: npt.NDArray[Any]) -> FloatArray | None:
-    """Return the days (n,) since 1970 of a column of dates, NaN where a cell is none; None where less than half are.
+    """Return the days (n,) since 1970 of a column of dates, NaN where a cell is none; None where less than half are dates.
 
-    Year, month and day as ISO 8601 has them, day before month or month before day, eight or six digits, or by
-    week or day of the year: of the orders that are dates the one which goes on with the fewest days, and month first where
-    several do.
+    Accepts year, month and day in the order of ISO 8601, day before month, month before day, eight or six digits, and week or day
+    of the year. Of several possible orders the one with the fewest cells that are no dates is taken, then the one that spans the
+    fewest days, then the one with the month first.
     """
     digits = _digits(cells)
     if digits is not None:
@@ -71,7 +71,7 @@ def texts(cells: npt.NDArray[Any]) -> Series[str]:
 
 
 def stamps_in(words: Series[str], forms: Sequence[str]) -> npt.NDArray[np.datetime64] | None:
-    """Return the stamps (n,) of texts in the first of some forms in which most are, NaT where one is not; None for none."""
+    """Return the stamps (n,) of texts by the first form that most of them have, NaT for the others; None without such a form."""
     import pandas as pd
 
     found = (pd.to_datetime(words, format=form, errors="coerce").to_numpy(dtype="datetime64[us]") for form in forms)
@@ -79,7 +79,7 @@ def stamps_in(words: Series[str], forms: Sequence[str]) -> npt.NDArray[np.dateti
 
 
 def _digits(cells: npt.NDArray[Any]) -> FloatArray | None:
-    """Return numbers (n,) of dates that are written as digits alone, None where they are written otherwise."""
+    """Return the numbers (n,) of dates that are written as digits alone; None where they are not."""
     numbers, wrong = as_numbers(cells)
     seen = numbers[np.isfinite(numbers)]
     if wrong.size > MOSTLY * cells.size or not seen.size:
@@ -88,7 +88,7 @@ def _digits(cells: npt.NDArray[Any]) -> FloatArray | None:
 
 
 def _of_digits(numbers: FloatArray) -> FloatArray | None:
-    """Return the days (n,) of 20240301 or 01032024, and of 010324 as satellite receivers write it or 240301."""
+    """Return the days (n,) of dates such as 20240301, 01032024, 240301, or 010324 as satellite receivers write it."""
     long = float(np.nanmax(numbers)) >= 1e6
     first, middle, last = np.floor(numbers / 1e4), np.floor(numbers / 1e2) % 100.0, numbers % 100.0
     orders = [(last, middle, first), (first, middle, last), (last, first, middle)]
@@ -99,18 +99,19 @@ def _of_digits(numbers: FloatArray) -> FloatArray | None:
 
 
 def _are_years(numbers: FloatArray, *, long: bool) -> bool:
-    """Whether numbers (n,) are years of a log, of four digits where they are long."""
+    """Whether most numbers (n,) are plausible years of a log, of four digits where `long`, else of two."""
     low, high = YEARS if long else (0.0, 100.0)
     return float(((numbers >= low) & (numbers < high)).mean()) > MOSTLY
 
 
 def _likeliest(orders: Sequence[tuple[FloatArray, FloatArray, FloatArray]]) -> FloatArray | None:
+    """Return the days (n,) by the likeliest of some orders of year, month and day; None where none gives a date."""
     found = [days for order in orders if np.isfinite(days := _days(*order)).any()]
     return min(found, key=lambda d: (int(np.isnan(d).sum()), float(np.nanmax(d) - np.nanmin(d)))) if found else None
 
 
 def _month_numbers(months: Series[str]) -> FloatArray:
-    """Return numbers (n,) of texts, a month's name as its number."""
+    """Return texts (n,) as numbers, with the name of a month as its number."""
     import pandas as pd
 
     named = months.str.lower().map({name: i + 1.0 for i, name in enumerate(MONTHS)})

@@ -1,4 +1,4 @@
-"""Time columns as seconds: numbers in any unit, epoch times, ISO 8601 text, clocks, and dates or GPS weeks beside them."""
+"""Convert time columns to seconds: numbers in any unit, epoch times, ISO 8601 text, clocks, with dates or GPS weeks."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from fieldsid.logs.convert.times.clock_text import (
     clock_of_digits,
     clock_of_stamps,
     clock_of_text,
-    going_on,
-    gone_on,
     lost_hours,
+    made_continuous,
     round_of,
     stamps_of_text,
+    without_restarts,
 )
 from fieldsid.logs.convert.times.coarse_stamps import rebuilt
 from fieldsid.logs.convert.times.dates import YEARS, days_of_columns, texts
@@ -39,7 +39,7 @@ from fieldsid.logs.unknown_file import COPY_AGAIN
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 EPOCH_FROM_S = 1e8
-"""A time that starts later than this many seconds (three years) counts from an epoch, not from the start of the run."""
+"""A time that starts at more than this many seconds (three years) counts from an epoch, not from the start of the run."""
 GPS_EPOCH_S = 315964800.0
 """6 January 1980, from which GPS weeks count, in seconds since 1970."""
 
@@ -56,17 +56,20 @@ class _Column:
         if self.cells.size == 0:
             raise LogError("the table has no rows", found=f"only the header, with column `{self.name}`", hint=COPY_AGAIN)
 
-    def refused(self, what: str, places: npt.NDArray[np.intp]) -> LogError:
-        """Return the error of cells at some places (k,) that are no times."""
+    def error_at(self, what: str, places: npt.NDArray[np.intp]) -> LogError:
+        """Return the error for cells at some indices (k,) that are no times."""
         found = f"{places.size} of {self.cells.size}, the first in row {int(places[0]) + 1}: {str(self.cells[places[0]])[:40]!r}"
         hint = self.options.salvaging("mend the column, or leave such rows out", 1.0 - places.size / self.cells.size)
         return LogError(f"column `{self.name}` {what}", found=found, hint=hint or "check which column is the time")
 
     def without_time(self, there: BoolArray) -> list[Note]:
-        """Return the note on rows (n,) without a time, where there are some; raises LogError unless it is asked to salvage."""
+        """Return the note on rows (n,) without a time, where there are some; raises LogError unless the options say to salvage.
+
+        `there` is the mask of the rows with a time.
+        """
         missing = np.flatnonzero(~there)
         if missing.size and not self.options.salvage:
-            raise self.refused("has rows without a time", missing)
+            raise self.error_at("has rows without a time", missing)
         message = f"rows left out because they have no time: {missing.size}"
         return [Note("no_time", message, {"count": int(missing.size)})] if missing.size else []
 
@@ -82,16 +85,16 @@ def seconds_of(
 ) -> tuple[FloatArray, list[Note]]:
     """Return a time column (n,) in s, and notes.
 
-    Numbers are in `unit` (seconds when None); text is ISO 8601, taken as UTC, a date and a clock, or a clock, to which `dates`
-    are the days (one column, or year, month and day) and `unit` may say the form, see FORMS.
-    `weeks` are GPS weeks beside the time of the week. A time that counts from an epoch or from midnight starts at zero, and the
-    note `time_origin` keeps its start. Stamps with too few digits are rebuilt, see coarse_stamps.py. Cells that are no times
-    become NaN when salvaging. Raises LogError for a cell that is no time, and MappingError for a unit that is not one of time.
+    Numbers are in `unit` (seconds when None). Text is ISO 8601, taken as UTC; or a date and a clock; or a clock, whose days are
+    in `dates` (one column, or year, month and day) and whose form `unit` may state, see FORMS. `weeks` are the GPS weeks of a
+    time of week. A time that counts from an epoch or from midnight is shifted to start at zero, and the note `time_origin` states
+    its start. Stamps with too few digits are rebuilt, see coarse_stamps.py. Cells that are no times become NaN when salvaging.
+    Raises LogError for a cell that is no time and for a unit of another dimension, MappingError for an unknown unit.
     """
     column = _Column(cells, name, options or ReadOptions())
     column.refuse_empty()
     if unit in FORMS or (dates and cells.dtype.kind == "O"):
-        return _going_on(_clock(column, unit if unit in FORMS else None), column, dates)
+        return _from_clock(_clock(column, unit if unit in FORMS else None), column, dates)
     if cells.dtype.kind == "M":
         return _of_integers(cells.astype("datetime64[ns]").astype(np.int64), 1e-9, column)
     if weeks is not None:
@@ -112,22 +115,22 @@ def seconds_of_parts(
     dates: Sequence[npt.NDArray[Any]] = (),
     date_names: Sequence[str] = (),
 ) -> tuple[FloatArray, list[Note]]:
-    """Return the time (n,) in s that several columns make up, and notes; `form` names the part of each, as `hh+mm+ss`.
+    """Return the time (n,) in s that is the sum of several columns, and notes; `form`, such as `hh+mm+ss`, names their parts.
 
-    Raises MappingError for a form that does not fit, LogError for a row that lacks a part.
+    Raises MappingError for a form that does not fit, LogError for a row in which a part is missing.
     """
     _Column(columns[0], names[0], options or ReadOptions()).refuse_empty()
     parts = parts_of(form, names)
     clock = clock_of_parts(columns, parts)
-    time, notes = _going_on(clock, _Column(clock.seconds, PLUS.join(names), options or ReadOptions()), dates)
+    time, notes = _from_clock(clock, _Column(clock.seconds, PLUS.join(names), options or ReadOptions()), dates)
     return time, [put_together(names, parts, date_names if dates else ()), *notes]
 
 
 def likely_time_unit(cells: npt.NDArray[Any], step: float = 0.0) -> str | None:
-    """Return the unit of numbers of time by their size, as an epoch has them, else by their usual step.
+    """Return the likely unit of numbers of time: by their size, which is characteristic of an epoch, else by their median step.
 
-    None where the cells are no numbers. A step that shows nothing of a vehicle's motion in seconds, and does in milliseconds or
-    less, is in those; seconds since 1970 with a fraction are what they are, however seldom a glider writes them.
+    None where the cells are no numbers. A median step too long for a vehicle's motion in seconds, but plausible in ms, us or ns,
+    is taken for that unit. Fractional seconds since 1970 are seconds, however long the steps are, as in a glider's log.
     """
     if cells.dtype.kind not in "iuf" or not cells.size or not np.isfinite(cells[0]):
         return None
@@ -144,40 +147,40 @@ def likely_time_unit(cells: npt.NDArray[Any], step: float = 0.0) -> str | None:
 
 
 def _are_digits_of_a_clock(seen: npt.NDArray[Any]) -> bool:
-    """Whether numbers (n,) are a clock's digits, as 142018.5: they jump at each full minute, and the clock does not."""
+    """Whether numbers (n,) are a clock's digits, such as 142018.5: they jump at each full minute, but the clock does not."""
     if float(seen.min(initial=0.0)) < 0.0 or float(seen.max(initial=0.0)) >= 240000.0:
         return False
     if bool((seen % 100.0 >= 60.0).any() or (np.floor(seen / 100.0) % 100.0 >= 60.0).any()):
         return False
     full = np.diff(np.floor(seen / 100.0)) != 0.0
-    clock, _ = going_on(clock_of_digits(seen.astype(np.float64)).seconds, DAY_S)
+    clock, _ = made_continuous(clock_of_digits(seen.astype(np.float64)).seconds, DAY_S)
     jumps, steps = np.abs(np.diff(seen))[full], np.diff(clock)
     return bool(full.any() and (jumps >= 40.0).all() and (np.abs(steps[full]) <= FEW_STEPS * np.median(steps)).all())
 
 
 STAMPS = tuple((YEARS[0] * 10.0**digits, YEARS[1] * 10.0**digits) for digits in (10, 13))
-"""Dates and times of a log as one number, with milliseconds or without: ms and us since 1970 are of another size until 2500."""
+"""Ranges of dates and times written as one number, with milliseconds or without; until 2500, ms and us since 1970 are outside."""
 
 
 def _are_days(size: float, step: float) -> bool:
-    """Whether a time counts the days of a calendar: it is of this age, and its steps are those of a log in days alone."""
+    """Whether a time counts days of a calendar: its size is that of a present date, and its step is plausible only in days."""
     return any(low < size < high for low, high in DAYS) and 0.0 < step < FASTEST_S
 
 
 DAYS = ((2e4, 8e4), (7e5, 8e5), (2.4e6, 2.5e6))
-"""Days between 1954 and 2119 since 1900 as spreadsheets count them (from 1982 as astronomers do), since year 0, Julian days."""
+"""Ranges of days: since 1900 as in spreadsheets (1954 to 2119; as in astronomy from 1982), since year 0, and Julian days."""
 FASTEST_S = 1e-4
-"""A step shorter than this is no vehicle's log in seconds; one of 8 s is shorter in days."""
+"""A shorter step is implausible in seconds; in days it is a step of less than 9 s."""
 YEARS_S = (946684800, 4102444800)
 """Seconds since 1970 between 2000 and 2100."""
 LATEST_S = 1e20
-"""No clock is at more, not even one of nanoseconds since an epoch that is taken for seconds: such a cell is damage."""
+"""Largest plausible time, even for nanoseconds since an epoch taken for seconds: a larger number is a damaged cell."""
 SLOW_S = 5.0
-"""A step longer than this shows nothing of a vehicle's motion: time is in another unit."""
+"""A log with a longer step would not show a vehicle's motion, so that its time must be in another unit."""
 
 
 def unit_of_step(step_s: float) -> str:
-    """Return the unit of time in which a step too long in seconds is that of a log; nothing where there is none."""
+    """Return the unit of time in which a step that is too long in seconds is plausible; empty where there is none."""
     units = [name for name, factor in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)) if 1e-4 <= step_s * factor <= 2.0]
     return units[0] if units and step_s > SLOW_S else ""
 
@@ -193,7 +196,7 @@ def _factor(unit: str | None) -> float:
 
 
 def _of_integers(values: npt.NDArray[np.int64], factor: float, column: _Column) -> tuple[FloatArray, list[Note]]:
-    """Subtract the start before scaling, so that nanoseconds of an epoch keep every digit."""
+    """Return integer times in s, and notes; the start is subtracted before scaling, so that ns of an epoch keep every digit."""
     if round_of(values, factor) is not None:
         return _of_floats(values.astype(np.float64), factor, column)
     start = int(values[0])
@@ -209,7 +212,7 @@ def _of_floats(values: FloatArray, factor: float, column: _Column) -> tuple[Floa
     values = values if there.all() else np.where(there, values, np.nan)
     again = round_of(values[there], factor)
     if again is not None:
-        values, note = gone_on(values, again, column.name)
+        values, note = without_restarts(values, again, column.name)
         notes.append(note)
     values, coarse = rebuilt(values, column.name)
     seen = values[np.isfinite(values)]
@@ -220,7 +223,7 @@ def _of_floats(values: FloatArray, factor: float, column: _Column) -> tuple[Floa
 
 
 def _scaled(values: FloatArray, factor: float) -> FloatArray:
-    """Divide by a whole number where there is one: 50 ms is then 0.05 s to the last bit."""
+    """Return values times a factor; where its inverse is whole, divide by that, so that 50 ms is 0.05 s to the last bit."""
     if factor == 1.0:
         return values
     return values / round(1.0 / factor) if factor < 1.0 else values * factor
@@ -231,7 +234,7 @@ def _of_text(column: _Column, unit: str | None) -> tuple[FloatArray, list[Note]]
     values, wrong = as_numbers(cells)
     if not wrong.size or wrong.size < cells.size // 2:
         if wrong.size and not column.options.salvage:
-            raise column.refused("holds cells that are no times", wrong)
+            raise column.error_at("holds cells that are no times", wrong)
         return _of_floats(values, _factor(unit), column)
     stamps = _iso(cells)
     if np.isnat(stamps).mean() > 0.5:
@@ -240,10 +243,10 @@ def _of_text(column: _Column, unit: str | None) -> tuple[FloatArray, list[Note]]
             return _from_start(other, column)
         clock = clock_of_text(cells) or clock_behind_dates(cells)
         if clock is not None:
-            return _going_on(clock, column, ())
+            return _from_clock(clock, column, ())
     there = ~np.isnat(stamps)
     if not there.any() and wrong.size < cells.size:
-        raise column.refused("holds cells that are no times", wrong)
+        raise column.error_at("holds cells that are no times", wrong)
     notes = column.without_time(there)
     nanoseconds = stamps.astype(np.int64)
     start = int(nanoseconds[there][0]) if there.any() else 0
@@ -251,12 +254,15 @@ def _of_text(column: _Column, unit: str | None) -> tuple[FloatArray, list[Note]]
     return seconds, [*notes, *coarse, _origin(start / 1e9)]
 
 
-def _going_on(clock: Clock, column: _Column, dates: Sequence[npt.NDArray[Any]]) -> tuple[FloatArray, list[Note]]:
-    """Return a clock's time, midnights and full hours passed over; dates count the days where the clock counts all of one."""
+def _from_clock(clock: Clock, column: _Column, dates: Sequence[npt.NDArray[Any]]) -> tuple[FloatArray, list[Note]]:
+    """Return the time of a clock, continuous over midnights and full hours, and notes.
+
+    The days are taken from `dates` where the clock has a period of one day.
+    """
     days = days_of_columns(dates) if dates and clock.period_s == DAY_S else None
     if days is not None:
         return _from_start(clock.seconds + DAY_S * days, column)
-    seconds, rounds = going_on(clock.seconds, clock.period_s)
+    seconds, rounds = made_continuous(clock.seconds, clock.period_s)
     time, notes = _from_start(seconds, column, is_of_day=np.isfinite(clock.period_s))
     return time, [*notes, lost_hours(column.name, rounds, clock.period_s)] if clock.period_s <= HOUR_S else notes
 
@@ -266,27 +272,27 @@ def _clock(column: _Column, form: str | None) -> Clock:
         return clock_of_digits(as_numbers(column.cells)[0])
     found = clock_of_stamps(column.cells) if form == STAMP else clock_of_text(column.cells, form)
     if found is None:
-        raise column.refused("holds cells that are no clock", np.arange(column.cells.size))
+        raise column.error_at("holds cells that are no clock", np.arange(column.cells.size))
     return found
 
 
 def _from_start(seconds: FloatArray, column: _Column, *, is_of_day: bool = False) -> tuple[FloatArray, list[Note]]:
-    """Return seconds (n,) from the first on, and the notes on cells without one and on the start."""
+    """Return seconds (n,) counted from the first one, and notes on cells without a time and on the start."""
     there = np.isfinite(seconds)
     notes = column.without_time(there)
     start = float(seconds[there][0]) if there.any() else 0.0
-    # A clock's digits are those of a second's parts: what is subtracted leaves rounding behind the ninth.
+    # A clock has at most nine decimals of a second; further digits are rounding errors of the subtraction.
     time, coarse = rebuilt(np.round(seconds - start, 9), column.name)
     return time, [*notes, *coarse, _origin(start, is_of_day=is_of_day)]
 
 
 def _of_weeks(column: _Column, unit: str | None, weeks: npt.NDArray[Any]) -> tuple[FloatArray, list[Note]]:
-    """Return the time of GPS weeks and of what has passed of each, in seconds or in milliseconds, by its size."""
+    """Return the time of GPS weeks and times of week, and notes; without `unit` the size decides between s and ms."""
     values, _ = as_numbers(column.cells)
     largest = float(np.nanmax(values, initial=0.0))
     factor = _factor(unit or ("s" if largest <= WEEK_S else "ms"))
-    since = WEEK_S * as_numbers(weeks)[0] + GPS_EPOCH_S
-    return _from_start(_scaled(values, factor) + since, column)
+    week_start = WEEK_S * as_numbers(weeks)[0] + GPS_EPOCH_S
+    return _from_start(_scaled(values, factor) + week_start, column)
 
 
 def _iso(cells: npt.NDArray[Any]) -> npt.NDArray[np.datetime64]:
