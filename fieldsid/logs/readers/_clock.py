@@ -1,4 +1,4 @@
-"""What is in a table: its columns, and its clock: which of them is the time, how it is read, and how often each has a number."""
+"""Make the inventory of a table, and find its clock: the column of the time, how it is read, and the rate of each column."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from fieldsid.logs.run import Note, origin_of
 from fieldsid.numerics.arrays import FloatArray
 
 REGULAR = 0.5
-"""Standard deviation of the steps over their mean, up to which a column that nobody named goes on like time."""
+"""Largest ratio of standard deviation to mean of the steps at which a column without a known name may be the time."""
 OF_WEEK = (
     frozenset({"tow"}),
     frozenset({"itow"}),
@@ -39,9 +39,9 @@ WEEKS = frozenset({"week", "wn", "wk", "gwk", "gpsweek"})
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """The time of a table's rows (n,) in s, NaN where they have none, the column it is from and how it is read, and notes.
+    """The time (n,) in s of a table's rows, NaN where they have none, with its source in the table, and notes.
 
-    `origin_s` is what its zero is on the clock that wrote it, where that counts from an epoch or from midnight.
+    `origin_s` is the reading of the logger's clock at time 0, where that clock counts from an epoch or from midnight.
     """
 
     time: FloatArray
@@ -51,12 +51,12 @@ class Clock:
 
     @property
     def duration_s(self) -> float:
-        """From the first time to the last, in s."""
+        """Return the time from the first row to the last in s."""
         seen = self.time[np.isfinite(self.time)]
         return float(seen[-1] - seen[0])
 
     def rate_hz(self, cells: npt.NDArray[Any]) -> float:
-        """Return how often a column (n,) has a cell, by the median of the steps between them; NaN below two."""
+        """Return the rate in Hz of a column (n,): the inverse median step between its filled cells; NaN below two cells."""
         import pandas as pd
 
         there = ~np.asarray(pd.isna(cells)) & np.isfinite(self.time)
@@ -74,7 +74,10 @@ def inventory_of_table(
     notes: Sequence[Note] = (),
     more: int = 0,
 ) -> Inventory:
-    """Return the columns of a table with their count of numbers, rate, first values and range; `more` were not looked into."""
+    """Return the columns of a table with their count of numbers, rate, first values and range.
+
+    `more` is the number of columns that were not read.
+    """
     clock = clock_of(columns, options.clock)
     return Inventory(
         path,
@@ -105,18 +108,21 @@ def _channel(columns: Columns, index: int, clock: Clock | None) -> ChannelInfo:
 
 
 def clock_of(columns: Columns, known: Source | None) -> Clock | None:
-    """Return the clock of a table, by its mapping or by the names of its columns; None where no column goes on like time."""
+    """Return the clock of a table: by the mapping `known`, else by the names of its columns, else by their numbers.
+
+    None where no column increases like a time.
+    """
     if known is not None and known.counts_rows:
         return Clock((known.scale or 1.0) * np.arange(columns.take(0).size, dtype=np.float64), known)
     if known is not None and known.places:
-        return _tried(columns, known)
-    named = (_tried(columns, source) for source in _named(columns))
+        return _clock_from(columns, known)
+    named = (_clock_from(columns, source) for source in _named_times(columns))
     return next((clock for clock in named if clock is not None), None) or _by_numbers(columns)
 
 
 def _why_no_clock(columns: Columns) -> tuple[Source, FieldsidError] | None:
-    """Return the column that is surest called a time and why it is none, where it is none; None where no column is called so."""
-    for source in _named(columns):
+    """Return the first column that has a name of a time but cannot be read as one, and the reason; None without such a column."""
+    for source in _named_times(columns):
         first = columns.index(source.places[0], TIME)
         try:
             time, _ = time_of(columns, source, source.unit, ReadOptions())
@@ -126,8 +132,11 @@ def _why_no_clock(columns: Columns) -> tuple[Source, FieldsidError] | None:
     return None
 
 
-def _named(columns: Columns) -> Iterator[Source]:
-    """Yield the columns that are called a time, the surest first, with the dates or weeks beside them, and parts of one."""
+def _named_times(columns: Columns) -> Iterator[Source]:
+    """Yield the sources that are a time by their names, the surest first, with the dates or weeks that belong to them.
+
+    Besides single columns these are clocks in several columns.
+    """
     meanings = [(i, meaning_of(name), set(words_of(name))) for i, name in enumerate(columns.names)]
     weeks = next((i for i, _, words in meanings if words & WEEKS), None)
     if weeks is not None:
@@ -147,7 +156,7 @@ def _named(columns: Columns) -> Iterator[Source]:
 
 
 def _source(columns: Columns, index: int) -> Source:
-    """Return how a column of time is read: its unit, or the columns of its days where it is a clock that counts all of one."""
+    """Return how a column of time is read: with its unit, or with the columns of its dates where it is a clock of 24 hours."""
     cells, place = columns.take(index), columns.place(index)
     if cells.dtype.kind == "O":
         clock = clock_of_text(cells)
@@ -159,15 +168,16 @@ def _source(columns: Columns, index: int) -> Source:
 
 
 def unit_by_size(cells: npt.NDArray[Any]) -> str | None:
+    """Return the likely unit of a column (n,) of times by its size and its median step; None where it is not numeric."""
     if cells.dtype.kind not in "iuf" or not cells.size:
         return None
     steps = np.diff(cells[np.isfinite(cells)].astype(np.float64))
-    ahead = steps[steps > 0.0]  # of stamps with too few digits most do not go on
+    ahead = steps[steps > 0.0]  # most steps of stamps with too few digits are zero
     return likely_time_unit(cells, float(np.median(ahead)) if ahead.size else 0.0)
 
 
-def _tried(columns: Columns, source: Source) -> Clock | None:
-    """Return the clock that a source gives; None where it is no time, or does not go on."""
+def _clock_from(columns: Columns, source: Source) -> Clock | None:
+    """Return the clock of a source; None where it cannot be read as a time, or does not increase."""
     first = columns.index(source.places[0], TIME)
     cells = columns.take(first)
     if not cells.size:
@@ -175,14 +185,14 @@ def _tried(columns: Columns, source: Source) -> Clock | None:
     unit = source.unit if source.columns else source.unit or unit_in_name(columns.name(first), TIME) or unit_by_size(cells)
     try:
         time, notes = time_of(columns, source, unit, ReadOptions(salvage=True))
-    except FieldsidError:  # what is no time is not taken for one
+    except FieldsidError:  # the column is no time
         return None
     steps = np.diff(time[np.isfinite(time)])
     return Clock(time, source, origin_s=origin_of(notes)) if steps.size and bool((steps > 0.0).mean() > MOSTLY) else None
 
 
 def _by_numbers(columns: Columns) -> Clock | None:
-    """Return the first column that goes on by even steps, and is named as nothing else: a row number as the last."""
+    """Return the clock of the first unnamed column that increases by even steps; a number of the row only without another."""
     of_rows = None
     for clock in _even_clocks(columns):
         if not _counts_rows(columns, clock.source):
@@ -192,7 +202,7 @@ def _by_numbers(columns: Columns) -> Clock | None:
 
 
 def _even_clocks(columns: Columns) -> Iterator[Clock]:
-    """Yield the clock of each column that goes on by even steps, and is not named as something else."""
+    """Yield the clock of each column that increases by even steps, and whose name does not mean something else."""
     for i in range(columns.width):
         cells = columns.take(i)
         name = columns.names[i] if columns.names else ""
@@ -200,22 +210,22 @@ def _even_clocks(columns: Columns) -> Iterator[Clock]:
             continue
         if is_counter(name) and cells.dtype.kind != "M":
             continue
-        clock = _tried(columns, _source(columns, i))
+        clock = _clock_from(columns, _source(columns, i))
         if clock is None:
             continue
         steps = np.diff(clock.time[np.isfinite(clock.time)])
         # seconds since 1970 are a time however long the logger paused
         is_epoch = cells.dtype.kind in "iuf" and bool(((cells > YEARS_S[0]) & (cells < YEARS_S[1])).all())
         if is_epoch or float(np.std(steps)) < REGULAR * float(np.mean(steps)):
-            yield replace(clock, notes=_guessed(name, clock.source.unit)) if name else clock
+            yield replace(clock, notes=_note_of_guess(name, clock.source.unit)) if name else clock
 
 
 def _counts_rows(columns: Columns, source: Source) -> bool:
-    """Whether a column goes on by one from row to row, as the number of the row does."""
+    """Whether a column increases by one from row to row, as the number of the row does."""
     cells = columns.take(columns.index(source.places[0], TIME))
     return cells.dtype.kind in "iuf" and bool((np.diff(cells) == 1).all())
 
 
-def _guessed(name: str, unit: str | None) -> tuple[Note, ...]:
+def _note_of_guess(name: str, unit: str | None) -> tuple[Note, ...]:
     message = f"no column is called a time: `{name}` goes on by even steps, taken in {unit or 's'} by their size; check its unit"
     return (Note("time_guessed", message, {"column": name, "unit": unit}),)

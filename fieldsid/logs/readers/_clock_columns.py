@@ -1,7 +1,7 @@
-"""Which columns of a table are the parts of one clock: `hours`, `minutes` and `seconds`, `H`, `M` and `S`, year to second.
+"""Find the columns of a table that are the parts of one clock: `hours`, `minutes`, `seconds`; `H`, `M`, `S`; year to second.
 
-A name only proposes a part. It is one where its numbers are: whole ones below the seconds or minutes that fall back where they
-go on. Of several columns with the name of a part that beside the others is taken.
+The name of a column only proposes a part; its numbers must confirm it: the upper part has whole numbers, and increases where the
+lower part falls back. Of several columns with the name of a part, the one nearest to the other parts is taken.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.readers._columns import Columns
 from fieldsid.numerics.arrays import FloatArray
 
-CALLED: Mapping[str, frozenset[str]] = MappingProxyType(
+NAMES_OF_PARTS: Mapping[str, frozenset[str]] = MappingProxyType(
     {
         "year": frozenset({"year", "years", "yr", "yyyy", "yy", "y", "jahr"}),
         "month": frozenset({"month", "months", "mon", "mo", "mm", "m", "monat"}),
@@ -41,32 +41,32 @@ CALLED: Mapping[str, frozenset[str]] = MappingProxyType(
         "hhmmss": frozenset({"hhmmss"}),
     }
 )
-"""What the parts of a date and a clock are called; a month and a minute may share a name."""
-BESIDE = frozenset({
+"""Names of the parts of a date and a clock; a month and a minute may have the same name."""
+IGNORED_WORDS = frozenset({
     "time", "timestamp", "stamp", "header", "clock", "utc", "gps", "gnss", "gmt", "rtc", "local", "log", "pc", "unix", "unixtime",
     "epoch", "posix",
 })  # fmt: skip
-"""Words that may stand beside the name of a part."""
+"""Words that a name may contain in addition to the name of a part."""
 DATES = frozenset({"date", "datum", "day", "yyyymmdd", "ddmmyy", "ddmmyyyy", "yymmdd"})
-"""Words of a column of dates."""
+"""Words in the name of a column of dates."""
 FRACTIONS = ("ms", "us", "ns", "cs", "ds")
-"""Parts that may follow whole seconds."""
+"""Parts that may be the fraction of whole seconds."""
 UPPERS = ("hhmm", "mm", "hh")
-"""Parts that may count the rounds of those below."""
-UNITS_CALLED = {"ss": "s", "ms": "ms", "us": "us", "ns": "ns", "mm": "min", "hh": "h", "yearday": "d"}
-"""The unit of a column that is called as a part of a clock is, and goes on."""
+"""Parts that may count the periods of the parts below them."""
+UNITS_OF_PARTS = {"ss": "s", "ms": "ms", "us": "us", "ns": "ns", "mm": "min", "hh": "h", "yearday": "d"}
+"""Unit of a column that has the name of a part of a clock, but never starts again from zero."""
 _BEHIND = re.compile(r"[\[(].*|[ _]of[ _].*", re.IGNORECASE)
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 
 Chain = list[tuple[str, int]]
-"""Parts of a clock and their columns, the one that counts longest first."""
+"""Parts of a clock and their columns, in the order from the longest unit to the shortest."""
 
 
 def clocks_in_parts(columns: Columns) -> Iterator[Source]:
-    """Yield the clocks that several columns of a table make up, with the columns of their days."""
-    called = _called(columns)
-    for start in _starts(columns, called):
-        chain = _upwards(columns, called, _downwards(columns, called, start))
+    """Yield the clocks that are the sum of several columns of a table, with the columns of their dates."""
+    candidates = _columns_of_parts(columns)
+    for start in _starts(columns, candidates):
+        chain = _upwards(columns, candidates, _downwards(columns, candidates, start))
         places = tuple(index for _, index in chain)
         date = dates_beside(columns, places) if max(PARTS[part].period_s for part, _ in chain) == DAY_S else ()
         if len(chain) > 1 or len(date) > 1:
@@ -75,19 +75,19 @@ def clocks_in_parts(columns: Columns) -> Iterator[Source]:
 
 
 def elapsed(columns: Columns) -> Iterator[tuple[int, str]]:
-    """Yield the columns that are called by a unit of time, as `minutes`, with that unit."""
-    called = _called(columns)
-    for part, unit in UNITS_CALLED.items():
-        yield from ((i, unit) for i in called[part] if len(columns.name(i)) > 1)
+    """Yield the columns that are named by a unit of time, such as `minutes`, with that unit."""
+    candidates = _columns_of_parts(columns)
+    for part, unit in UNITS_OF_PARTS.items():
+        yield from ((i, unit) for i in candidates[part] if len(columns.name(i)) > 1)
 
 
 def dates_beside(columns: Columns, clock: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the column of the dates beside a clock's, or those of year, month and day or of year and day of the year.
+    """Return the columns of the dates of a clock: one column; year, month and day; or year and day of the year.
 
-    Nothing where there is none.
+    The result is empty where there are none. `clock` are the columns of the clock.
     """
     dated = [(i,) for i, name in enumerate(columns.names) if DATES & set(words := words_of(name)) and "time" not in words]
-    free = {part: [i for i in places if i not in clock] for part, places in _called(columns).items()}
+    free = {part: [i for i in places if i not in clock] for part, places in _columns_of_parts(columns).items()}
     parts: list[tuple[int, ...]] = []
     for year in _nearest(free["year"], clock[0]):
         days = _nearest(free["day"], year)
@@ -96,53 +96,53 @@ def dates_beside(columns: Columns, clock: tuple[int, ...]) -> tuple[int, ...]:
     return next((c for c in (*dated, *parts) if days_of_columns([columns.take(i) for i in c]) is not None), ())
 
 
-def _called(columns: Columns) -> dict[str, list[int]]:
-    """Return the columns whose name is that of a part, by part."""
-    found: dict[str, list[int]] = {part: [] for part in CALLED}
+def _columns_of_parts(columns: Columns) -> dict[str, list[int]]:
+    """Return by part the columns that have its name."""
+    found: dict[str, list[int]] = {part: [] for part in NAMES_OF_PARTS}
     for i, name in enumerate(columns.names):
-        words = {w.lower() for w in _WORD.findall(_BEHIND.sub("", name))} - BESIDE
-        for part, called in CALLED.items():
-            if words and (words <= called or (words - called == {"second"} and part in FRACTIONS)):
+        words = {w.lower() for w in _WORD.findall(_BEHIND.sub("", name))} - IGNORED_WORDS
+        for part, known in NAMES_OF_PARTS.items():
+            if words and (words <= known or (words - known == {"second"} and part in FRACTIONS)):
                 found[part].append(i)
     return found
 
 
-def _starts(columns: Columns, called: Mapping[str, list[int]]) -> Iterator[tuple[str, int]]:
-    """Yield the columns from which a clock may be put together: its seconds, else its minutes or hours with a fraction."""
-    for i in called["ss"]:
+def _starts(columns: Columns, candidates: Mapping[str, list[int]]) -> Iterator[tuple[str, int]]:
+    """Yield the columns from which the search for a clock may start: its seconds, else minutes or hours with a fraction."""
+    for i in candidates["ss"]:
         seen = _numbers(columns, i)
         if seen.size:
             yield ("ss" if float(seen.max()) <= MINUTE_S else "s"), i
-    for i in called["hhmmss"]:
+    for i in candidates["hhmmss"]:
         yield "hhmmss", i
-    for i, name in enumerate(columns.names) if called["ms"] or called["us"] else ():
+    for i, name in enumerate(columns.names) if candidates["ms"] or candidates["us"] else ():
         meaning = meaning_of(name)
         if meaning is not None and meaning[0] == TIME and columns.take(i).dtype.kind == "O":
             clock = clock_of_text(columns.take(i))
             if clock is not None and clock.period_s == DAY_S:
                 yield "hh:mm:ss", i
     for part in ("mm", "hh"):
-        for i in called[part]:
+        for i in candidates[part]:
             if bool((_numbers(columns, i) % 1.0 != 0.0).any()):
                 yield part, i
 
 
-def _downwards(columns: Columns, called: Mapping[str, list[int]], start: tuple[str, int]) -> Chain:
-    """Return whole seconds with the column of their fraction, or what it starts from alone."""
+def _downwards(columns: Columns, candidates: Mapping[str, list[int]], start: tuple[str, int]) -> Chain:
+    """Return the starting part, followed by the column of the fraction of its whole seconds where there is one."""
     part, index = start
     seconds = _seconds(columns, part, index)
     seen = seconds[np.isfinite(seconds)]
     if bool((seen != np.round(seen)).any()):
         return [start]
     for lower in FRACTIONS:
-        for i in _nearest(called[lower], index):
+        for i in _nearest(candidates[lower], index):
             if carries(seconds, _seconds(columns, lower, i), PARTS[part].period_s, 1.0):
                 return [start, (lower, i)]
     return [start]
 
 
-def _upwards(columns: Columns, called: Mapping[str, list[int]], chain: Chain) -> Chain:
-    """Return a clock with the columns that count the rounds of what is there, as long as there is one."""
+def _upwards(columns: Columns, candidates: Mapping[str, list[int]], chain: Chain) -> Chain:
+    """Return a clock extended by the columns that count the periods of its longest part, as far as there are such columns."""
     while np.isfinite(period := max(PARTS[part].period_s for part, _ in chain)) and period < DAY_S:
         lower = np.sum([_seconds(columns, part, i) for part, i in chain], axis=0)
         found = next(
@@ -150,7 +150,7 @@ def _upwards(columns: Columns, called: Mapping[str, list[int]], chain: Chain) ->
                 (part, i)
                 for part in UPPERS
                 if PARTS[part].worth_s == period
-                for i in _nearest([i for i in called[part] if i not in {j for _, j in chain}], chain[0][1])
+                for i in _nearest([i for i in candidates[part] if i not in {j for _, j in chain}], chain[0][1])
                 if carries(_seconds(columns, part, i), lower, PARTS[part].period_s, period)
             ),
             None,

@@ -1,4 +1,4 @@
-"""Columns of a table by name or index, as numbers and as one clock: shared by the readers of text and Parquet."""
+"""Read the columns of a table by name or index, as numbers on one time: shared by the readers of tables."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ from fieldsid.registry import near
 
 LOOKED_AT = 200
 FEW_WORDS = 0.05
-"""Share of words among the first cells of a column, and among all, up to which it is one of numbers."""
+"""Largest share of words, among the first cells of a column and among all, at which the column counts as numbers."""
 SHOWN = 100
-"""Names of columns that a message tells."""
+"""Number of column names that a message lists."""
 SAMPLED = 100_000
-"""Rows of a table that are looked at for what its numbers say."""
+"""Largest number of rows of a table whose numbers are examined to guess the mapping."""
 
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """The columns of one file; `take` gives the raw cells (n,) of a column by index. Names are empty without a header.
+    """The columns of one file.
 
-    `units` are those of a row below the names, empty without one.
+    `take` returns the raw cells (n,) of a column by index. `names` is empty without a header, and `units` without a row of units.
     """
 
     path: Path
@@ -66,7 +66,7 @@ class Columns:
         raise MappingError(f"`{self.path}` has {what}", found=found, hint=hint, signal=signal)
 
     def shown(self) -> str:
-        """Return the names of the columns for a message, the first ones where there are many."""
+        """Return the names of the columns for a message; where there are many, only the first ones."""
         more = f", ... {self.width - SHOWN} more" if self.width > SHOWN else ""
         return ", ".join(self.names[:SHOWN]) + more if self.names else f"{self.width} columns without names"
 
@@ -75,7 +75,7 @@ class Columns:
         return self.names[index] if self.names else str(index)
 
     def place(self, index: int) -> str | int:
-        """Return the name of a column, or its place where it has none of its own."""
+        """Return the name by which a mapping refers to a column, or its index where the name is not unique."""
         name = self.name(index)
         return name if self.names.count(name) == 1 else index
 
@@ -84,12 +84,12 @@ class Columns:
         return unit_in_name(self.name(index), signal, self.units[index] if self.units else None)
 
     def rows(self, keep: npt.NDArray[np.bool_]) -> Columns:
-        """Return the columns with some of their rows (n,) only."""
+        """Return the columns with only those rows for which the mask (n,) is true."""
         return replace(self, take=lambda index: self.take(index)[keep])
 
 
 def numbers_mostly(cells: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Return cells (n,) as numbers, NaN where words stand among them, as long as nearly all are; else as they are."""
+    """Return cells (n,) as numbers, with NaN for words among them, if nearly all are numbers; else return the cells unchanged."""
     if cells.dtype.kind != "O":
         return cells
     seen = [c for c in cells[:LOOKED_AT].tolist() if isinstance(c, str)]
@@ -100,7 +100,7 @@ def numbers_mostly(cells: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 
 def samples_of(columns: Columns, time: FloatArray, source: Source) -> Samples:
-    """Return the numbers of a table's columns, of a long one every so many rows."""
+    """Return the numeric columns of a table, decimated to at most SAMPLED rows."""
     step, seen = max(1, -(-time.size // SAMPLED)), np.isfinite(time)
     taken = {}
     for i in range(columns.width):
@@ -120,27 +120,27 @@ def own_map_of(names: Sequence[str]) -> ChannelMap | None:
 
 
 def canonical_sources(names: Sequence[str]) -> dict[str, Source]:
-    """Return the columns of a table that have canonical names, by signal, the time among them.
+    """Return the columns of a table that have canonical names, by signal, including the time.
 
     Where two columns mean one signal, the one in SI is taken.
     """
-    stated = [(name, said) for name in names if (said := canonical(name)) is not None]
+    matches = [(name, match) for name in names if (match := canonical(name)) is not None]
     best: dict[str, tuple[str, Canonical]] = {}
-    for name, said in stated:
-        if said.signal not in best or name.strip().lower() == said.signal:
-            best[said.signal] = (name, said)
-    return {signal: Source(column=name, unit=said.unit) for signal, (name, said) in best.items()}
+    for name, match in matches:
+        if match.signal not in best or name.strip().lower() == match.signal:
+            best[match.signal] = (name, match)
+    return {signal: Source(column=name, unit=match.unit) for signal, (name, match) in best.items()}
 
 
 def used_by(mapping: ChannelMap, names: Sequence[str], width: int) -> set[int]:
-    """Return the indexes of the columns that a mapping names, as far as a table has them."""
+    """Return the indexes of those columns of a table that a mapping names."""
     named = [c for s in (*mapping.sources.values(), *([mapping.time] if mapping.time else [])) for c in s.places]
     indexes = {c for c in named if isinstance(c, int) and 0 <= c < width}
     return indexes | {i for i, name in enumerate(names) if name in named}
 
 
 def series_of(path: Path, columns: Columns, mapping: ChannelMap, notes: tuple[Note, ...], options: ReadOptions) -> RawLog:
-    """Return the mapped columns of a table on its time column."""
+    """Return the signals of a table that are mapped, at the times of its time column."""
     columns, blank = _without_blank_rows(columns, mapping)
     notes = (*notes, *blank)
     time, time_notes = _time(columns, mapping, options)
@@ -153,14 +153,14 @@ def series_of(path: Path, columns: Columns, mapping: ChannelMap, notes: tuple[No
         values = numbers[0] if len(numbers) == 1 else np.stack(numbers, axis=1)
         label = ", ".join(columns.name(i) for i in picked)
         unit = None if signal in COMBINED else columns.unit(picked[0], signal)
-        bad += _contradicted(columns, picked[0], signal, source.unit or unit) if mapping.origin is None else []
+        bad += _other_unit_below(columns, picked[0], signal, source.unit or unit) if mapping.origin is None else []
         series[signal] = Series(time, values, label, unit, label.strip().lower() == "z")
     ignored = _ignored(columns, mapping)
     return RawLog(stem_of(path), series, (*notes, *time_notes, *bad, *ignored))
 
 
-def _contradicted(columns: Columns, index: int, signal: str, unit: str | None) -> list[Note]:
-    """Return the note that the row of units below a column's name states another unit than the one it is taken in."""
+def _other_unit_below(columns: Columns, index: int, signal: str, unit: str | None) -> list[Note]:
+    """Return the note that the row of units states another unit than the one in which a column is read."""
     below = stated_unit(columns.units[index], signal) if columns.units else None
     if below is None or unit is None or below == unit:
         return []
@@ -186,11 +186,11 @@ NO_CLOCK = "where no column is a time write how many rows there are a second at 
 COUNTERS = frozenset(
     {"sample", "samples", "index", "idx", "row", "frame", "no", "nr", "number", "count", "counter", "seq", "step", "entry"}
 )
-"""Words of a column that counts the rows of a table."""
+"""Words in the name of a column that counts the rows of a table."""
 
 
 def is_counter(name: str) -> bool:
-    """Whether a column counts rows by its name: it tells no time, only their order."""
+    """Whether a column counts rows, by its name, so that it gives their order but no time."""
     words = set(words_of(name))
     return bool(words) and words <= COUNTERS
 
@@ -202,21 +202,21 @@ def _time(columns: Columns, mapping: ChannelMap, options: ReadOptions) -> tuple[
     if mapping.time is None or not mapping.time.places:
         guessed = [name for name in columns.names if (meaning := meaning_of(name)) is not None and meaning[0] == TIME]
         # Without a file the mapping came from `--channel`.
-        way = f"add `time: {{column: {guessed[0]}, unit: s}}` to {mapping.place}" if mapping.origin and guessed else ""
+        hint = f"add `time: {{column: {guessed[0]}, unit: s}}` to {mapping.place}" if mapping.origin and guessed else ""
         counter = None if guessed else next((name for name in columns.names if is_counter(name)), None)
         if counter is not None:
-            way = f"`{counter}` counts samples: write how many there are a second at the top of the mapping, as "
-            way += f"`time: {{column: {counter}, rate: 10}}`"
+            hint = f"`{counter}` counts samples: write how many there are a second at the top of the mapping, as "
+            hint += f"`time: {{column: {counter}, rate: 10}}`"
         raise MappingError(
             f"`{columns.path}` has no time column: `{TIME}` is missing",
             found=columns.shown(),
-            hint=way or (f"add `--channel {quote(f'time={guessed[0]}:s')}`" if guessed else NO_CLOCK),
+            hint=hint or (f"add `--channel {quote(f'time={guessed[0]}:s')}`" if guessed else NO_CLOCK),
         )
     return time_of(columns, mapping.time, mapping.time.unit, options)
 
 
 def time_of(columns: Columns, source: Source, unit: str | None, options: ReadOptions) -> tuple[FloatArray, list[Note]]:
-    """Return the time (n,) in s of a table's rows, from one column or put together from several, and notes.
+    """Return the time (n,) in s of the rows of a table, from one column or as the sum of several, and notes.
 
     Raises LogError and MappingError, see seconds_of.
     """
@@ -235,9 +235,9 @@ def time_of(columns: Columns, source: Source, unit: str | None, options: ReadOpt
 
 
 def _without_blank_rows(columns: Columns, mapping: ChannelMap) -> tuple[Columns, list[Note]]:
-    """Return the columns without rows that hold neither a time nor a number of the mapped ones, and a note on words in them.
+    """Return the columns without the rows that have neither a time nor a mapped number, and a note on words in such rows.
 
-    Such are a last line of separators alone, and what was written between the rows.
+    Such rows are a last line of separators alone, and lines of text between the rows of data.
     """
     if mapping.time is None or not mapping.time.places:
         return columns, []
@@ -256,10 +256,10 @@ def _without_blank_rows(columns: Columns, mapping: ChannelMap) -> tuple[Columns,
         rows &= _is_missing(cells) | (_is_word(cells) if cells.dtype.kind == "O" else False)
     if not rows.any() or rows.all():
         return columns, []
-    said = int((rows & words).sum())
-    first = str(times[rows & words][0])[:60] if said else ""
-    found = [Note("text_rows", f"lines of words between the rows, left out: {said}, the first {first!r}", {"count": said})]
-    return columns.rows(~rows), found if said else []
+    texts = int((rows & words).sum())
+    first = str(times[rows & words][0])[:60] if texts else ""
+    found = [Note("text_rows", f"lines of words between the rows, left out: {texts}, the first {first!r}", {"count": texts})]
+    return columns.rows(~rows), found if texts else []
 
 
 def _is_missing(cells: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
@@ -269,12 +269,15 @@ def _is_missing(cells: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
 
 
 def _is_word(cells: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
-    """Return which cells (n,) hold a letter and no digit at their start: no number, clock or date."""
+    """Return a mask (n,) of the cells with a letter and without a leading digit, which are no number, clock or date."""
     return np.array([isinstance(c, str) and not c.strip()[:1].isdigit() and any(x.isalpha() for x in c) for c in cells])
 
 
 def _numbers(columns: Columns, index: int, signal: str, bad: list[Note], options: ReadOptions) -> FloatArray:
-    """Return a column as float64 (n,), NaN where a cell is empty."""
+    """Return a column as float64 (n,), NaN where a cell is empty; append to `bad` the note on cells that are no numbers.
+
+    Raises LogError for such a cell unless the options say to salvage.
+    """
     cells = columns.take(index)
     values, wrong = as_numbers(cells)
     if wrong.size:

@@ -1,7 +1,7 @@
-"""The elements of a MATLAB file of version 5, looked through before scipy reads them.
+"""Check the elements of a MATLAB file of version 5 before scipy reads them.
 
-scipy's compiled reader takes types and lengths as they stand: one that is damaged ends the process, with no error to catch. The
-layout is that of MathWorks, MAT-File Format (2024), chapter 1: tags of a type and a length, arrays as elements inside elements.
+The compiled reader of scipy trusts types and lengths: a damaged one ends the process, with no error to catch. The layout is that
+of MathWorks, MAT-File Format (2024), chapter 1: tags of a type and a length, arrays as elements inside elements.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ NAMES, INTEGERS = (1, 2, 16), (5, 6)
 
 
 class _DamagedError(Exception):
-    """An element that is not as the format has it."""
+    """An element that the format does not allow."""
 
 
 def refuse_damaged(path: Path) -> None:
@@ -56,19 +56,22 @@ def _check_file(data: memoryview, size: UnpackedSize) -> None:
 
 def _unpacked(body: memoryview, size: UnpackedSize) -> memoryview:
     unpack = zlib.decompressobj()
-    plain = unpack.decompress(body, size.left + 1)
-    size.add(len(plain))
+    data = unpack.decompress(body, size.left + 1)
+    size.add(len(data))
     if not unpack.eof:
         raise _DamagedError("a packed variable that is cut off")
-    return memoryview(plain)
+    return memoryview(data)
 
 
 def _elements(data: memoryview, order: str, *, padded: bool = True) -> Iterator[tuple[int, memoryview]]:
-    """Yield the elements of some bytes, each by its type; those of a file are not padded, those of an array are to 8 bytes."""
+    """Yield type and body of each element in some bytes.
+
+    With `padded` the bodies are padded to 8 bytes, as inside an array; at the level of the file they are not.
+    """
     at = 0
     while at < len(data):
         (first,) = struct.unpack_from(f"{order}I", data, at)
-        if first >> 16:  # a small element keeps its length and up to four bytes in the eight of a tag
+        if first >> 16:  # the tag of a small element has 8 bytes, which include its length and up to four bytes of data
             kind, length, start = first & 0xFFFF, first >> 16, at + 4
             if length > 4:
                 raise _DamagedError(f"a small element of {length} bytes")
@@ -84,7 +87,7 @@ def _elements(data: memoryview, order: str, *, padded: bool = True) -> Iterator[
 
 
 def _check_array(data: memoryview, order: str, depth: int) -> None:
-    """Check one array, and the arrays in it; raises _DamagedError."""
+    """Check one array and the arrays inside it; raises _DamagedError."""
     if depth > DEEPEST:
         raise _DamagedError(f"arrays inside arrays, {depth} deep")
     if not len(data):
@@ -94,37 +97,37 @@ def _check_array(data: memoryview, order: str, depth: int) -> None:
     if len(flags) != 8:
         raise _DamagedError(f"flags of {len(flags)} bytes")
     (word,) = struct.unpack_from(f"{order}I", flags)
-    inner = _opaque(parts) if word & 0xFF == OPAQUE else _held(parts, order, word)
+    inner = _skipped_opaque(parts) if word & 0xFF == OPAQUE else _checked_array(parts, order, word)
     if inner * 8 > len(data):
         raise _DamagedError(f"{inner} arrays in {len(data)} bytes")
     for _ in range(inner):
         _check_array(_next(parts, (MATRIX,)), order, depth + 1)
 
 
-def _opaque(parts: Iterator[tuple[int, memoryview]]) -> int:
-    """Pass over the three names of an object that only MATLAB knows; return how many arrays follow."""
+def _skipped_opaque(parts: Iterator[tuple[int, memoryview]]) -> int:
+    """Skip the three names of an object that only MATLAB can read; return how many arrays follow."""
     for _ in range(3):
         _next(parts, NAMES)
     return 1
 
 
-def _held(parts: Iterator[tuple[int, memoryview]], order: str, word: int) -> int:
-    """Check the dimensions, the name and the numbers of an array with such flags; return how many arrays follow."""
+def _checked_array(parts: Iterator[tuple[int, memoryview]], order: str, word: int) -> int:
+    """Check the dimensions, the name and the numbers of an array whose flags are `word`; return how many arrays follow."""
     size = _next(parts, INTEGERS)
     dimensions: tuple[int, ...] = struct.unpack(f"{order}{len(size) // 4}i", size[: len(size) // 4 * 4])
     if not 1 <= len(dimensions) <= MOST_DIMENSIONS or min(dimensions) < 0:
         raise _DamagedError(f"an array of {dimensions}")
     _next(parts, NAMES)
-    kind, of_number = word & 0xFF, 2 if word & COMPLEX else 1
+    kind, parts_of_number = word & 0xFF, 2 if word & COMPLEX else 1
     if kind in (CELL, STRUCT, OBJECT):
         return prod(dimensions) * (1 if kind == CELL else _fields(parts, order, has_class=kind == OBJECT))
     if kind in NUMERIC:
-        for _ in range(of_number):
+        for _ in range(parts_of_number):
             _numbers(parts, prod(dimensions))
     elif kind == CHAR:
         _text(parts)
     elif kind == SPARSE:
-        _sparse(parts, order, dimensions, of_number)
+        _sparse(parts, order, dimensions, parts_of_number)
     elif kind != FUNCTION:
         raise _DamagedError(f"an array of class {kind}")
     return 1 if kind == FUNCTION else 0
@@ -144,13 +147,13 @@ def _numbers(parts: Iterator[tuple[int, memoryview]], count: int) -> None:
 
 
 def _text(parts: Iterator[tuple[int, memoryview]]) -> None:
-    # Of a coded text the bytes of a letter vary, and it has no element at all where it is empty.
+    # The number of bytes of a letter depends on its encoding, and an empty text has no element at all.
     kind, body = next(parts, (0, memoryview(b"")))
     if len(body) and kind not in TEXT:
         raise _DamagedError(f"letters in an element of type {kind}")
 
 
-def _sparse(parts: Iterator[tuple[int, memoryview]], order: str, dimensions: tuple[int, ...], of_number: int) -> None:
+def _sparse(parts: Iterator[tuple[int, memoryview]], order: str, dimensions: tuple[int, ...], parts_of_number: int) -> None:
     rows, starts = (_next(parts, INTEGERS) for _ in range(2))
     of_row = struct.unpack(f"{order}{len(rows) // 4}i", rows[: len(rows) // 4 * 4])
     of_column = struct.unpack(f"{order}{len(starts) // 4}i", starts[: len(starts) // 4 * 4])
@@ -158,12 +161,12 @@ def _sparse(parts: Iterator[tuple[int, memoryview]], order: str, dimensions: tup
     fits = fits and of_column[0] == 0 and of_column[-1] <= len(of_row)
     if not fits or any(not 0 <= r < dimensions[0] for r in of_row[: of_column[-1]]):
         raise _DamagedError(f"a sparse array of {dimensions} whose places lie outside of it")
-    for _ in range(of_number):
-        _next(parts, tuple(NUMBERS))  # of logical values MATLAB states doubles and writes bytes: their length says nothing
+    for _ in range(parts_of_number):
+        _next(parts, tuple(NUMBERS))  # MATLAB declares logical values as doubles and writes bytes: their length cannot be checked
 
 
 def _fields(parts: Iterator[tuple[int, memoryview]], order: str, *, has_class: bool) -> int:
-    """Return how many fields a struct has, by the length of a name and that of all names."""
+    """Return the number of fields of a struct: the length of all names over that of one name."""
     if has_class:
         _next(parts, NAMES)
     width = _next(parts, INTEGERS)

@@ -1,4 +1,4 @@
-"""Logs of topics, each with numbers on a clock of its own: what is in them, and the mapped fields; shared by several formats."""
+"""Inventory and signals of logs of topics, each with its own clock: shared by the readers of several formats."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
 
 DATA = "data"
-"""Field of a topic that is one number."""
+"""Name of the field of a topic that is a single number."""
 MOST_DEVICES = 32
-"""Numbers of servos, motors and the like in one kind of message or table; more are no numbers of devices."""
+"""Largest number of servos, motors and the like in one kind of message or table; a field with more values names no devices."""
 Means = Mapping[str, tuple[str, Mapping[str, Any]]]
-"""What a format's own definition says: by `topic.field`, the signal and how a mapping reads it."""
+"""Signals by the definition of a format: by `topic.field`, the signal and the keys of a mapping with which it is read."""
 
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """One topic: time (n,) in s, its numbers (n,) by field, and the unit that the log states where it is one number."""
+    """One topic: time (n,) in s, its numbers (n,) by field, and the unit that the log states for a topic of a single number."""
 
     time: FloatArray
     fields: Mapping[str, FloatArray]
@@ -54,7 +54,7 @@ class Topic:
 
 @dataclass(frozen=True, slots=True)
 class Topics:
-    """What was read of a log: topics by name, what its format says of them, notes, and how many others were not looked into."""
+    """The content of a log: topics by name, their meaning by the format, notes, and the number of topics that were not read."""
 
     by_name: Mapping[str, Topic | None]
     means: Means = field(default_factory=lambda: MappingProxyType({}))
@@ -71,10 +71,11 @@ def topic_reader(
     found: Callable[[Path, ReadOptions, frozenset[str]], Topics],
     kind: str = DEFINED,
 ) -> Reader:
-    """Return the reader of a format of topics, by what finds those of a log, at least the ones that are wanted of all there are.
+    """Return the reader of a format of topics.
 
-    Its inventory has each topic with count, rate and first numbers; raises LogError as what finds them does. What it reads are
-    the mapped fields; raises MappingError also, for one that is not there.
+    `found` reads the topics of a log; its last argument names topics that must be included, and if it is empty all are read.
+    The reader's inventory has each topic with count, rate and first numbers. It reads the mapped fields, and raises MappingError
+    for one that is missing, in addition to the LogError that `found` raises.
     """
 
     def inventory(path: Path, options: ReadOptions, written: TableForm) -> Inventory:
@@ -92,7 +93,7 @@ def wanted_by(mapping: ChannelMap) -> frozenset[str]:
 
 
 def library(module: str, path: Path, what: str, extra: str) -> Any:
-    """Return an optional library; raises LogError that says what the log is, and the line that installs what reads it."""
+    """Return an optional library; raises LogError with the kind of the log and the command that installs the library."""
     try:
         return import_module(module)
     except ImportError as error:
@@ -105,16 +106,16 @@ def library(module: str, path: Path, what: str, extra: str) -> Any:
 
 
 @contextmanager
-def unheard() -> Iterator[None]:
-    """Keep what a library prints of a damaged log, some of it among the data on stdout: a note says it once."""
+def silenced() -> Iterator[None]:
+    """Suppress what a library prints about a damaged log, which would mix with the data on stdout; a note reports it once."""
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
         yield
 
 
 def inventory_of(path: Path, form: str, log: Topics, *, kind: str = DEFINED) -> Inventory:
-    """Return what is in a log of topics, all of them north-east-down; raises LogError where it holds none.
+    """Return the inventory of a log of topics in north-east-down axes; raises LogError where it has no topic with data.
 
-    `kind` is what a topic is called; of what the format has defined nothing is guessed by its name.
+    `kind` is the word for a topic; with DEFINED the format defines its topics, and nothing is guessed by their names.
     """
     topics = _not_empty(path, log)
     names = sorted(topics)
@@ -148,7 +149,7 @@ def _not_empty(path: Path, log: Topics) -> dict[str, Topic]:
 
 
 def raw_log_of(path: Path, log: Topics, mapping: ChannelMap) -> RawLog:
-    """Return the mapped fields on the time from the first of them; raises MappingError for a topic or field that is not there."""
+    """Return the mapped fields with time 0 at the first of their stamps; raises MappingError for a missing topic or field."""
     topics = _not_empty(path, log)
     picked = {signal: _picked(path, topics, signal, source) for signal, source in mapping.sources.items()}
     origin = min((float(s.time[0]) for s in picked.values()), default=0.0)
@@ -158,7 +159,7 @@ def raw_log_of(path: Path, log: Topics, mapping: ChannelMap) -> RawLog:
 
 
 def topic_name(path: Path, what: str, topics: Collection[str], signal: str, source: Source) -> str:
-    """Return the topic that a source names, of those of a log; raises MappingError where it names none, or another."""
+    """Return the topic that a source names; raises MappingError where it names none, or one that the log does not have."""
     if source.topic is None:
         raise MappingError(
             f"`{signal}` is mapped to a {source.label}, but `{path}` is {what}",
@@ -177,24 +178,24 @@ def topic_name(path: Path, what: str, topics: Collection[str], signal: str, sour
 
 
 def _picked(path: Path, topics: Mapping[str, Topic], signal: str, source: Source) -> Series:
-    called = topic_name(path, "a log of topics", topics, signal, source)
-    topic = topics[called]
+    name_of_topic = topic_name(path, "a log of topics", topics, signal, source)
+    topic = topics[name_of_topic]
     fields = [part.strip() for part in (source.path or DATA).split(",")]
     for name in fields:
         if name not in topic.fields:
             raise MappingError(
-                f"topic `{called}` has no field `{name}` for `{signal}`",
+                f"topic `{name_of_topic}` has no field `{name}` for `{signal}`",
                 found=", ".join(topic.fields),
                 hint=near(name, list(topic.fields)),
                 signal=signal,
             )
     values = [topic.fields[name] for name in fields]
-    unit = None if signal in COMBINED else unit_of_field(called, fields[0], signal, topic.unit)
+    unit = None if signal in COMBINED else unit_of_field(name_of_topic, fields[0], signal, topic.unit)
     return Series(topic.time, values[0] if len(values) == 1 else np.stack(values, axis=1), source.label, unit)
 
 
 def topic_of(time: FloatArray, fields: Mapping[str, FloatArray], unit: str | None = None) -> Topic | None:
-    """Return a topic whose time increases, of equal times the last sample; None where there is no time."""
+    """Return a topic sorted by time, with the last sample of each group of equal times; None where there is no time."""
     good = np.isfinite(time)
     order = np.flatnonzero(good)[np.argsort(time[good], kind="stable")]
     kept = order[np.append(np.diff(time[order]) > 0.0, True)] if order.size else order

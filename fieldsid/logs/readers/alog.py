@@ -1,4 +1,4 @@
-"""MOOS logs, .alog: a line for each posting, `time VARIABLE source value`; the variables that are numbers are topics."""
+"""Read MOOS logs, .alog: a line for each posting, `time VARIABLE source value`; each numeric variable is a topic."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ MEANS: Means = {
     f"DESIRED_ELEVATOR.{DATA}": ("elevator_rad", {"unit": "deg"}),
     f"DESIRED_THRUST.{DATA}": ("thrust", {}),
 }
-"""The helm's own variables: heading from north, X east and Y north, fins in degrees."""
+"""Signals by the variables of the helm: heading from north, X east and Y north, fins in degrees."""
 
 
 def sniff(path: Path) -> bool:
-    """Whether a file has the logger's head."""
+    """Whether a file has the head that the MOOS logger writes."""
     head = head_of(path)
     return head.startswith(b"%%") and b"%% LOGSTART" in head
 
 
 def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
-    """Return the variables that are numbers: as many as are looked into, and those that are wanted."""
+    """Return the numeric variables: at most MOST_CHANNELS, and in addition those that are wanted."""
     times: dict[str, list[float]] = {}
     values: dict[str, list[float]] = {}
     odd = 0

@@ -1,4 +1,4 @@
-"""ArduPilot logs, read by pymavlink (extra `ardupilot`): DataFlash .bin of the vehicle or its text form, telemetry .tlog."""
+"""Read ArduPilot logs by pymavlink (extra `ardupilot`): DataFlash .bin of the vehicle or its text form, telemetry .tlog."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ import numpy as np
 from fieldsid.logs.convert.servo_counts import COUNTS, SERVOS
 from fieldsid.logs.convert.times.time_column import YEARS_S
 from fieldsid.logs.reader import ReadOptions
-from fieldsid.logs.readers._topics import Means, Topic, Topics, library, topic_of, topic_reader, unheard
+from fieldsid.logs.readers._topics import Means, Topic, Topics, library, silenced, topic_of, topic_reader
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import DATAFLASH, head_of, unreadable
 
 MAVLINK = (0xFE, 0xFD)
-"""How a packet of either version of the protocol starts, behind eight bytes of time."""
+"""First byte of a packet in either version of the protocol; in a .tlog it follows eight bytes of time."""
 FORMAT, FORMAT_LENGTH = 128, 89
 PARAMETERS = {"PARM": ("Name", "Value"), "PARAM_VALUE": ("param_id", "param_value")}
 """Messages of the vehicle's parameters, with the fields of their name and value."""
 TEXT = re.compile(rb"^FMT, ?128,", re.MULTILINE)
-"""A line with which the text form of a DataFlash log begins, as ground stations write it."""
+"""Start of the first line of the text form of a DataFlash log, which ground stations write."""
 _DEG, _DEG_S, _RAD, _RAD_S = ({"unit": unit} for unit in ("deg", "deg/s", "rad", "rad/s"))
 MEANS: Means = {
     "ATT.Yaw": ("yaw_rad", _DEG), "ATT.Pitch": ("pitch_rad", _DEG), "ATT.Roll": ("roll_rad", _DEG),
@@ -36,17 +36,17 @@ MEANS: Means = {
     "ATTITUDE.rollspeed": ("roll_rate_rad_s", _RAD_S),
     "LOCAL_POSITION_NED.x": ("x_m", {}), "LOCAL_POSITION_NED.y": ("y_m", {}), "LOCAL_POSITION_NED.z": ("depth_m", {}),
 }  # fmt: skip
-"""What the definitions of the messages say."""
+"""Signals by the definitions of the messages."""
 FUNCTIONS = {19: "elevator_rad", 21: "rudder_rad", 26: "rudder_rad", 70: "thrust"}
-"""What an output moves by its parameter SERVOn_FUNCTION: elevator, rudder, ground steering, throttle."""
+"""Signal of an output by its parameter SERVOn_FUNCTION: elevator, rudder, ground steering, throttle."""
 PULSES = {"RCOU": "C{}", "SERVO_OUTPUT_RAW": "servo{}_raw"}
-"""Messages of the outputs' pulses, and what the n-th is called."""
+"""Messages with the outputs' pulses, and the name of the field of the n-th output."""
 Rows = dict[str, list[tuple[float, dict[str, float]]]]
 """Messages by name, each with its time in s and its numbers."""
 
 
 def _outputs(parameters: Mapping[str, float]) -> dict[str, tuple[str, Mapping[str, Any]]]:
-    """Return what the outputs are by the vehicle's parameters, with the pulse at which each is in the middle."""
+    """Return the signals of the outputs by the vehicle's parameters, with the pulse at which each is centred."""
     found: dict[str, tuple[str, Mapping[str, Any]]] = {}
     for name, function in parameters.items():
         number = name.removeprefix("SERVO").removesuffix("_FUNCTION")
@@ -54,13 +54,13 @@ def _outputs(parameters: Mapping[str, float]) -> dict[str, tuple[str, Mapping[st
         if signal is not None:
             centre = parameters.get(f"SERVO{number}_TRIM", SERVOS[1].centre)
             sign = {"sign": -1} if parameters.get(f"SERVO{number}_REVERSED", 0.0) else {}
-            how = {"unit": COUNTS, "centre": int(centre), **sign}
-            found |= {f"{message}.{field.format(number)}": (signal, how) for message, field in PULSES.items()}
+            keys = {"unit": COUNTS, "centre": int(centre), **sign}
+            found |= {f"{message}.{field.format(number)}": (signal, keys) for message, field in PULSES.items()}
     return found
 
 
 def sniff(path: Path) -> bool:
-    """Whether a file starts as a DataFlash log, binary or text, or as a packet with its time."""
+    """Whether a file starts like a DataFlash log, binary or text, or with a time and a MAVLink packet."""
     head = head_of(path)
     if head.startswith(DATAFLASH) or TEXT.search(head):
         return True
@@ -68,7 +68,7 @@ def sniff(path: Path) -> bool:
 
 
 def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
-    """Return all topics, and what they mean: by the definitions, the outputs by the vehicle's own parameters.
+    """Return all topics and their meaning: by the definitions of the messages, for outputs by the vehicle's parameters.
 
     Raises LogError for a damaged file, or without pymavlink.
     """
@@ -77,11 +77,11 @@ def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
     what = "a DataFlash log (ArduPilot)" if is_flash else "a telemetry log (MAVLink)"
     mavutil = library("pymavlink.mavutil", path, what, "ardupilot")
     try:
-        with unheard(), closing(mavutil.mavlink_connection(str(path)) if not is_flash else _flash(path)) as log:
+        with silenced(), closing(mavutil.mavlink_connection(str(path)) if not is_flash else _opened_flash(path)) as log:
             rows, parameters = _rows(log, is_flash=is_flash)
-    except Exception as error:  # pymavlink raises this very class for a format it does not know
+    except Exception as error:  # pymavlink raises exactly this class for a format it does not know
         raise unreadable(path, f"{what} that cannot be read", error) from error
-    topics = {name: _joined(messages) for name, messages in rows.items()}
+    topics = {name: _topic_of_messages(messages) for name, messages in rows.items()}
     return Topics(topics, {**MEANS, **_outputs(parameters)}, _cut(path))
 
 
@@ -102,16 +102,16 @@ def _rows(log: Any, *, is_flash: bool) -> tuple[Rows, dict[str, float]]:
     return rows, parameters
 
 
-def _flash(path: Path) -> Any:
+def _opened_flash(path: Path) -> Any:
     forms = library("pymavlink.DFReader", path, "a DataFlash log (ArduPilot)", "ardupilot")
-    its_own = forms.DFReader_binary if head_of(path).startswith(DATAFLASH) else forms.DFReader_text
-    # its compiled index writes a line for each damaged byte to the process's own stderr, where nothing keeps it from the user
-    kind: Any = type("Quiet", (its_own,), {"init_arrays_fast": its_own.init_arrays})  # the text form has none
+    reader = forms.DFReader_binary if head_of(path).startswith(DATAFLASH) else forms.DFReader_text
+    # The compiled index of pymavlink writes a line for each damaged byte to file descriptor 2, which `silenced` does not reach.
+    kind: Any = type("Quiet", (reader,), {"init_arrays_fast": reader.init_arrays})  # the text form has no compiled index
     log = kind.__new__(kind)
     try:
         kind.__init__(log, str(path))
     except Exception:
-        # it opens the file before it looks into it, and leaves it open where it does not like what it finds
+        # it opens the file before it reads the format, and leaves it open after an error
         if (handle := getattr(log, "filehandle", None)) is not None:
             handle.close()
         raise
@@ -119,11 +119,11 @@ def _flash(path: Path) -> Any:
 
 
 def _of_flash(message: Any, body: dict[str, float]) -> tuple[str, float | None]:
-    """Return the name and the time in s of a message of the vehicle, which are taken out of its numbers."""
+    """Return the name and the time in s of a DataFlash message; remove its time and instance from its numbers `body`."""
     stamp, unit_s = (body.pop("TimeUS"), 1e-6) if "TimeUS" in body else (body.pop("TimeMS", None), 1e-3)
-    # without the units of its fields a format does not say which is the number of the sensor: then it stands behind the time
-    which = getattr(message.fmt, "instance_field", None) or ("I" if list(message.fmt.columns[1:2]) == ["I"] else None)
-    name = f"{message.get_type()}[{int(body.pop(which))}]" if which in body else message.get_type()
+    # A format without units does not state which field is the number of the sensor: then it is `I`, next after the time.
+    instance = getattr(message.fmt, "instance_field", None) or ("I" if list(message.fmt.columns[1:2]) == ["I"] else None)
+    name = f"{message.get_type()}[{int(body.pop(instance))}]" if instance in body else message.get_type()
     return name, None if stamp is None else float(stamp) * unit_s
 
 
@@ -132,7 +132,7 @@ def _of_packet(message: Any) -> tuple[str, float]:
 
 
 def _cut(path: Path) -> tuple[Note, ...]:
-    """Return the note that a DataFlash log is cut off inside a message, by the lengths that it states of its formats."""
+    """Return the note that a DataFlash log is cut off inside a message, by the lengths that it states for its formats."""
     data = path.read_bytes()
     if not data.startswith(DATAFLASH):
         return ()
@@ -144,7 +144,7 @@ def _cut(path: Path) -> tuple[Note, ...]:
     return () if at == len(data) else (Note("truncated", f"the log is damaged or cut off at byte {min(at, len(data))}", {}),)
 
 
-def _joined(messages: list[tuple[float, dict[str, float]]]) -> Topic | None:
+def _topic_of_messages(messages: list[tuple[float, dict[str, float]]]) -> Topic | None:
     names = messages[0][1]
     fields = {n: np.array([m.get(n, np.nan) for _, m in messages], dtype=np.float64) for n in names}
     return topic_of(np.array([t for t, _ in messages]), fields)

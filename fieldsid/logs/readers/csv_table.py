@@ -1,4 +1,4 @@
-"""Tables of text: any separator, header or none, leading lines of words, gzip, UTF-8/16 or Windows-1252, decimal comma."""
+"""Read tables of text: any separator, header or none, leading lines of words, gzip, UTF-8/16, Windows-1252, decimal comma."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN, head_of, is_text, known_text
 
 NUMBERS = "fiub"
-ROOM = 1.01
-"""By how much a column is made longer than it is expected to become: one that is too short is moved once more."""
+SPARE = 1.01
+"""Factor by which a column is allocated longer than expected, because one that is too short must be copied once more."""
 
 
 class GrowingColumn:
-    """Cells (n,) of a column: numbers as long as all blocks hold nothing else, words from then on."""
+    """Cells (n,) of a column that grows by blocks: numbers until a block contains words, objects from then on."""
 
     def __init__(self) -> None:
         self._cells: npt.NDArray[Any] = np.zeros(0)
         self._count = 0
 
     def add(self, block: npt.NDArray[Any], expected: float) -> None:
-        """Append a block; `expected` is the number of cells that the column will probably have."""
+        """Append a block; `expected` is the probable number of cells of the complete column."""
         if not self._count:
             self._cells = self._cells.astype(block.dtype)
         elif block.dtype != self._cells.dtype:
@@ -46,12 +46,12 @@ class GrowingColumn:
             self._cells = self._cells.astype(object if has_words else np.result_type(block, self._cells))
         end = self._count + block.size
         if end > self._cells.size:
-            self._cells.resize(max(end, round(ROOM * expected)), refcheck=False)
+            self._cells.resize(max(end, round(SPARE * expected)), refcheck=False)
         self._cells[self._count : end] = block
         self._count = end
 
     def whole(self) -> npt.NDArray[Any]:
-        """Return the cells (n,), read-only; the column grows no more."""
+        """Return all cells (n,), read-only; no block may be added after this."""
         self._cells.resize(self._count, refcheck=False)
         self._cells.setflags(write=False)
         return self._cells
@@ -59,11 +59,11 @@ class GrowingColumn:
 
 _LINE = re.compile(r"line (\d+)")
 BLOCK_ROWS = 100_000
-"""Rows that are read at once: what a block's cells take while they are text is little beside the columns."""
+"""Rows that are read at once: few enough that the text of a block takes little memory compared with the columns."""
 
 
 def sniff(path: Path) -> bool:
-    """Whether a file may be text: anything that has no binary format's signature."""
+    """Whether a file may be text: it is gzip, or does not have the signature of a binary format."""
     return not path.is_dir() and (head_of(path).startswith(GZIP) or is_text(path))
 
 
@@ -92,7 +92,7 @@ def columns_of(path: Path, form: TableForm, options: ReadOptions) -> tuple[Colum
 
 
 def names_of(path: Path) -> tuple[str, ...]:
-    """Return the names of a table's columns, none of an empty text; raises LogError where it is no table."""
+    """Return the names of a table's columns, empty for an empty text; raises LogError where the file is no table."""
     with plain_text(path, None, limit=HEAD) as text:
         head = _head_of(path, text)
         return form_of(head, TableForm(), path).names if head.strip() else ()
@@ -104,7 +104,7 @@ def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
 
 
 def _head_of(path: Path, text: PlainText) -> str:
-    """Return the start of a text, by which it is known how it is written; raises LogError where not even a line ends in it."""
+    """Return the start of a text, from which its form is found; raises LogError where it does not contain one complete line."""
     head = text.head()
     if "\n" not in head and text.size >= HEAD:
         refuse_endless(path, text.size, head[:40])
@@ -119,7 +119,7 @@ def opened(path: Path, asked: TableForm, options: ReadOptions) -> Iterator[_Tabl
 
 
 class _Table:
-    """The text of one file, its form, and its cells."""
+    """The text of one file, with its form and its cells."""
 
     def __init__(self, path: Path, text: PlainText, asked: TableForm, options: ReadOptions) -> None:
         self.path = path
@@ -132,12 +132,12 @@ class _Table:
         self.begin = text.offset_of_line(self.form.start)
         self.end = text.size
         if text.is_cut:
-            self._cut()
+            self._end_at_cut()
         else:
             self._drop_half_a_line()
 
-    def _cut(self) -> None:
-        """A gzip stream that ends early: its last line is not whole, and what is left is taken on request only."""
+    def _end_at_cut(self) -> None:
+        """Leave out the incomplete last line of a truncated gzip stream; raises LogError unless the options say to salvage."""
         self.end = max(self.text.last_line()[0], self.begin)
         rows = self.text.count(b"\n", self.begin, self.end)
         if not self.options.salvage:
@@ -149,7 +149,7 @@ class _Table:
         self.notes.append(Note("truncated", f"the gzip file is cut off; {rows} rows were left", {"rows": rows}))
 
     def _drop_half_a_line(self) -> None:
-        """A plain file that was cut off ends in a line with too few cells."""
+        """Leave out a last line with too few cells, at which a file that is not packed was cut off."""
         begin, line = self.text.last_line()
         if len(line) > LONGEST_ROW:
             refuse_endless(self.path, self.text.size - begin, line[:40].decode("latin-1"))
@@ -161,7 +161,7 @@ class _Table:
             )
 
     def columns(self, wanted: Iterable[int]) -> Columns:
-        """Return the columns; the cells are there of those that are wanted."""
+        """Return the columns, with cells for those whose index is wanted."""
         taken = self._cells(sorted(set(wanted)))
         return Columns(self.path, self.form.names, self.form.width, taken.__getitem__, self.form.units)
 
@@ -180,20 +180,20 @@ class _Table:
                 return self._parsed(wanted)
 
     def _copied(self, plain: IO[bytes], line_of: Callable[[bytes], bytes]) -> None:
-        """Read on from a copy of the rows, each as a function gives it."""
+        """Replace the text by a copy of the rows, each as `line_of` returns it."""
         with self.text.between(self.begin, self.end) as rows:
             plain.writelines(map(line_of, rows))
         self.text = replace(self.text, stream=plain, size=plain.tell(), encoding=self.text.encoding.removesuffix("-sig"))
         self.begin, self.end = 0, plain.tell()
 
     def _without_errors(self, plain: IO[bytes]) -> None:
-        """Leave an empty cell for each in which a program says that there is no number."""
+        """Replace each cell by which a program marks that there is no number by an empty one."""
         found: list[bytes] = []
 
         def without(raw: bytes) -> bytes:
-            said = ERRORS.findall(raw) if b"#" in raw else []
-            found.extend(said)
-            return ERRORS.sub(b"", raw) if said else raw
+            errors = ERRORS.findall(raw) if b"#" in raw else []
+            found.extend(errors)
+            return ERRORS.sub(b"", raw) if errors else raw
 
         self._copied(plain, without)
         if found:
@@ -201,7 +201,7 @@ class _Table:
             self.notes.append(Note("error_cells", message, {"count": len(found)}))
 
     def _without_sentences(self, plain: IO[bytes]) -> None:
-        """Leave an empty line for each sentence of NMEA among the rows."""
+        """Replace each sentence of NMEA between the rows by an empty line."""
         found: list[bytes] = []
 
         def without(raw: bytes) -> bytes:
@@ -216,7 +216,7 @@ class _Table:
             self.notes.append(Note("nmea_lines", message, {"count": len(found)}))
 
     def _without_words(self, plain: IO[bytes]) -> bool:
-        """Leave an empty line for each line without a number that is no row; return whether there was one."""
+        """Replace each line without a number by an empty one; return whether there was such a line."""
         found: list[str] = []
 
         def without(raw: bytes) -> bytes:
@@ -232,7 +232,7 @@ class _Table:
         return bool(found)
 
     def _parsed(self, wanted: Sequence[int]) -> dict[int, npt.NDArray[Any]]:
-        """Return the cells (n,) of the wanted columns: numbers where a column holds nothing else, words otherwise."""
+        """Return the cells (n,) of the wanted columns: numbers where a column contains nothing else, else objects."""
         import pandas as pd
 
         grown = {i: GrowingColumn() for i in wanted}
@@ -252,7 +252,7 @@ class _Table:
         return {i: self._with_points(column.whole()) for i, column in grown.items()}
 
     def _with_points(self, cells: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Return cells with a decimal point where words among them kept pandas from reading their commas."""
+        """Return cells with decimal points: pandas does not read decimal commas in a column that contains words."""
         if self.form.decimal == "." or cells.dtype.kind in NUMBERS:
             return cells
         return np.array([c.replace(",", ".") if isinstance(c, str) and not is_word(c, ",") else c for c in cells], dtype=object)
@@ -284,7 +284,7 @@ class _Table:
 
     def _count_bad_rows(self, kept: int) -> None:
         with self.text.between(self.begin, self.end) as rows:
-            # a quote that closes on a line of its own ends a cell, and is no row
+            # a closing quote alone on a line ends a cell of the row before, and is no row
             lines = (line.strip(b"\"' \t\r\n") for line in rows)
             left_out = sum(1 for line in lines if line and not line.startswith(b"#")) - kept
         if left_out > 0:
@@ -294,7 +294,7 @@ class _Table:
 
 
 def _exact(version: str) -> dict[str, Any]:
-    """Ask pandas for the last digit; from 3.1 on it gives it unasked, and warns when asked."""
+    """Return the option by which pandas reads every digit; from version 3.1 on it does so by default, and warns of the option."""
     major, minor = (int(n) for n in version.split(".")[:2])
     return {} if (major, minor) >= (3, 1) else {"float_precision": "round_trip"}
 

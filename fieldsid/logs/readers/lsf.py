@@ -1,8 +1,9 @@
-"""Logs of DUNE and Neptus (LSTS), .lsf: IMC messages one behind the other, which the IMC.xml beside them defines.
+"""Read logs of DUNE and Neptus (LSTS), .lsf: a sequence of IMC messages, which an IMC.xml in the same folder defines.
 
-A message is a header of 20 bytes (synchronisation number 0xFE, major and minor version, which tells the byte order; kind, size of
-what follows, time in s, source, its entity, destination, its entity), its fields, and the CRC-16-IBM of both (IMC protocol
-reference, LSTS). Where the next message does not follow, what lies between is damaged and left out, as is a wrong checksum.
+A message is a header of 20 bytes, its fields, and the CRC-16-IBM of both (IMC protocol reference, LSTS). The header has the
+synchronisation number (0xFE with the major and minor version; it shows the byte order), kind, size of the fields, time in s,
+source, entity of the source, destination, and entity of the destination. Bytes between two messages are damaged and left out, as
+are messages with a wrong checksum.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ NUMBERS: Mapping[str, str] = MappingProxyType(
     {"int8_t": "i1", "uint8_t": "u1", "int16_t": "i2", "uint16_t": "u2", "int32_t": "i4", "uint32_t": "u4", "int64_t": "i8",
      "fp32_t": "f4", "fp64_t": "f8"}
 )  # fmt: skip
-"""NumPy's types of the protocol's numbers; text, raw data and messages inside a message have no length of their own."""
+"""NumPy's types of the protocol's numbers; text, raw data and messages inside a message have no fixed length."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +46,7 @@ class Message:
 
 
 def definition_of(path: Path, folder: Path | None) -> dict[int, Message]:
-    """Return the kinds of messages by number, from beside a log or from a folder; raises LogError for no definition."""
+    """Return the kinds of messages by number, defined in `folder`, else in the folder of the log; raises LogError without one."""
     place = folder or path.parent
     file = next((f for name in FILES if (f := place / name).is_file()), None)
     if file is None:
@@ -62,7 +63,7 @@ def definition_of(path: Path, folder: Path | None) -> dict[int, Message]:
         ) from error
 
 
-def _messages(text: bytes, is_cut: bool) -> dict[int, Message]:  # noqa: FBT001 - as `inflated` gives them
+def _messages(text: bytes, is_cut: bool) -> dict[int, Message]:  # noqa: FBT001 - as `inflated` returns them
     if is_cut:
         raise ValueError("it is cut off")
     if b"<!ENTITY" in text:
@@ -95,7 +96,7 @@ MEANS: Means = {f"EstimatedState.{name}": (signal, {"unit": unit}) for name, (si
     "Rpm.value": ("propeller_rpm", {"unit": "rpm"}),
     "SetThrusterActuation.value": ("thrust", {}),
 }
-"""What the protocol says of its messages: the estimated state is north-east-down, the body forward-starboard-down."""
+"""Signals by the protocol: the estimated state is in north-east-down axes, the body in forward-starboard-down axes."""
 
 
 def sniff(path: Path) -> bool:
@@ -104,24 +105,24 @@ def sniff(path: Path) -> bool:
     if head.startswith(GZIP):
         try:
             head = next((piece for piece, _ in gunzipped(BytesIO(head)) if piece), b"")
-        except (zlib.error, EOFError):  # whatever it is, this reader does not take it
+        except (zlib.error, EOFError):  # not a readable gzip file, so not one for this reader
             return False
     return imc_order(head) is not None
 
 
 Kinds = dict[tuple[int, int, int, int], list[int]]
-"""Where messages start, by kind, source, entity and size."""
+"""Byte offsets of messages, by kind, source, entity and size."""
 
 
-def _places(data: bytes, order: str) -> tuple[Kinds, int, int]:
-    """Return where the messages of each kind start, and where the bytes are none: how often, and first."""
+def _find_messages(data: bytes, order: str) -> tuple[Kinds, int, int]:
+    """Return the offsets of the messages of each kind, the number of damaged places, and the offset of the first one."""
     head, by_kind = struct.Struct(f"{order}HHHdHBHB"), defaultdict(list)
     sync, at, damaged, first, buffer = data[:2], 0, 0, -1, np.frombuffer(data, np.uint8)
     while at >= 0 and at + HEADER + FOOTER <= len(data):
         _, kind, size, _, source, entity, _, _ = head.unpack_from(data, at)
         end = at + HEADER + size + FOOTER
         follows = end == len(data) or data[end : end + 2] == sync
-        if data[at : at + 2] == sync and end <= len(data) and (follows or _whole(buffer[None, at:end], order)[0]):
+        if data[at : at + 2] == sync and end <= len(data) and (follows or _have_checksum(buffer[None, at:end], order)[0]):
             by_kind[kind, source, entity, size].append(at)
             at = end
             continue
@@ -141,13 +142,13 @@ CRC = _crc_table()
 """The CRC-16-IBM of each byte: x^16 + x^15 + x^2 + 1, low bit first."""
 
 
-def _whole(messages: npt.NDArray[np.uint8], order: str) -> npt.NDArray[np.bool_]:
-    """Return which messages (n, size) have the checksum that they end with."""
-    said = np.ascontiguousarray(messages[:, -FOOTER:]).view(f"{order}u2")[:, 0]
-    made = np.zeros(len(messages), dtype=np.uint16)
+def _have_checksum(messages: npt.NDArray[np.uint8], order: str) -> npt.NDArray[np.bool_]:
+    """Return a mask (n,) of the messages (n, size) whose checksum is right."""
+    stated = np.ascontiguousarray(messages[:, -FOOTER:]).view(f"{order}u2")[:, 0]
+    computed = np.zeros(len(messages), dtype=np.uint16)
     for column in messages[:, :-FOOTER].T:
-        made = (made >> 8) ^ CRC[(made ^ column) & 0xFF]
-    return np.asarray(made == said)
+        computed = (computed >> 8) ^ CRC[(computed ^ column) & 0xFF]
+    return np.asarray(computed == stated)
 
 
 def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
@@ -157,8 +158,8 @@ def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
     order = imc_order(data[:2])
     if order is None:
         raise LogError(f"`{path}` is a damaged IMC log", found="no message at its start", hint=COPY_AGAIN)
-    (places, lost, first), buffer = _places(data, order), np.frombuffer(data, np.uint8)
-    own = Counter(source for (_, source, _, _), starts in places.items() for _ in starts)
+    (places, damaged, first), buffer = _find_messages(data, order), np.frombuffer(data, np.uint8)
+    by_source = Counter(source for (_, source, _, _), starts in places.items() for _ in starts)
     parts: dict[tuple[int, int, int], list[tuple[FloatArray, dict[str, FloatArray]]]] = defaultdict(list)
     wrong = 0
     for (kind, source, entity, size), starts in places.items():
@@ -166,35 +167,39 @@ def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
         if not 0 < layout.itemsize <= size:
             continue
         messages = buffer[np.array(starts)[:, None] + np.arange(HEADER + size + FOOTER)]
-        good = messages[_whole(messages, order)]
+        good = messages[_have_checksum(messages, order)]
         wrong += len(messages) - len(good)
         time = np.ascontiguousarray(good[:, 6:14]).view(f"{order}f8")[:, 0].astype(np.float64)
         numbers = np.ascontiguousarray(good[:, HEADER : HEADER + layout.itemsize]).view(layout)[:, 0]
         parts[kind, source, entity].append((time, {n: numbers[n].astype(np.float64) for n in layout.names or ()}))
-    # the system of most messages wrote the log, which hears others too
-    named = dict(_named(kinds, parts, max(own, key=lambda source: own[source], default=0)))
-    return Topics(named, MEANS, _notes(lost, wrong, first, is_cut=is_cut))
+    # the source of most messages is the system that wrote the log; it also records messages of others
+    named = dict(_named(kinds, parts, max(by_source, key=lambda source: by_source[source], default=0)))
+    return Topics(named, MEANS, _notes(damaged, wrong, first, is_cut=is_cut))
 
 
-def _notes(lost: int, wrong: int, first: int, *, is_cut: bool) -> tuple[Note, ...]:
-    if not lost + wrong and not is_cut:
+def _notes(damaged: int, wrong: int, first: int, *, is_cut: bool) -> tuple[Note, ...]:
+    if not damaged + wrong and not is_cut:
         return ()
-    where = f", the first at byte {first}" if lost else ""
+    where = f", the first at byte {first}" if damaged else ""
     cut = "; the packed file is cut off" if is_cut else ""
-    message = f"messages that are damaged or cut off, left out: {lost + wrong}{where}{cut}"
-    return (Note("truncated", message, {"count": lost + wrong}),)
+    message = f"messages that are damaged or cut off, left out: {damaged + wrong}{where}{cut}"
+    return (Note("truncated", message, {"count": damaged + wrong}),)
 
 
 def _named(
-    kinds: dict[int, Message], parts: dict[tuple[int, int, int], list[tuple[FloatArray, dict[str, FloatArray]]]], own: int
+    kinds: dict[int, Message], parts: dict[tuple[int, int, int], list[tuple[FloatArray, dict[str, FloatArray]]]], logger: int
 ) -> Iterator[tuple[str, Topic | None]]:
-    """Yield topics: the own system's busiest entity has the message's name, others their source, entity or device beside it."""
+    """Yield topics by name.
+
+    The topic of the entity that sends most messages of a kind, in the system that wrote the log (`logger`), has the name of the
+    message. The names of the other topics have the source, the entity or the device in brackets.
+    """
     sizes = {key: sum(len(time) for time, _ in blocks) for key, blocks in parts.items()}
     for (kind, source, entity), blocks in parts.items():
-        rivals = [key for key in parts if key[0] == kind and key[1] == own]
+        rivals = [key for key in parts if key[0] == kind and key[1] == logger]
         busiest = max(rivals, key=lambda key: sizes[key], default=None) == (kind, source, entity)
         name = kinds[kind].name
-        name += "" if busiest else f"[{entity}]" if source == own else f"[{source:#06x}.{entity}]"
+        name += "" if busiest else f"[{entity}]" if source == logger else f"[{source:#06x}.{entity}]"
         time = np.concatenate([t for t, _ in blocks])
         fields = {n: np.concatenate([f[n] for _, f in blocks]) for n in blocks[0][1]}
         devices = np.unique(fields["id"]) if "id" in fields else np.zeros(0)

@@ -1,4 +1,4 @@
-"""MATLAB files, .mat: the columns of equal length among their variables and the fields of their structs; 7.3 by h5py."""
+"""Read MATLAB files, .mat: columns of equal length among the variables and the fields of structs; version 7.3 by h5py."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _FAILURES = (ValueError, TypeError, KeyError, IndexError, OSError, EOFError, Not
 
 
 def sniff(path: Path) -> bool:
-    """Whether a file has MATLAB's head."""
+    """Whether a file has the head that MATLAB writes."""
     return head_of(path).startswith(MAGIC)
 
 
@@ -46,14 +46,14 @@ def _columns(path: Path) -> Columns:
         )
     longest = max(lengths, key=lambda size: (lengths[size], size))
     kept = {name: v for name, v in found.items() if v.size == longest}
-    names, filled = tuple(kept), _filled(list(kept.values()))
+    names, filled = tuple(kept), _filled_rows(list(kept.values()))
     return Columns(path, names, len(names), lambda i: kept[names[i]][:filled])
 
 
-def _filled(columns: list[FloatArray]) -> int:
-    """Return the rows up to the last that holds anything but zeros: a script that makes room first leaves the rest empty."""
-    held = np.flatnonzero(np.logical_or.reduce([v != 0.0 for v in columns]))
-    return int(held[-1]) + 1 if held.size else columns[0].size
+def _filled_rows(columns: list[FloatArray]) -> int:
+    """Return the number of rows up to the last one that is not all zero: preallocated rows that were not filled are zero."""
+    nonzero = np.flatnonzero(np.logical_or.reduce([v != 0.0 for v in columns]))
+    return int(nonzero[-1]) + 1 if nonzero.size else columns[0].size
 
 
 def _of_mat(path: Path) -> Iterator[tuple[str, FloatArray]]:
@@ -61,7 +61,7 @@ def _of_mat(path: Path) -> Iterator[tuple[str, FloatArray]]:
     refuse_damaged(path)
     try:
         with warnings.catch_warnings():
-            # of objects without a name, which hold no columns
+            # scipy warns of objects without a name, which contain no columns
             warnings.simplefilter("ignore", scipy_io.matlab.MatReadWarning)
             variables = scipy_io.loadmat(str(path), squeeze_me=True, struct_as_record=False)
     except _FAILURES as error:
@@ -72,14 +72,14 @@ def _of_mat(path: Path) -> Iterator[tuple[str, FloatArray]]:
         raise unreadable(path, "a MATLAB file that cannot be read", error) from error
     for name, value in variables.items():
         if not name.startswith("__"):
-            yield from _walked(name, value, 0)
+            yield from _columns_in(name, value, 0)
 
 
-def _walked(name: str, value: Any, depth: int) -> Iterator[tuple[str, FloatArray]]:
-    """Yield the columns of a variable: itself, those of a matrix, and those of a struct's fields."""
+def _columns_in(name: str, value: Any, depth: int) -> Iterator[tuple[str, FloatArray]]:
+    """Yield the columns of a variable: a vector, the columns of a matrix, or those of a struct's fields."""
     if hasattr(value, "_fieldnames") and depth < DEEPEST:
         for part in value._fieldnames:  # noqa: SLF001 - scipy's only list of a struct's fields
-            yield from _walked(part if depth == 0 else f"{name}.{part}", getattr(value, part), depth + 1)
+            yield from _columns_in(part if depth == 0 else f"{name}.{part}", getattr(value, part), depth + 1)
     elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
         yield from _of_array(name, value)
 

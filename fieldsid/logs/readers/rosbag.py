@@ -13,7 +13,7 @@ from fieldsid.logs.readers.bags.stores import SUFFIXES, collected, is_bag
 
 
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
-    """Return topics with type, count, rate, and the first value, least and largest of every number inside."""
+    """Return the topics with type, count, rate, and the first, least and largest value of each of their numbers."""
     from fieldsid.logs.readers.bags.contents import Contents
 
     contents = Contents(path, options)

@@ -1,4 +1,4 @@
-"""Logs of Slocum gliders, .dbd and its kin, read by dbdreader (extra `slocum`): each sensor on the times it was written at."""
+"""Read logs of Slocum gliders, .dbd and related formats, by dbdreader (extra `slocum`): each sensor at its times of writing."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fieldsid.logs.unknown_file import COPY_AGAIN, head_of, is_glider_log, unrea
 
 END = b"X"
 SIZES = {1, 2, 4, 8}
-"""Bytes of a sensor's number."""
+"""Possible numbers of bytes of a sensor's value."""
 MEANS: Means = {
     f"m_heading.{DATA}": ("yaw_rad", {"unit": "rad"}),
     f"m_pitch.{DATA}": ("pitch_rad", {"unit": "rad"}),
@@ -29,7 +29,7 @@ MEANS: Means = {
     f"c_pitch.{DATA}": ("pitch_goal_rad", {"unit": "rad"}),
     f"c_fin.{DATA}": ("rudder_rad", {"unit": "rad"}),
 }
-"""The glider's own sensors: heading from north, pitch up, the fin its rudder; `c_` is commanded, `m_` measured."""
+"""Signals by the glider's sensors: heading from north, pitch positive up, fin as rudder; `c_` is commanded, `m_` measured."""
 _TAGS = re.compile(rb"num_ascii_tags:\s*(\d+)")
 _CACHE = re.compile(rb"sensor_list_crc:\s*(\w+)")
 _FACTORED = re.compile(rb"sensor_list_factored:\s*1")
@@ -42,17 +42,17 @@ def sniff(path: Path) -> bool:
 
 
 def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
-    """Return the sensors that are wanted, all where they are not all there; raises LogError, also without dbdreader."""
+    """Return the wanted sensors, or all sensors if one of them is missing; raises LogError, also without dbdreader."""
     dbdreader = library("dbdreader", path, "a Slocum glider's log", "slocum")
     _refuse_cut_head(path)
     cache = _cache_of(path)
     try:
-        # The list of sensors of a log that brings its own is written to the cache: not beside the log. One that lies there is
-        # looked for in small letters, and a glider writes capitals.
-        with TemporaryDirectory() as own:
+        # dbdreader writes the list of sensors that is inside a log to its cache folder, which must not be the folder of the log.
+        # It looks for the file of an external list by a lower-case name, while gliders write upper-case names.
+        with TemporaryDirectory() as cache_folder:
             if cache is not None:
-                copy(cache, Path(own) / cache.name.lower())
-            log = dbdreader.DBD(str(path), cacheDir=own)
+                copy(cache, Path(cache_folder) / cache.name.lower())
+            log = dbdreader.DBD(str(path), cacheDir=cache_folder)
             log.close()  # it opens the file again to read it
             _refuse_other_lengths(path, log)
             found = _sensors(log, sorted(wanted.intersection(log.parameterNames)))
@@ -64,7 +64,7 @@ def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
 
 
 def _refuse_cut_head(path: Path) -> None:
-    """Raise LogError where the head ends before the lines that it counts: dbdreader would look for them for ever."""
+    """Raise LogError where the head has fewer lines than it states: dbdreader would search for them in an endless loop."""
     head = head_of(path)
     tags = _TAGS.search(head)
     lines = head.count(b"\n")
@@ -75,7 +75,7 @@ def _refuse_cut_head(path: Path) -> None:
 
 
 def _refuse_other_lengths(path: Path, log: Any) -> None:
-    """Raise LogError where the counts of a head are not those of its list: dbdreader's compiled part takes them as they stand."""
+    """Raise LogError where the head's counts differ from its list of sensors: the compiled part of dbdreader trusts them."""
     count, sizes, names = log.headerInfo["sensors_per_cycle"], log.byteSizes, log.parameterNames
     fits = len(sizes) == count > 0 and log.n_state_bytes == -(-count // 4) and len(set(names)) == count
     if not fits or not set(sizes) <= SIZES:
@@ -86,7 +86,7 @@ def _refuse_other_lengths(path: Path, log: Any) -> None:
 
 
 def _sensors(log: Any, names: list[str]) -> dict[str, Topic | None]:
-    """Return sensors by name, all of them by one way through the file: a glider has two thousand."""
+    """Return sensors by name, read in one pass through the file, because a glider has two thousand of them."""
     read = log.get(*names) if len(names) > 1 else [log.get(*names)] if names else []
     return {
         name: topic_of(np.asarray(time, dtype=np.float64), {DATA: np.asarray(values, dtype=np.float64)}, log.parameterUnits[name])
@@ -95,7 +95,7 @@ def _sensors(log: Any, names: list[str]) -> dict[str, Topic | None]:
 
 
 def _cut(path: Path) -> tuple[Note, ...]:
-    """Return the note that a log is cut off: the glider closes it with a mark."""
+    """Return the note that a log is cut off, because it does not end with the mark that the glider writes last."""
     with path.open("rb") as stream:
         stream.seek(-1, 2)
         is_whole = stream.read(1) == END
@@ -103,7 +103,7 @@ def _cut(path: Path) -> tuple[Note, ...]:
 
 
 def _cache_of(path: Path) -> Path | None:
-    """Return the list of sensors that a log refers to, None where it brings the list; raises LogError."""
+    """Return the file of the list of sensors that a log refers to, None where the log contains it; raises LogError without it."""
     head = head_of(path)
     found = _CACHE.search(head)
     if found is None or not _FACTORED.search(head):

@@ -1,4 +1,4 @@
-"""PX4 logs, .ulg, read by pyulog (extra `ulog`): each topic of the flight stack with its fields, north-east-down."""
+"""Read PX4 logs, .ulg, by pyulog (extra `ulog`): each topic of the flight stack with its fields, in north-east-down axes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from fieldsid.errors import LogError
 from fieldsid.logs.reader import ReadOptions
-from fieldsid.logs.readers._topics import Means, Topics, library, topic_of, topic_reader, unheard
+from fieldsid.logs.readers._topics import Means, Topics, library, silenced, topic_of, topic_reader
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import ULOG, ULOG_HEADER, head_of, unreadable
 
@@ -28,11 +28,11 @@ MEANS: Means = {
     "actuator_controls_0.control[2]": ("rudder_rad", {"unit": "1"}),
     "actuator_controls_0.control[3]": ("thrust", {}),
 }
-"""What the definitions of PX4's own topics say."""
+"""Signals by the definitions of PX4's topics."""
 
 
 def sniff(path: Path) -> bool:
-    """Whether a file has the signature."""
+    """Whether a file has the signature of ULog."""
     return head_of(path).startswith(ULOG)
 
 
@@ -44,13 +44,13 @@ def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
         raise LogError(what, found=f"{size} bytes: its header", hint="take another log")
     pyulog = library("pyulog", path, "a ULog file (PX4)", "ulog")
     try:
-        with path.open("rb") as stream, unheard():
+        with path.open("rb") as stream, silenced():
             log = pyulog.ULog(stream)
     except Exception as error:  # pyulog has no error of its own for what it cannot parse
         raise unreadable(path, "a damaged ULog file", error) from error
     topics = {}
     for part in log.data_list:
-        if "timestamp" not in part.data:  # the format asks for it: a definition that was damaged
+        if "timestamp" not in part.data:  # the format requires it, so the definition is damaged
             continue
         fields = {n: np.asarray(v, dtype=np.float64) for n, v in part.data.items() if n != "timestamp"}
         stamps = np.asarray(part.data["timestamp"], dtype=np.float64) / 1e6
