@@ -1,6 +1,6 @@
-"""The text of a table file as plain bytes: unzipped, and in an encoding in which a line ends in one byte.
+"""Provide the text of a table file as bytes: unzipped, and in an encoding in which a line ends in one byte.
 
-A plain file is read where it lies; any other is unpacked or transcoded into a temporary file, piece by piece, so that no
+A file that is already so is read directly; any other is unpacked or transcoded into a temporary file, piece by piece, so that no
 table is in memory as text.
 """
 
@@ -23,14 +23,14 @@ from fieldsid.logs.readers._unpacked import GZIP, LONGEST_ROW, PIECE_BYTES, Unpa
 from fieldsid.logs.unknown_file import COPY_AGAIN
 
 HEAD = LONGEST_ROW
-"""Bytes at the start of a table that tell how it is written."""
+"""Number of bytes at the start of a table from which its form is found."""
 LONGEST_CELL = 64
-"""Bytes that a cell looked for may have before a piece of the text."""
+"""Overlap of the pieces in which a cell is searched, so that a cell across their border is found."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlainText:
-    """A table's bytes, their encoding and number, and whether the gzip stream they came in ends early."""
+    """The bytes of a table, with their encoding and number; `is_cut` says that their gzip stream ended early."""
 
     stream: IO[bytes]
     encoding: str
@@ -38,17 +38,17 @@ class PlainText:
     is_cut: bool
 
     def head(self) -> str:
-        """Return the text at the start; a character that the cut splits is replaced."""
+        """Return the text of the first HEAD bytes; an incomplete character at their end is replaced."""
         self.stream.seek(0)
         return self.stream.read(HEAD).decode(self.encoding, errors="replace")
 
     def offset_of_line(self, line: int) -> int:
-        """Return the byte at which a line starts, counted from 0."""
+        """Return the byte offset at which a line, counted from 0, starts."""
         self.stream.seek(0)
         return sum(len(self.stream.readline()) for _ in range(line))
 
     def last_line(self) -> tuple[int, bytes]:
-        """Return the byte behind the last line end, and what follows there, up to a little more than the longest row."""
+        """Return the offset after the last line end, and the bytes that follow, at most one more than a row can have."""
         begin = behind = self.size
         while begin == behind > 0:
             start = max(0, behind - PIECE_BYTES)
@@ -57,11 +57,11 @@ class PlainText:
         return begin, self._piece(begin, min(self.size - begin, LONGEST_ROW + 1))
 
     def count(self, what: bytes, begin: int, end: int) -> int:
-        """Return how often a byte stands between two places."""
+        """Return the number of occurrences of a byte between two offsets."""
         return sum(self._piece(at, min(PIECE_BYTES, end - at)).count(what) for at in range(begin, end, PIECE_BYTES))
 
     def holds(self, what: re.Pattern[bytes], mark: bytes, begin: int, end: int) -> bool:
-        """Whether a cell of an expression that holds a mark stands between two places."""
+        """Whether a cell that matches an expression, and contains the byte `mark`, is between two offsets."""
         pieces = (
             self._piece(max(begin, at - LONGEST_CELL), min(PIECE_BYTES + LONGEST_CELL, end - at))
             for at in range(begin, end, PIECE_BYTES)
@@ -69,11 +69,11 @@ class PlainText:
         return any(mark in piece and what.search(piece) is not None for piece in pieces)
 
     def is_blank(self) -> bool:
-        """Whether there is nothing but white space."""
+        """Whether the text has only white space."""
         return not any(self._piece(at, PIECE_BYTES).strip() for at in range(0, self.size, PIECE_BYTES))
 
     def between(self, begin: int, end: int) -> io.BufferedReader:
-        """Return the bytes between two places as a stream of their own."""
+        """Return the bytes between two offsets as a separate stream."""
         return io.BufferedReader(_Slice(self.stream, begin, end), PIECE_BYTES)
 
     def _piece(self, start: int, size: int) -> bytes:
@@ -82,7 +82,7 @@ class PlainText:
 
 
 class _Slice(io.RawIOBase):
-    """The bytes of a stream between two places."""
+    """The bytes of a stream between two offsets, as a stream."""
 
     def __init__(self, stream: IO[bytes], begin: int, end: int) -> None:
         self.stream = stream
@@ -102,10 +102,10 @@ class _Slice(io.RawIOBase):
 
 @contextmanager
 def plain_text(path: Path, asked: str | None = None, limit: int | None = None) -> Iterator[PlainText]:
-    """Yield the text of a file, of a packed one the first `limit` bytes only where that is given.
+    """Yield the text of a file; with `limit` only about so many bytes of a packed or transcoded one.
 
-    The encoding is the one asked for, else by byte order mark, else UTF-8, else Windows-1252. Raises LogError when nothing
-    can be unzipped, and when the bytes are no text.
+    The encoding is `asked`, else that of the byte order mark, else UTF-8, else Windows-1252. Raises LogError when nothing can be
+    unzipped, and when the bytes are no text.
     """
     with ExitStack() as stack:
         stream: IO[bytes] = stack.enter_context(path.open("rb"))
@@ -123,7 +123,7 @@ def plain_text(path: Path, asked: str | None = None, limit: int | None = None) -
                 _transcode(other, stream, encoding, "strict" if asked else "replace", limit)
                 encoding = "utf-8"
             elif asked:
-                deque(_decoded(stream, asked, "strict"), maxlen=0)  # raises where it is none
+                deque(_decoded(stream, asked, "strict"), maxlen=0)  # raises where the bytes do not have this encoding
         except (UnicodeDecodeError, LookupError) as error:
             hint = "leave `encoding` out of the mapping: it is found out"
             raise LogError(f"`{path}` is not text in {encoding}", found=str(error), hint=hint) from error
@@ -134,7 +134,7 @@ def plain_text(path: Path, asked: str | None = None, limit: int | None = None) -
 
 
 def _unzip(packed: IO[bytes], plain: IO[bytes], path: Path, limit: int | None) -> bool:
-    """Unpack gzip streams, as many as follow each other; return whether the last one ends early.
+    """Unpack consecutive gzip streams; return whether the last one ends early.
 
     Raises LogError where nothing can be unpacked, and for what is no table.
     """
@@ -154,14 +154,14 @@ def _unzip(packed: IO[bytes], plain: IO[bytes], path: Path, limit: int | None) -
 
 
 def _needs_transcoding(encoding: str, head: bytes) -> bool:
-    """Whether a line does not end in one byte, or ends in a carriage return alone; raises LookupError."""
+    """Whether a line end is not one byte, or is a carriage return alone; raises LookupError for an unknown encoding."""
     if encoding != "utf-8-sig" and "\n".encode(encoding) != b"\n":
         return True
     return b"\n" not in head and b"\r" in head
 
 
 def _transcode(other: IO[bytes], plain: IO[bytes], encoding: str, errors: str, limit: int | None) -> None:
-    """Write a text as UTF-8 whose lines end in a line feed."""
+    """Write a text as UTF-8 with line feeds as line ends."""
     has_line_feeds: bool | None = None
     for text in _decoded(other, encoding, errors):
         has_line_feeds = "\n" in text if has_line_feeds is None else has_line_feeds
@@ -171,7 +171,7 @@ def _transcode(other: IO[bytes], plain: IO[bytes], encoding: str, errors: str, l
 
 
 def _decoded(stream: IO[bytes], encoding: str, errors: str) -> Iterator[str]:
-    """Yield the text of some bytes from their start, piece by piece; raises UnicodeDecodeError where they are none."""
+    """Yield the text of a stream from its start, piece by piece; raises UnicodeDecodeError for bytes of another encoding."""
     stream.seek(0)
     return codecs.iterdecode(iter(lambda: stream.read(PIECE_BYTES), b""), encoding, errors)
 
@@ -186,6 +186,6 @@ def _encoding(raw: bytes) -> str:
     try:
         raw.decode("utf-8")
     except UnicodeDecodeError as error:
-        # A piece of a file may end inside a character; anything else that is no UTF-8 is Windows text.
+        # The head may end inside a character; anything else that is not UTF-8 is taken for Windows-1252.
         return "utf-8" if error.start >= len(raw) - 3 else "cp1252"
     return "utf-8"

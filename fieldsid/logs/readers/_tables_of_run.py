@@ -1,8 +1,9 @@
-"""Which tables of a folder are one run, and what each of them is called in it.
+"""Find the tables of a folder that belong to one run, and the name of each table in its run.
 
-Loggers that write a file for each kind of message name them by it: `EstimatedState.csv`, `run7_state.csv`, `LOG_attitude_0.csv`.
-Tables with the same columns are several runs where each of their names goes with one of every other kind, and where each of them
-is a run by itself or there is no other kind; else they are several devices of one run, as are those whose columns have no name.
+Loggers that write a file for each kind of message name it by the kind: `EstimatedState.csv`, `run7_state.csv`,
+`LOG_attitude_0.csv`. Tables with the same columns belong to several runs if the name of each matches one table of every other
+kind, or if each of them has all signals of a run, or if there is no other kind. Otherwise they, and tables with unknown columns,
+are several devices of one run.
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ from fieldsid.logs.several.run_names import common_start, name_of_run, names_apa
 
 
 def run_of(path: Path, joined: Sequence[Path]) -> list[Path]:
-    """Return the tables of one run: those of a folder, or a table and those that were named with it.
+    """Return the tables of one run: those of a folder, or a table and the tables in `joined`.
 
-    Raises LogError where a folder holds several runs.
+    Raises LogError where a folder has several runs.
     """
     if joined or not path.is_dir():
         return [path, *joined]
@@ -36,7 +37,7 @@ def run_of(path: Path, joined: Sequence[Path]) -> list[Path]:
 
 
 def runs_in(folder: Path) -> list[list[Path]]:
-    """Return the runs of several tables that a folder holds; none where each of its tables is a run by itself."""
+    """Return the runs of several tables in a folder; none where each of its tables alone is a run."""
     by_header: dict[tuple[str, ...], list[Path]] = {}
     for path in sorted(folder.iterdir()):
         names = _names(path)
@@ -44,8 +45,8 @@ def runs_in(folder: Path) -> list[list[Path]]:
             by_header.setdefault(names, []).append(path)
     kinds = list(by_header.values())
     signals = {names: _signals(names) for names in by_header}
-    whole = [is_enough(signals[names]) for names in by_header]
-    if sum(map(len, kinds)) < 2 or all(whole) or any(w for w, kind in zip(whole, kinds, strict=True) if len(kind) > 1):
+    complete = [is_enough(signals[names]) for names in by_header]
+    if sum(map(len, kinds)) < 2 or all(complete) or any(c for c, kind in zip(complete, kinds, strict=True) if len(kind) > 1):
         return []
     if len(kinds) == 1 and any(signals.values()):
         return []
@@ -60,19 +61,19 @@ def tables_beside(path: Path) -> list[Note]:
     if path.is_dir() or str(path) == "-":
         return []
     runs = runs_in(path.parent)
-    own = next((run for run in runs if any(table.samefile(path) for table in run)), [])
-    others = [table for table in own if not table.samefile(path)]
+    same_run = next((run for run in runs if any(table.samefile(path) for table in run)), [])
+    others = [table for table in same_run if not table.samefile(path)]
     if not others:
         return []
-    files = quote(str(path.parent)) if len(runs) == 1 else " ".join(["--join", *(quote(str(p)) for p in own)])
+    files = quote(str(path.parent)) if len(runs) == 1 else " ".join(["--join", *(quote(str(p)) for p in same_run)])
     message = f"beside it lie {few_of([p.name for p in others])}: where they are of the same run, `sysid inspect {files}`"
     return [Note("tables_beside", message, {"tables": [str(p) for p in others]})]
 
 
 def names_in_run(tables: Sequence[Path]) -> dict[str, Path]:
-    """Return the tables by what each is called in its run: its own name without what all of them begin with.
+    """Return the tables by their names in the run: the names of the files without their common start.
 
-    A mapping that goes by these names is that of every run of the logger.
+    A mapping that uses these names fits every run of the logger.
     """
     stems = [stem_of(path) for path in tables]
     start = len(shared_start(stems)) if len(tables) > 1 else 0
@@ -81,7 +82,7 @@ def names_in_run(tables: Sequence[Path]) -> dict[str, Path]:
 
 
 def _marks(kind: Sequence[Path]) -> dict[str, Path]:
-    """Return tables of one kind by what tells their names apart."""
+    """Return tables of one kind by the part of their names that differs."""
     stems = [stem_of(path) for path in kind]
     start = len(common_start(stems))
     rest = [stem[start:] for stem in stems]
@@ -90,7 +91,7 @@ def _marks(kind: Sequence[Path]) -> dict[str, Path]:
 
 
 def _names(path: Path) -> tuple[str, ...]:
-    """Return the names of a table's columns; none of what is no table."""
+    """Return the names of a table's columns; empty for a file that is no table."""
     reader = next((r for r in (csv_table, parquet) if path.name.endswith(r.READER.suffixes)), None)
     if reader is None or path.name.startswith(".") or not path.is_file():
         return ()
@@ -98,13 +99,13 @@ def _names(path: Path) -> tuple[str, ...]:
         check_readable(path)
         return reader.names_of(path) if reader.sniff(path) else ()
     except LogError as error:
-        if isinstance(error.__cause__, OSError):  # what is in it is not known
+        if isinstance(error.__cause__, OSError):  # the file cannot be read, so it may be a table
             raise
         return ()
 
 
 def _signals(names: Sequence[str]) -> set[str]:
-    """Return what the columns of a table are by their names."""
+    """Return the signals that the names of a table's columns mean."""
     return {found[0] for name in names if (found := meaning_of(name)) is not None and found[0] != TIME}
 
 

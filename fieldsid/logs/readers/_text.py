@@ -1,4 +1,4 @@
-"""The form of a text table: separator, decimal sign, first line of numbers, and names and their units above it."""
+"""Find the form of a text table: separator, decimal sign, first line of numbers, and names and units above it."""
 
 from __future__ import annotations
 
@@ -18,29 +18,32 @@ OTHER_UNITS = frozenset({
     "counts", "pwm", "lat", "lon", "byte", "bit", "byte/s", "s/m", "cc", "m^3", "kg", "kg/m3", "m/s2", "m/s^2", "m/s/s", "nm",
     "n.m", "ppm", "psu", "ntu", "ug/l", "inhg", "torr", "datenum",
 })  # fmt: skip
-"""Units of what is no signal here, as rows of units state them."""
+"""Units in rows of units that belong to no signal of the package."""
 
 
 SEPARATORS = ("\t", ";", ",", "|", "whitespace")
 _RULE = re.compile(r"^[\s|+:=-]*[-=]{2,}[\s|+:=-]*$")
-"""A line drawn below the names."""
+"""A line of dashes or equal signs below the names."""
 
 
 def header_of(
-    lines: list[str], at: int, first: int, separator: str, width: int, *, asked: bool | None
+    lines: list[str], at: int, first: int, separator: str, width: int, *, stated: bool | None
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names and the units of the columns; a row of units stands below one of names."""
-    if asked is False:
+    """Return the names and the units of the columns; a row of units is looked for below the names.
+
+    `at` is the line of the first row of numbers, `first` the first line that may belong to the table.
+    """
+    if stated is False:
         return (), ()
-    names, units = _above(lines, at, first, separator, width)
+    names, units = _header_above(lines, at, first, separator, width)
     if not names and width > 2 and cells(lines[at], separator)[-1] == "":
-        # rows that end in a separator have a cell more than there are names
-        names, units = _above(lines, at, first, separator, width - 1)
+        # rows that end in a separator have one cell more than the header has names
+        names, units = _header_above(lines, at, first, separator, width - 1)
         return (*names, "") if names else (), (*units, "") if units else ()
     return names, units
 
 
-def _above(lines: list[str], at: int, first: int, separator: str, width: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _header_above(lines: list[str], at: int, first: int, separator: str, width: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
     units: tuple[str, ...] = ()
     for i in range(at - 1, max(first, 0) - 1, -1):
         if not lines[i].strip() or _RULE.match(lines[i]):
@@ -58,35 +61,37 @@ def _above(lines: list[str], at: int, first: int, separator: str, width: int) ->
 
 
 def _state_units(names: tuple[str, ...]) -> bool:
-    """Whether most words of a line, and more than one, are units of measurement."""
-    said = [name for name in names if name]
-    known = sum(find_unit(name) is not None or name.lower() in OTHER_UNITS for name in said)
-    return known > 1 and 2 * known > len(said)
+    """Whether more than half of the words of a line, and at least two, are units of measurement."""
+    words = [name for name in names if name]
+    known = sum(find_unit(name) is not None or name.lower() in OTHER_UNITS for name in words)
+    return known > 1 and 2 * known > len(words)
 
 
-def behind_sizes(lines: list[str], at: int, names: tuple[str, ...]) -> int:
-    """Return the first row of numbers; a glider's tables state the bytes of each column below its name and unit."""
+def first_data_line(lines: list[str], at: int, names: tuple[str, ...]) -> int:
+    """Return the line of the first row of data; in a glider's table it follows a row with the bytes of each column."""
     head = {key.strip(): value.strip() for key, colon, value in (line.partition(":") for line in lines[:at]) if colon}
     return at + 1 if names and head.get("num_label_lines") == "3" else at
 
 
 def _names(line: str, separator: str, width: int) -> tuple[str, ...]:
-    """Return a header line's names when it has one word for each column, else nothing."""
+    """Return the names in a header line if it has one for each column, else nothing."""
     bare = line.strip().lstrip(COMMENTS).strip() if line.lstrip().startswith(tuple(COMMENTS)) else line
     names = cells(bare, separator)
     if separator == "whitespace":
         names = [n.strip(",;|") for n in names]
     if len(names) != width and separator == "whitespace":
-        names = [n.strip() for n in re.split(r"\s{2,}|\t", bare.strip())]  # names of several words, further apart than these
+        names = [
+            n.strip() for n in re.split(r"\s{2,}|\t", bare.strip())
+        ]  # names of several words, separated by at least two blanks
     if len(names) != width:
-        names = _otherwise(bare, separator, width)
+        names = _split_by_other(bare, separator, width)
     if len(names) != width or any(is_number_or_date(n) for n in names) or not any(names):
         return ()
     return () if _are_units(line, separator, width) else tuple(names)
 
 
-def _otherwise(line: str, separator: str, width: int) -> list[str]:
-    """Return the words of a line above a table that are parted otherwise than its rows, where they name signals or units."""
+def _split_by_other(line: str, separator: str, width: int) -> list[str]:
+    """Return the words of a header that has another separator than the rows, if they name signals or units; else nothing."""
     for other in SEPARATORS:
         words = cells(line, other) if other != separator else []
         if len(words) == width and (_state_units(tuple(words)) or sum(meaning_of(w) is not None for w in words) > 1):
@@ -95,23 +100,23 @@ def _otherwise(line: str, separator: str, width: int) -> list[str]:
 
 
 def _are_units(line: str, separator: str, width: int) -> bool:
-    """Whether a line below the names only states units, such as `[s];[deg];[deg/s]`."""
+    """Whether a line below the names has only units in brackets, such as `[s];[deg];[deg/s]`."""
     parts = cells(line, separator)
     return len(parts) == width and all(p == "" or (p[:1] in "[(" and p[-1:] in "])") for p in parts)
 
 
 LOOKED_AT = 400
-"""Lines at the start of a file among which the first row of numbers must be."""
+"""Number of lines at the start of a file among which the first row of numbers must be."""
 AGREEING = 20
-"""Rows that must have as many cells as the first."""
+"""Number of rows whose number of cells is compared with that of the first row."""
 
 Score = tuple[int, float, int]
-"""Rows that agree with the first, share of its cells that are no words, and its columns."""
+"""Number of rows that agree with the first, share of its cells that are no words, and its number of columns."""
 
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """How a table is written: `start` is the line of its first row, `names` and `units` what is said above."""
+    """The form of a table: `start` is the line of its first row; `names` and `units` are from the header above."""
 
     separator: str
     decimal: str
@@ -122,15 +127,15 @@ class Form:
     is_sentences: bool = False
 
 
-def form_of(text: str, asked: TableForm, path: Path) -> Form:
-    """Find out how a table is written, as far as `asked` leaves it open; raises LogError when there is no row of numbers."""
+def form_of(text: str, stated: TableForm, path: Path) -> Form:
+    """Return the form of a table, with what `stated` states taken as given; raises LogError when there is no row of numbers."""
     lines = text.split("\n", LOOKED_AT + AGREEING)[: LOOKED_AT + AGREEING]
     lines = [line.rstrip("\r") for line in lines]
-    first = asked.skip or 0
+    first = stated.skip or 0
     best: Form | None = None
     best_score = (0, 0.0, 0)
-    for separator in [asked.separator] if asked.separator else SEPARATORS:
-        form, score = _try(lines, first, separator, asked)
+    for separator in [stated.separator] if stated.separator else SEPARATORS:
+        form, score = _try(lines, first, separator, stated)
         if form is not None and score > best_score:
             best, best_score = form, score
     # sentences of several kinds have no columns in common
@@ -149,10 +154,10 @@ def form_of(text: str, asked: TableForm, path: Path) -> Form:
     return best
 
 
-def _try(lines: list[str], first: int, separator: str, asked: TableForm) -> tuple[Form | None, Score]:
-    """Return the form by one separator, and its score."""
+def _try(lines: list[str], first: int, separator: str, stated: TableForm) -> tuple[Form | None, Score]:
+    """Return the best form with one separator, and its score."""
     only_points = separator == "," and not any('"' in line for line in lines[first:])
-    decimals = [asked.decimal] if asked.decimal else ["."] if only_points else [".", ","]
+    decimals = [stated.decimal] if stated.decimal else ["."] if only_points else [".", ","]
     best: tuple[Form | None, Score] = (None, (0, 0.0, 0))
     for decimal in decimals:
         for at in range(first, len(lines)):
@@ -165,8 +170,8 @@ def _try(lines: list[str], first: int, separator: str, asked: TableForm) -> tupl
                 continue
             score = (agreeing, sum(not is_word(c, decimal) for c in row) / len(row), len(row))
             if score > best[1]:
-                names, units = header_of(lines, at, first, separator, len(row), asked=asked.header)
-                said = SENTENCE.match(lines[at].encode()) is not None
-                best = Form(separator, decimal, behind_sizes(lines, at, names), len(row), names, units, said), score
+                names, units = header_of(lines, at, first, separator, len(row), stated=stated.header)
+                is_nmea = SENTENCE.match(lines[at].encode()) is not None
+                best = Form(separator, decimal, first_data_line(lines, at, names), len(row), names, units, is_nmea), score
             break
     return best

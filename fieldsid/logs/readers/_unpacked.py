@@ -1,7 +1,8 @@
-"""How large a packed log may become: some bytes can claim, and give, any number of others.
+"""Limit the size of an unpacked log, because a few packed bytes can state, and unpack to, any number of bytes.
 
-A log's own numbers pack a few times, constants beside them some hundred times; what goes beyond is no log, and is refused before
-it fills the memory, as soon as that is known. So are rows of a table that repeat one another, and a line that has no end.
+The measurements of a log pack by a factor of a few, constant columns by some hundred. A file that exceeds this is no log, and is
+refused as soon as that is known, before it fills the memory. The same holds for a table whose rows repeat one another, and for a
+line without end.
 """
 
 from __future__ import annotations
@@ -16,15 +17,15 @@ from fieldsid.errors import LogError
 GZIP = b"\x1f\x8b"
 PIECE_BYTES = 1 << 20
 _SMALL_PIECE = 512
-"""Bytes of a gzip stream that are unpacked at once: what a damaged one still gives is known to as many."""
+"""Bytes of a gzip stream that are unpacked at once; at most so many before a damaged place are lost."""
 SMALL = 128 << 20
-"""Unpacked bytes that are read however they were packed."""
+"""Unpacked bytes that are always accepted, whatever the ratio to the packed ones."""
 MOST_TIMES = 300
-"""Times its own bytes that a larger log may unpack to: a table of three hundred columns, most of them constant, comes to that."""
+"""Largest ratio of unpacked to packed bytes of a larger log; a table of 300 columns, most of them constant, reaches it."""
 
 
 class UnpackedSize:
-    """Counts what a log of so many bytes unpacks to; raises LogError where it is more than a log can be."""
+    """Count the bytes to which a log of `packed` bytes unpacks; raises LogError where they are too many for a log."""
 
     def __init__(self, path: Path, packed: int | None = None) -> None:
         self.path = path
@@ -33,11 +34,11 @@ class UnpackedSize:
 
     @property
     def left(self) -> int:
-        """Bytes that may still be unpacked."""
+        """Return the number of bytes that may still be unpacked."""
         return max(SMALL, MOST_TIMES * self.packed) - self.size
 
     def add(self, size: int) -> None:
-        """Count bytes that have been unpacked, or that the file says it will unpack to."""
+        """Add bytes that were unpacked, or that the file states it will unpack to."""
         self.size += size
         if self.left < 0:
             raise LogError(
@@ -48,9 +49,10 @@ class UnpackedSize:
 
 
 def gunzipped(packed: IO[bytes], most: Callable[[], int] = lambda: 0) -> Iterator[tuple[bytes, int]]:
-    """Yield what gzip streams hold, as many as follow each other, piece by piece with the packed bytes of each.
+    """Yield the unpacked pieces of consecutive gzip streams, each with the number of its packed bytes.
 
-    `most` says how many bytes a piece may have, 0 any number. Raises zlib.error for damage, EOFError for an early end.
+    `most` returns the largest number of bytes of a piece, 0 for no limit. Raises zlib.error for damage, and EOFError for an early
+    end.
     """
     stream, piece = zlib.decompressobj(wbits=31), b""
     while piece := piece or packed.read(_SMALL_PIECE):
@@ -66,9 +68,9 @@ def gunzipped(packed: IO[bytes], most: Callable[[], int] = lambda: 0) -> Iterato
 
 
 def inflated(path: Path) -> tuple[bytes, bool]:
-    """Return the bytes of a file, unpacked where it is gzip, and whether they end before its stream does.
+    """Return the bytes of a file, unpacked where it is gzip, and whether its stream is truncated or damaged.
 
-    Raises LogError where it unpacks to more than a log does.
+    Raises LogError where it unpacks to more bytes than a log can have.
     """
     with path.open("rb") as stream:
         if stream.read(len(GZIP)) != GZIP:
@@ -85,17 +87,17 @@ def inflated(path: Path) -> tuple[bytes, bool]:
 
 
 LEAST_BYTES = 1.0
-"""Packed bytes that a row must have: with a clock of its own and constants beside it one takes 2.1 to 2.6 at the best that gzip
-can, nine forms of stamps over 3e5 rows; the noise of a sensor comes on top."""
+"""Smallest number of packed bytes of a row. With the best compression of gzip a row of a stamp and constants takes 2.1 to 2.6
+bytes, measured with nine forms of stamps over 3e5 rows; the noise of a sensor adds to that."""
 MANY = 1_000_000
-"""Rows from which on that is asked: fewer take little memory, whatever is in them."""
+"""Number of rows above which LEAST_BYTES is required; fewer rows take little memory in any case."""
 LONGEST_ROW = 1 << 18
-"""Bytes of a line that is a row; also those at the start of a table that tell how it is written."""
+"""Largest number of bytes of a row; also the number at the start of a table from which its form is found."""
 LINE_ENDS = (b"\n", b"\r")
 
 
 def refuse_repeated(path: Path, rows: int, packed: int) -> None:
-    """Raise LogError where rows are packed into fewer bytes than those of a log whose time goes on can be."""
+    """Raise LogError where rows are packed into fewer bytes than possible for a log whose time increases."""
     if rows > MANY and packed < LEAST_BYTES * rows:
         raise LogError(
             f"`{path}` is no log: its rows repeat one another",
@@ -105,7 +107,7 @@ def refuse_repeated(path: Path, rows: int, packed: int) -> None:
 
 
 def refuse_endless(path: Path, size: int, start: str) -> None:
-    """Raise LogError for a line that is longer than a row can be, which starts so."""
+    """Raise LogError for a line that is longer than a row can be and begins with `start`."""
     raise LogError(
         f"`{path}` is no table that can be read: a line of it has no end",
         found=f"none in {size} bytes, which begin {start!r}",
@@ -114,7 +116,7 @@ def refuse_endless(path: Path, size: int, start: str) -> None:
 
 
 class UnpackedRows:
-    """Counts the rows of a text that is unpacked piece by piece; what is no table is refused as soon as that shows."""
+    """Count the rows of a text that is unpacked piece by piece, to refuse what is no table as early as possible."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -123,7 +125,7 @@ class UnpackedRows:
         self._line = 0
 
     def add(self, text: bytes, packed: int) -> None:
-        """Count a piece of text that so many packed bytes gave. Raises LogError for rows that repeat, and a line without end."""
+        """Count a piece of text from `packed` bytes; raises LogError for rows that repeat, and for a line without end."""
         self.rows += max(text.count(end) for end in LINE_ENDS)
         self._size.packed += packed
         self._size.add(len(text))

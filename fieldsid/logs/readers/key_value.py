@@ -1,6 +1,6 @@
-"""Tables of one reading a row, `Timestamp, Key, Value`: each key is a topic on a clock of its own.
+"""Read tables of one reading a row, `Timestamp, Key, Value`: each key is a topic with its own clock.
 
-So write FRC's and Influx's exporters, Signal K and many programs of one's own; a key whose values are words is no topic.
+The exporters of FRC and Influx, Signal K and many private programs write such tables; a key whose values are words is no topic.
 """
 
 from __future__ import annotations
@@ -30,26 +30,26 @@ from fieldsid.numerics.arrays import FloatArray
 
 KEYS = frozenset({"key", "name", "variable", "signal", "topic", "field", "channel", "parameter", "path", "tag", "entry"})
 VALUES = frozenset({"value", "val", "data", "reading"})
-"""Words of the column that says what was read, and of that which holds it."""
+"""Words in the name of the column of keys, and in that of the column of values."""
 FEWEST, OFTEN = 2, 3
-"""Keys that there must be, and how often one returns on the average."""
+"""Smallest number of keys, and smallest average number of rows of a key."""
 
 
 def sniff(path: Path) -> bool:
-    """Whether a text table has a column of times, one of few words that return, and one of what was read."""
+    """Whether a text table has a column of times, one of a few repeated words, and one of values."""
     if not csv_table.sniff(path):
         return False
     try:
         with plain_text(path, limit=HEAD) as text:
             head = text.head()
             form = form_of(head, TableForm(), path)
-    except LogError:  # the reader of tables says what is wrong
+    except LogError:  # the reader of text tables reports the reason
         return False
     return _places(form, head) is not None
 
 
 def _places(form: Form, head: str) -> tuple[int, int, int] | None:
-    """Return the columns of the time, the key and the value; None where there are none."""
+    """Return the indexes of the columns of time, key and value; None where there are no such columns."""
     names = [set(words_of(name)) for name in form.names]
     times = [i for i, name in enumerate(form.names) if (meaning := meaning_of(name)) is not None and meaning[0] == TIME]
     keys = [i for i, words in enumerate(names) if words & KEYS and i not in times]
@@ -57,28 +57,31 @@ def _places(form: Form, head: str) -> tuple[int, int, int] | None:
     rows = [cells(line, form.separator) for line in head.splitlines()[form.start :][:LOOKED_AT]]
     rows = [row for row in rows if len(row) == form.width]
     for time, key, value in ((t, k, v) for t in times for k in keys for v in values if k != v):
-        said = [row[key] for row in rows]
-        are_words = all(is_word(word, form.decimal) for word in said)
-        if are_words and FEWEST <= len(set(said)) <= len(said) / OFTEN and any(not is_word(r[value], form.decimal) for r in rows):
+        tags = [row[key] for row in rows]
+        are_words = all(is_word(word, form.decimal) for word in tags)
+        if are_words and FEWEST <= len(set(tags)) <= len(tags) / OFTEN and any(not is_word(r[value], form.decimal) for r in rows):
             return time, key, value
     return None
 
 
 def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
-    """Return the keys whose values are numbers as topics of one number, in the order of their times."""
+    """Return each key with numeric values as a topic of one number, in the order of its times."""
     with csv_table.opened(path, TableForm(), options) as table:
         places = _places(table.form, table.text.head())
         if places is None:
             raise LogError(f"`{path}` is no table of keys and values", found=", ".join(table.form.names), hint="name its columns")
         columns = table.columns(places)
         time, notes = _times(columns, places[0])
-        said, values = columns.take(places[1]).astype(str), as_numbers(columns.take(places[2]))[0]
-        found = {str(key): _topic(time, values, said == key) for key in np.unique(said)}
+        keys, values = columns.take(places[1]).astype(str), as_numbers(columns.take(places[2]))[0]
+        found = {str(key): _topic(time, values, keys == key) for key in np.unique(keys)}
         return Topics(found, notes=(*table.notes, *notes))
 
 
 def _times(columns: Columns, place: int) -> tuple[FloatArray, list[Note]]:
-    """Return the times (n,) of the rows in s: several readings may have one, which makes it no coarse stamp."""
+    """Return the times (n,) of the rows in s, and notes.
+
+    Several readings may share a stamp; only the distinct stamps are converted, so that shared ones do not count as too coarse.
+    """
     import pandas as pd
 
     rows, stamps = pd.factorize(columns.take(place))

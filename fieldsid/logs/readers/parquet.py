@@ -1,4 +1,4 @@
-"""Parquet tables: our own Runs, with their notes, and anybody's columns."""
+"""Read Parquet tables: Runs written by this package, with their notes, and any other table."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from fieldsid.records.reading import read_json
 MAGIC = b"PAR1"
 METADATA_KEY = b"fieldsid"
 NUMBER_BYTES = 8
-TOLD = 3
-"""Cells of a column of lists that are looked at."""
+LIST_CELLS = 3
+"""Number of cells that are read of a column of lists."""
 AGAIN = "import the log again, with `--force`"
 
 
 def sniff(path: Path) -> bool:
-    """Whether a file starts like Parquet."""
+    """Whether a file has the signature of Parquet."""
     return head_of(path).startswith(MAGIC)
 
 
@@ -44,7 +44,7 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
-    """Return the mapped columns, or one of our Runs as it was written."""
+    """Return the mapped columns; a Run of this package is returned as it was written, unless a mapping file is used."""
     table = _table(path)
     notes = _notes_of_ours(path, table)
     if notes is not None and mapping.origin is None:
@@ -58,7 +58,7 @@ def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
 
 
 def names_of(path: Path) -> tuple[str, ...]:
-    """Return the names of a table's columns, none of a run of ours; raises LogError where it cannot be read."""
+    """Return the names of a table's columns, empty for a Run of this package; raises LogError where it cannot be read."""
     schema = _schema_of(path)
     return () if METADATA_KEY in (schema.metadata or {}) else tuple(schema.names)
 
@@ -83,35 +83,35 @@ def _columns(path: Path, table: Any) -> Columns:
 def _table(path: Path) -> Any:
     try:
         # read_table refuses a file in which two columns have one name
-        with import_module("pyarrow.parquet").ParquetFile(path, read_dictionary=_texts(path)) as file:
+        with import_module("pyarrow.parquet").ParquetFile(path, read_dictionary=_text_columns(path)) as file:
             refuse_repeated(path, file.metadata.num_rows, path.stat().st_size)
             size = UnpackedSize(path)
-            for bytes_of in _claimed(file.metadata):
+            for bytes_of in _stated_sizes(file.metadata):
                 size.add(bytes_of)
             table = file.read(columns=_first_columns(file.schema_arrow.names))
     except (OSError, ValueError) as error:
         raise _unreadable(path, error) from error
     for column in table.columns:
-        size.add(_spelt_out(column))
+        size.add(_expanded_size(column))
     return table
 
 
-def _texts(path: Path) -> list[str]:
-    """Return the columns of text: they are read with each word once, as they are packed, for one may stand in every row."""
+def _text_columns(path: Path) -> list[str]:
+    """Return the names of the columns of text, which are read as dictionaries, because a long text may repeat in every row."""
     kinds, schema = import_module("pyarrow.types"), import_module("pyarrow.parquet").read_schema(path)
     return [f.name for f in schema if kinds.is_string(f.type) or kinds.is_binary(f.type)]
 
 
-def _claimed(metadata: Any) -> Iterator[int]:
-    """Yield the bytes that each part of a file says it unpacks to, numbers that repeat counted as often as they stand there."""
+def _stated_sizes(metadata: Any) -> Iterator[int]:
+    """Yield the unpacked bytes that each row group states, but at least NUMBER_BYTES for each number, repeated ones included."""
     for i in range(metadata.num_row_groups):
         group = metadata.row_group(i)
         columns = (group.column(j) for j in range(group.num_columns))
         yield sum(max(c.total_uncompressed_size, NUMBER_BYTES * c.num_values) for c in columns)
 
 
-def _spelt_out(column: Any) -> int:
-    """Return the bytes of a column of words when each stands in its row; zero for any other."""
+def _expanded_size(column: Any) -> int:
+    """Return the bytes of a column of text with the text written out in each row; zero for any other column."""
     if not import_module("pyarrow.types").is_dictionary(column.type):
         return 0
     compute = import_module("pyarrow.compute")
@@ -120,7 +120,7 @@ def _spelt_out(column: Any) -> int:
 
 
 def _first_columns(names: list[str]) -> list[str] | None:
-    """Return the columns of a very wide table that are looked into, None for all."""
+    """Return the names of the columns to read of a very wide table; None for all."""
     return names[:MOST_CHANNELS] if len(names) > MOST_CHANNELS else None
 
 
@@ -133,7 +133,7 @@ def _unreadable(path: Path, error: Exception) -> LogError:
 
 
 def _notes_of_ours(path: Path, table: Any) -> tuple[Note, ...] | None:
-    """Return the notes we wrote beside the columns, None for somebody else's table; raises LogError where they are spoilt."""
+    """Return the notes of a Run of this package, None for another table; raises LogError where its metadata are damaged."""
     text = (table.schema.metadata or {}).get(METADATA_KEY)
     if not text:
         return None
@@ -148,7 +148,7 @@ def _notes_of_ours(path: Path, table: Any) -> tuple[Note, ...] | None:
 
 
 def _series_of_ours(path: Path, table: Any) -> dict[str, Series]:
-    """Return the signals of a run of ours on its time; raises LogError where a column is missing, twice there or no numbers."""
+    """Return the signals of a Run of this package; raises LogError where a column is missing, duplicate or not numeric."""
     kept = [n for n in table.column_names if n in COLUMNS or n == TIME]
     numbers = {n: _cells(table.column(i)) for i, n in enumerate(table.column_names) if n in kept}
     wrong = [n for n in (TIME, *kept) if kept.count(n) != 1 or numbers[n].dtype.kind not in "fiub"]
@@ -161,20 +161,22 @@ def _series_of_ours(path: Path, table: Any) -> dict[str, Series]:
 
 
 def _cells(column: Any) -> Any:
-    """Return a column's cells (n,): numbers as they are, instants as datetime64, all else as text with None where it is empty."""
+    """Return a column's cells (n,): numbers unchanged, times as datetime64, others as text, with None for empty cells."""
     kinds, arrow = import_module("pyarrow.types"), import_module("pyarrow")
-    held = column.type
-    if kinds.is_integer(held) or kinds.is_floating(held):
+    arrow_type = column.type
+    if kinds.is_integer(arrow_type) or kinds.is_floating(arrow_type):
         return column.to_numpy()
-    if kinds.is_boolean(held) or kinds.is_decimal(held) or kinds.is_null(held):
+    if kinds.is_boolean(arrow_type) or kinds.is_decimal(arrow_type) or kinds.is_null(arrow_type):
         return column.cast(arrow.float64()).to_numpy()
-    if kinds.is_timestamp(held) or kinds.is_date(held):
+    if kinds.is_timestamp(arrow_type) or kinds.is_date(arrow_type):
         return column.cast(arrow.timestamp("ns"), safe=False).to_numpy()
-    if kinds.is_duration(held):
+    if kinds.is_duration(arrow_type):
         return column.cast(arrow.duration("ns"), safe=False).cast(arrow.int64()).to_numpy() / 1e9
-    told = len(column) if not kinds.is_nested(held) else TOLD  # lists are no numbers of a signal: a few are shown
+    shown = (
+        len(column) if not kinds.is_nested(arrow_type) else LIST_CELLS
+    )  # lists are no signal: only a few are read, to be shown
     cells = np.full(len(column), None, dtype=object)
-    cells[:told] = [None if cell is None else str(cell) for cell in column.slice(0, told).to_pylist()]
+    cells[:shown] = [None if cell is None else str(cell) for cell in column.slice(0, shown).to_pylist()]
     return cells
 
 

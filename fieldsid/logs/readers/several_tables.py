@@ -1,7 +1,7 @@
-"""A run in several tables of one clock, each on stamps of its own: a table is a topic, and its columns are the fields.
+"""Read a run in several tables of one clock, each with its own stamps: a table is a topic, and its columns are the fields.
 
-Exports of a message log (Neptus, ulog2csv, `rostopic echo -p`) and simulators that keep the inputs apart write such. What
-follows is the joining of any log of topics.
+Exports of a message log (Neptus, ulog2csv, `rostopic echo -p`) and simulators with a separate table of inputs write such runs.
+The tables are joined like the topics of any other log.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from fieldsid.numerics.arrays import FloatArray
 TABLES: Mapping[str, Callable[[Path, TableForm, ReadOptions], tuple[Columns, tuple[Note, ...]]]] = MappingProxyType(
     {csv_table.READER.name: csv_table.columns_of, parquet.READER.name: parquet.columns_of}
 )
-"""The readers of one table, and what gives its columns and notes."""
+"""Functions that return the columns and notes of one table, by the name of its reader."""
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One table of a run, or one device of it: its file, its numbers on the clock that wrote them, and what that counts from."""
+    """One table of a run, or one device of a table: its file, its numbers at the logger's times, and their origin in words."""
 
     file: Path
     topic: Topic
@@ -49,21 +49,21 @@ class Part:
 
     @property
     def span(self) -> tuple[float, float]:
-        """Its first and last time in s."""
+        """Return the first and the last time in s."""
         return float(self.topic.time[0]), float(self.topic.time[-1])
 
 
 def sniff(path: Path) -> bool:
-    """Whether a folder holds tables that are one run, or several runs, together."""
+    """Whether a folder has tables that must be joined to one run or to several runs."""
     return path.is_dir() and bool(runs_in(path))
 
 
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
-    """Return the tables and their columns; raises LogError where a folder holds several runs."""
+    """Return the tables and their columns; raises LogError where the folder has several runs."""
     parts, notes = _parts(path, options, form, ChannelMap({}, time=options.clock))
     topics = {name: part.topic for name, part in parts.items()}
-    apart = _apart(parts)
-    notes = (*notes, *([Note("clocks_apart", f"{apart.what} ({apart.found})", {})] if apart else _joined(parts)))
+    apart = _reason_not_to_join(parts)
+    notes = (*notes, *([Note("clocks_apart", f"{apart.what} ({apart.found})", {})] if apart else _notes_of_joining(parts)))
     return inventory_of(path, "tables of one run", Topics(topics, _attitudes(topics), notes), kind=TABLE)
 
 
@@ -72,16 +72,16 @@ def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     wanted = wanted_by(mapping)
     parts, notes = _parts(path, options, mapping.table, mapping, wanted)
     used = {name: part for name, part in parts.items() if name in wanted}
-    apart = _apart(used)
+    apart = _reason_not_to_join(used)
     if apart is not None:
         raise apart
     topics = {name: part.topic for name, part in parts.items()}
-    raw = raw_log_of(path, Topics(topics, notes=(*notes, *_joined(used))), mapping)
+    raw = raw_log_of(path, Topics(topics, notes=(*notes, *_notes_of_joining(used))), mapping)
     return replace(raw, name=name_of_run(run_of(path, options.joined)) if options.joined else raw.name)
 
 
 def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
-    """Return the mapping of tables whose canonical names give what an axis needs, each signal in one of them only, or None."""
+    """Return the mapping of tables whose canonical names include what an axis needs, each signal in one table only; else None."""
     parts, _ = _parts(path, options, TableForm(), ChannelMap({}))
     named = [
         (signal, replace(source, column=None, topic=topic, path=str(source.column)))
@@ -96,7 +96,7 @@ def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
 def _parts(
     path: Path, options: ReadOptions, form: TableForm, mapping: ChannelMap, wanted: Collection[str] = ()
 ) -> tuple[dict[str, Part], tuple[Note, ...]]:
-    """Return the parts of a run by name, those of tables that a mapping may want, and notes on the tables."""
+    """Return the parts of a run by name, from the tables that are wanted (all if none is), and notes on the tables."""
     tables = names_in_run(run_of(path, options.joined))
     bare = {name.partition("[")[0] for name in wanted}
     chosen = {n: p for n, p in tables.items() if n in wanted or n.partition("[")[0] in bare} or tables
@@ -104,19 +104,19 @@ def _parts(
     notes: list[Note] = []
     without: list[str] = []
     for i, (name, file) in enumerate(chosen.items()):
-        found, said = _of_table(name, file, options, form, mapping)
+        found, table_notes = _parts_of_table(name, file, options, form, mapping)
         parts |= found
-        notes += said
+        notes += table_notes
         without += [] if found else [file.name]
         options.progress((i + 1) / len(chosen))
     message = f"tables without a clock that is known, left out: {few_of(without)}"
     return parts, (*notes, *([Note("no_clock", message, {"tables": without})] if without else []))
 
 
-def _of_table(
+def _parts_of_table(
     name: str, file: Path, options: ReadOptions, form: TableForm, mapping: ChannelMap
 ) -> tuple[dict[str, Part], list[Note]]:
-    """Return the parts of one table, and notes that name it; raises LogError for a file that is none."""
+    """Return the parts of one table, and notes with its name; raises LogError for a file that is no table."""
     reader = reader_of(file)
     if reader.name not in TABLES:
         raise LogError(
@@ -134,7 +134,7 @@ def _of_table(
 
 
 def _numbers(columns: Columns, clock: Clock) -> dict[str, FloatArray]:
-    """Return the numbers (n,) of a table's columns by name, with the unit of a row below it; those of the clock left out."""
+    """Return the numeric columns (n,) of a table by name and stated unit, without those of the clock."""
     taken: dict[str, FloatArray] = {}
     for i in range(columns.width):
         cells: Any = numbers_mostly(columns.take(i))
@@ -153,20 +153,23 @@ def _counts_from(clock: Clock) -> str:
 
 
 def _attitudes(topics: Mapping[str, Topic]) -> Means:
-    """Return the four columns of each table that are a quaternion."""
+    """Return the meaning of the four columns that are a quaternion, for each table that has them."""
     columns: dict[str, dict[str | int, FloatArray]] = {name: dict(topic.fields.items()) for name, topic in topics.items()}
     found = {name: quaternion_of(list(topics[name].fields), fields) for name, fields in columns.items()}
     return {f"{name.partition('[')[0]}.{', '.join(four)}": (ATTITUDE, {}) for name, four in found.items() if four}
 
 
-def _apart(parts: Mapping[str, Part]) -> LogError | None:
-    """Return why tables cannot be joined: their clocks count from different times, or never run together; None where they can."""
+def _reason_not_to_join(parts: Mapping[str, Part]) -> LogError | None:
+    """Return the error for tables that cannot be joined, because their clocks have different origins or no time in common.
+
+    None where they can be joined.
+    """
     kinds = {part.counts_from: part for part in parts.values()}
     if len(kinds) > 1:
-        said = "; ".join(f"`{part.file.name}` from {start}" for start, part in kinds.items())
+        origins = "; ".join(f"`{part.file.name}` from {start}" for start, part in kinds.items())
         return LogError(
             "the tables are on different clocks, and are not joined",
-            found=f"they count: {said}",
+            found=f"they count: {origins}",
             hint="export them with one clock, or write the start of the one into the other's times",
         )
     if not parts:
@@ -182,8 +185,8 @@ def _apart(parts: Mapping[str, Part]) -> LogError | None:
     )
 
 
-def _joined(parts: Mapping[str, Part]) -> list[Note]:
-    """Say which tables were joined, and where nothing but their own start says that they may be."""
+def _notes_of_joining(parts: Mapping[str, Part]) -> list[Note]:
+    """Return the notes on which tables were joined, and on clocks that were only assumed to be one."""
     files = list(dict.fromkeys(part.file.name for part in parts.values()))
     if len(files) < 2:
         return []
@@ -211,28 +214,31 @@ READER = Reader(
 )
 
 
-CALLED = frozenset({"id", "device", "instance", "servo", "channel", "fin", "motor", "actuator", "thruster", "number", "no", "nr"})
-"""Words of a column that tells the device."""
+DEVICE_WORDS = frozenset({
+    "id", "device", "instance", "servo", "channel", "fin", "motor", "actuator", "thruster",
+    "number", "no", "nr",
+})  # fmt: skip
+"""Words in the name of a column that identifies the device."""
 IN_TURN = 0.5
-"""Share of the rows that are another device's than the one before."""
+"""Smallest share of rows whose device differs from that of the row before, in a table in which devices alternate."""
 
 
 def devices_of(columns: Columns) -> dict[str, Columns]:
-    """Return the rows of each device under its number or word in brackets, as `[3]`; the table itself under nothing elsewhere."""
+    """Return the rows of each device by its number or name in brackets, such as `[3]`; without devices, the table by ""."""
     for i, name in enumerate(columns.names):
         words = set(words_of(name))
-        if not words or not words <= CALLED:
+        if not words or not words <= DEVICE_WORDS:
             continue
         cells = columns.take(i)
-        told = _told(cells)
-        if told:
+        by_device = _rows_by_device(cells)
+        if by_device:
             rest = replace(columns, names=tuple(n if k != i else "" for k, n in enumerate(columns.names)))
-            return {f"[{label}]": rest.rows(rows) for label, rows in told.items()}
+            return {f"[{label}]": rest.rows(rows) for label, rows in by_device.items()}
     return {"": columns}
 
 
-def _told(cells: npt.NDArray[Any]) -> dict[str, npt.NDArray[np.bool_]]:
-    """Return the rows (n,) of each device that cells (n,) tell; none where they tell no devices."""
+def _rows_by_device(cells: npt.NDArray[Any]) -> dict[str, npt.NDArray[np.bool_]]:
+    """Return a mask (n,) of the rows of each device named in cells (n,); empty where the cells do not name devices."""
     if cells.size < 2 or float(np.mean(cells[1:] != cells[:-1])) < IN_TURN:
         return {}
     if cells.dtype.kind == "f" and not bool((cells == np.round(cells)).all()):
