@@ -1,4 +1,4 @@
-"""What is in a bag, and its mapped signals: topics with count, rate and ranges; stamps of the header or of the recorder."""
+"""Return the inventory of a bag (topics with count, rate and ranges) and its mapped signals, by header or receive stamps."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN
 
 MOST_NUMBERS = 200
-"""Numbers in a message beyond which it is a picture or a cloud of points: of those only the first values are told."""
+"""Numbers in a message above which it is an image or a point cloud, of which only the first values are shown."""
 MOST_AT_ONCE = 500
-"""Messages of each piece of a bag that tell the ranges."""
+"""Messages of each piece of a bag that are decoded for the ranges."""
 Span = tuple[float, float]
 
 
 @dataclass(slots=True)
 class _Topic:
-    """The numbers of one topic: first values by path, and the ranges seen so far; or the error that says why there are none."""
+    """The numbers of one topic: first values and ranges so far by path; or the error because of which there are none."""
 
     decoder: Decoder | None = None
     first: dict[str, Any] = field(default_factory=dict)
@@ -39,7 +39,7 @@ class _Topic:
     error: LogError | None = None
 
     def see(self, payloads: Sequence[bytes]) -> None:
-        """Widen the ranges by some messages."""
+        """Extend the ranges by the values in some messages."""
         if self.decoder is None or not 0 < len(self.first) <= MOST_NUMBERS:
             return
         paths = list(self.first)
@@ -52,7 +52,7 @@ class _Topic:
 
 
 class Contents:
-    """The inventory of a bag as it is read, piece by piece."""
+    """The inventory of a bag, built piece by piece while it is read."""
 
     def __init__(self, path: Path, options: ReadOptions) -> None:
         self.path = path
@@ -60,19 +60,19 @@ class Contents:
         self.topics: dict[str, _Topic] = {}
 
     def settle(self, connection: Connection, packets: TopicPackets) -> None:
-        """See the messages that came, and keep the first."""
+        """Extend the ranges by the waiting messages, and keep only the first message."""
         known = self.topics.get(connection.topic)
         if known is None and len(self.topics) >= MOST_CHANNELS:
             keep_first(connection, packets)
             return
         if known is None:
-            known = self.topics[connection.topic] = self._begun(connection, packets.payloads[0])
+            known = self.topics[connection.topic] = self._new_topic(connection, packets.payloads[0])
             known.see(packets.payloads)
         else:
             known.see(packets.payloads[1:])
         keep_first(connection, packets)
 
-    def _begun(self, connection: Connection, payload: bytes) -> _Topic:
+    def _new_topic(self, connection: Connection, payload: bytes) -> _Topic:
         try:
             if not connection.is_decodable:
                 raise undecodable(connection)
@@ -85,7 +85,7 @@ class Contents:
             return _Topic(note=note, error=error)
 
     def inventory(self, collector: Collector) -> Inventory:
-        """Return the inventory of a bag whose topics were all caught; raises LogError for a bag of which nothing can be read."""
+        """Return the inventory of a bag that was read; raises LogError for a bag of which nothing can be decoded."""
         check_not_empty(self.path, collector)
         errors = [found.error for _, found in sorted(self.topics.items()) if found.error is not None]
         if errors and len(errors) == len(self.topics):  # such a bag is no log yet
@@ -109,7 +109,7 @@ class Contents:
 
 
 LATE_S = 1.0
-"""Header and receive stamps further apart than this are two clocks, not a delay."""
+"""Largest difference of header and receive stamps that is a delay; a larger one means two different clocks."""
 
 
 def read_signals(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
@@ -129,7 +129,7 @@ def read_signals(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLo
 
 
 def _raw_log(path: Path, collector: Collector, mapping: ChannelMap, topics: list[TopicSeries]) -> RawLog:
-    notes = [*collector.notes, *(n for t in topics for n in t.notes), *_two_clocks(topics, mapping.stamp)]
+    notes = [*collector.notes, *(n for t in topics for n in t.notes), *_notes_of_delay(topics, mapping.stamp)]
     stamps = {signal: (t, t.stamps(source, mapping.stamp)) for t in topics for signal, source in t.sources.items()}
     origin = min(int(s[0]) for _, s in stamps.values())
     series = {signal: t.series(signal, s, origin) for signal, (t, s) in stamps.items()}
@@ -168,7 +168,7 @@ def _topic(path: Path, collector: Collector, signal: str, source: Source) -> Non
 
 
 def undecodable(connection: Connection, signal: str = "") -> LogError:
-    """Return the error of messages in a serialization that is not known."""
+    """Return the error for messages in an unknown serialization."""
     return LogError(
         f"the messages of `{connection.topic}` are serialized as `{connection.serialization}`, and only `{CDR}` and `{ROS1}` are "
         "known",
@@ -178,13 +178,16 @@ def undecodable(connection: Connection, signal: str = "") -> LogError:
     )
 
 
-def _two_clocks(topics: list[TopicSeries], asked: Stamp | None) -> list[Note]:
-    """Refuse header stamps of one clock beside receive stamps of another; note a plain delay."""
+def _notes_of_delay(topics: list[TopicSeries], requested: Stamp | None) -> list[Note]:
+    """Return the note on the delay between header and receive stamps where both are used.
+
+    Raises MappingError where the delay is so large that the stamps must be of two clocks.
+    """
     late: dict[str, float] = {}
     receive = False
     for topic in topics:
         for source in topic.sources.values():
-            by_header = topic.header is not None and topic.stamps(source, asked) is topic.header
+            by_header = topic.header is not None and topic.stamps(source, requested) is topic.header
             receive |= not by_header
             if topic.header is not None and by_header:
                 late[topic.connection.topic] = float(np.median(topic.received - topic.header)) / 1e9

@@ -1,4 +1,4 @@
-"""What a bag holds before its messages are decoded: connections, and their packets with the receive stamps."""
+"""Collect the connections of a bag, and their packets with receive stamps, before the messages are decoded."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from fieldsid.logs.readers._unpacked import UnpackedSize
 from fieldsid.logs.run import Note
 
 ROS1, CDR = "ros1", "cdr"
-"""Serializations whose messages can be decoded."""
+"""Serializations that can be decoded."""
 
 LAST_NS = (1 << 63) - 1
-"""Largest stamp that is a signed 64-bit number; only damage makes a larger one."""
+"""Largest stamp that is a signed 64-bit number; a larger stamp is damaged."""
 
-TOLD_PLACES = 5
-"""Damaged places that are noted one by one; of more, only the number is."""
+MOST_PLACES_NOTED = 5
+"""Number of damaged places with a note each; the others are only counted."""
 
 DAY_NS = 86_400 * 1_000_000_000
 
 SETTLE_BYTES = 1 << 23
-"""Bytes of a file that are read before what waits is settled: enough to decode in blocks, little beside 500 MiB."""
+"""Bytes of a file after which the waiting payloads are settled: enough for decoding in blocks, little compared with 500 MiB."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,47 +38,47 @@ class Connection:
 
     @property
     def is_decodable(self) -> bool:
-        """Whether messages are in a serialization that is known."""
+        """Whether the messages are in a known serialization."""
         return self.serialization in (ROS1, CDR)
 
 
 @dataclass(frozen=True, slots=True)
 class TopicPackets:
-    """The packets of one topic: all receive stamps in ns, and the payloads that have not been settled yet."""
+    """The packets of one topic: all receive stamps in ns, and the payloads that still wait to be settled."""
 
     topic: str
     stamps: array[int] = field(default_factory=lambda: array("q"))
     payloads: list[bytes] = field(default_factory=list)
 
     def leave_out_last(self) -> None:
-        """Forget the packet that came last, where it waits."""
+        """Remove the last packet, if its payload still waits."""
         self.leave_out_from(len(self.stamps) - 1)
 
     def leave_out_from(self, count: int) -> None:
-        """Forget the packets that wait and came after the first `count`."""
+        """Remove the packets after the first `count` whose payloads still wait."""
         surplus = min(len(self.stamps) - count, len(self.payloads))
         if surplus > 0:
             del self.stamps[-surplus:], self.payloads[-surplus:]
 
 
 Settle = Callable[[Connection, TopicPackets], None]
-"""What is done with the payloads that wait: decode and clear them, or keep them all."""
+"""Function that settles the waiting payloads: it decodes and clears them, or keeps them."""
 
 
 def keep_all(connection: Connection, packets: TopicPackets) -> None:
-    """Let the payloads wait to the end."""
+    """Keep all payloads until the whole bag is read."""
 
 
 def keep_first(connection: Connection, packets: TopicPackets) -> None:
-    """Keep one payload, to see what is inside."""
+    """Keep the first payload, from which the fields of the topic are found."""
     del packets.payloads[1:]
 
 
 class Collector:
-    """What the reading of a bag brings in: connections by topic, and packets of the topics that are wanted (all when None).
+    """Collect the connections of a bag by topic, and the packets of the topics that are wanted (all when None).
 
-    `expected` is the number of messages that the bag's own index states, by topic; `file` the one that is being read; `size`
-    the bytes of all, of which `progress` is given the share; `unpacked` counts what they unpack to.
+    expected: the number of messages by topic that the index of the bag states. file: the name of the file that is being read.
+    size: the bytes of all files; `progress` is called with the share of them that was read. unpacked: counts the unpacked bytes.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class Collector:
         self._waiting = self._read = 0
 
     def connect(self, connection: Connection) -> TopicPackets | None:
-        """Register a connection; return where its packets go, or None when nobody wants them."""
+        """Register a connection; return the collection for its packets, or None when its topic is not wanted."""
         topic = connection.topic
         known = self.connections.get(topic)
         if known is None or (not known.definition and connection.definition):
@@ -122,23 +122,23 @@ class Collector:
         return {topic: p.stamps[counts.get(topic, 0) :].tolist() for topic, p in self.packets.items()}
 
     def stamps_near(self, last: TopicPackets | None) -> tuple[int, int]:
-        """Return what stamps behind damage may be: within a day of the latest one, that of `last` not counted."""
+        """Return the plausible range of stamps after damage: within a day of the latest one, without the last stamp of `last`."""
         stamps = [p.stamps[-2 if p is last else -1] for p in self.packets.values() if len(p.stamps) > (p is last)]
         return (max(stamps) - DAY_NS, max(stamps) + DAY_NS) if stamps else (0, LAST_NS)
 
     def leave_out_from(self, counts: Mapping[str, int]) -> None:
-        """Forget the packets that came after `counts`; they must not have been settled."""
+        """Remove the packets that came after `counts`; they must not have been settled."""
         for topic, packets in self.packets.items():
             packets.leave_out_from(counts.get(topic, 0))
 
     def has_read(self, size: int) -> None:
-        """Count bytes that were read; what waits is settled every SETTLE_BYTES."""
+        """Count bytes that were read; settle the waiting payloads every SETTLE_BYTES."""
         self._waiting += size
         if self._waiting >= SETTLE_BYTES:
             self.settle()
 
     def settle(self) -> None:
-        """Hand on what waits, and tell how far the reading is."""
+        """Pass on the waiting payloads, and report the progress."""
         self._read += self._waiting
         self._waiting = 0
         self._progress(min(self._read / self.size, 1.0))
@@ -152,7 +152,7 @@ class Collector:
         self.notes.append(Note("truncated", message, {"bytes": size}))
 
     def cut_chunk(self, position: int, got: int, size: int) -> None:
-        """Note a chunk whose end is missing; compressed data give whole blocks only."""
+        """Note a chunk whose end is missing; of compressed data only complete blocks can be read."""
         message = f"the chunk at byte {position} of {self.file} is cut: {got} of its {size} bytes could be read"
         self.notes.append(Note("truncated", message, {"byte": position, "read": got, "of": size}))
 
@@ -161,17 +161,17 @@ class Collector:
         self.damaged(f"{what} at byte {position} of {self.file}", {"file": self.file, "byte": position})
 
     def damaged(self, what: str, data: Mapping[str, Any]) -> None:
-        """Note a part of a bag that could not be read; the first of many places get a note each."""
+        """Note a part of a bag that could not be read; of many places only the first ones get a note each."""
         self.damages += 1
-        if self.damages <= TOLD_PLACES:
+        if self.damages <= MOST_PLACES_NOTED:
             self.notes.append(Note("damaged", f"{what}: damaged, left out with what may be damaged beside it", data))
 
     def expect(self, topic: str, count: int) -> None:
-        """Add to the number of messages that the files themselves state."""
+        """Add to the number of messages of a topic that the files state."""
         self.expected[topic] = self.expected.get(topic, 0) + count
 
-    def say_untold_places(self) -> None:
-        """Note how many places are damaged besides those that have a note."""
-        if self.damages > TOLD_PLACES:
-            more = self.damages - TOLD_PLACES
+    def note_further_places(self) -> None:
+        """Note the number of damaged places that have no note of their own."""
+        if self.damages > MOST_PLACES_NOTED:
+            more = self.damages - MOST_PLACES_NOTED
             self.notes.append(Note("damaged", f"{more} more places are damaged and were left out", {"places": more}))

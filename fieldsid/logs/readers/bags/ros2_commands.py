@@ -1,6 +1,6 @@
-"""Write fin commands as a ROS 2 bag: each fin as std_msgs/Float64, whether the autopilot has it as std_msgs/Bool.
+"""Write fin commands as a ROS 2 bag: each fin as std_msgs/Float64, and whether the autopilot steers as std_msgs/Bool.
 
-What must be watched while it is played comes first, as std_msgs/String.
+The conditions to abort the playback are written first, as std_msgs/String.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ def write_commands(
     conditions: str,
     force: bool = False,
 ) -> Path:
-    """Write a bag folder (MCAP): commands (n,) about trim by topic, autopilot (n,) 0 or 1 on `/autopilot`, times (n,) s.
+    """Write a bag folder (MCAP): commands (n,) about trim by topic, autopilot (n,) 0 or 1 on `/autopilot`, times (n,) in s.
 
-    conditions stand on `/abort_conditions` before the first of them.
+    `conditions` is written on `/abort_conditions` before the first command.
 
     Raises ArtifactError when the folder exists and `force` is false, or cannot be written.
     """
@@ -57,13 +57,13 @@ def _fill(path: Path, time: FloatArray, commands: Mapping[str, FloatArray], auto
     store = get_typestore(Stores.ROS2_HUMBLE)
     float64, boolean, string = (store.types[f"std_msgs/msg/{name}"] for name in ("Float64", "Bool", "String"))
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        told = [writer.add_connection(topic, float64.__msgtype__, typestore=store) for topic in commands]
+        fins = [writer.add_connection(topic, float64.__msgtype__, typestore=store) for topic in commands]
         pilot = writer.add_connection("/autopilot", boolean.__msgtype__, typestore=store)
-        watched = writer.add_connection("/abort_conditions", string.__msgtype__, typestore=store)
-        writer.write(watched, 0, bytes(store.serialize_cdr(string(data=conditions), string.__msgtype__)))
+        abort = writer.add_connection("/abort_conditions", string.__msgtype__, typestore=store)
+        writer.write(abort, 0, bytes(store.serialize_cdr(string(data=conditions), string.__msgtype__)))
         values = [v.tolist() for v in commands.values()]
-        for t, steered, *angles in zip(time.tolist(), autopilot.tolist(), *values, strict=True):
+        for t, is_steering, *angles in zip(time.tolist(), autopilot.tolist(), *values, strict=True):
             stamp = round(t * NANOSECONDS)
-            for command, angle in zip(told, angles, strict=True):
+            for command, angle in zip(fins, angles, strict=True):
                 writer.write(command, stamp, bytes(store.serialize_cdr(float64(data=angle), float64.__msgtype__)))
-            writer.write(pilot, stamp, bytes(store.serialize_cdr(boolean(data=bool(steered)), boolean.__msgtype__)))
+            writer.write(pilot, stamp, bytes(store.serialize_cdr(boolean(data=bool(is_steering)), boolean.__msgtype__)))

@@ -1,4 +1,4 @@
-"""The files of a bag, read one after the other."""
+"""Read the files of a bag in sequence."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ZSTD = b"\x28\xb5\x2f\xfd"
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a file starts like a bag, or a folder holds one."""
+    """Whether a file starts like a bag, or a folder has files of one."""
     if path.is_dir():
         return bool(_parts(path))
     return path.name.endswith(PACKED) or _scan_of(path) is not None
@@ -52,7 +52,7 @@ def collected(
             (_scan_of(plain) or _unknown)(plain, collector)
     collector.settle()
     progress(1.0)
-    collector.say_untold_places()
+    collector.note_further_places()
     check_against_metadata(path, collector)
     return collector
 
@@ -68,14 +68,17 @@ def _scan_of(path: Path) -> Scan | None:
 
 
 def _parts(folder: Path) -> list[Path]:
-    """Return the stores in a bag folder, in the order the recorder split them."""
+    """Return the files of a bag's folder in the order in which they were recorded."""
     found = [p for p in folder.iterdir() if p.is_file() and p.name.endswith((*SUFFIXES, *PACKED)) and p.stat().st_size > 0]
     return sorted(found, key=lambda p: (len(p.name), p.name))
 
 
 @contextmanager
 def _plain_part(part: Path, collector: Collector) -> Iterator[Path]:
-    """Yield a store; one that is compressed as a whole file is unpacked into a temporary folder. Raises LogError for none."""
+    """Yield a file of a bag; a compressed file is first unpacked into a temporary folder.
+
+    Raises LogError where nothing can be unpacked.
+    """
     if part.suffix != ".zstd":
         yield part
         return
@@ -93,7 +96,7 @@ def _plain_part(part: Path, collector: Collector) -> Iterator[Path]:
 
 
 def _unpack_messages(packets: TopicPackets, collector: Collector) -> None:
-    """Unpack messages that the recorder compressed one by one; no plain message starts like zstd data."""
+    """Unpack messages that the recorder compressed one by one; an uncompressed message never starts like zstd data."""
     from fieldsid.logs.readers.bags.containers.decompress import unpacked
 
     plain = [unpacked(p, "zstd") if p.startswith(ZSTD) else p for p in packets.payloads]

@@ -1,1 +1,1 @@
-"""The messages inside bags: their definitions, and the numbers at a field's place."""
+"""Decode the messages of bags: their definitions, and the numbers of their fields."""

@@ -1,4 +1,4 @@
-"""Definitions of message types: from the bag, from a folder of .msg files, those that ROS 2 ships, or from beside the bag."""
+"""Find definitions of message types: in the bag, in a folder of .msg files, in ROS 2, or in folders near the bag."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from fieldsid.logs.run import Note
 Fields = dict[str, list[tuple[str, Any]]]
 _IDL_RULE = "=" * 80 + "\n"
 DEEPEST = 4
-"""Folders below the bag's that .msg files are looked for in, as in `workspace/src/package/msg`."""
+"""Depth of folders below that of the bag in which .msg files are searched, as in `workspace/src/package/msg`."""
 MOST_PARSED = 256
-"""Definitions that are kept: more than the topics of any bag seen."""
+"""Number of parsed definitions that are cached: more than any known bag has topics."""
 MOST_FOLDERS = 2000
-"""Folders beside a bag that are looked into: a bag in a home folder must not start a search of it all."""
+"""Largest number of folders near a bag that are searched, so that a bag in a home folder does not start a search of all of it."""
 
 
 @dataclass(frozen=True, slots=True)
 class DefinitionSearch:
-    """Where definitions may stand that a bag lacks: beside the log, and in the folder that was asked for."""
+    """Where to search definitions that a bag lacks: near the log, and in the folder that the user names."""
 
     log: Path
     msg_path: Path | None = None
 
 
 def decoder_of(connection: Connection, payload: bytes, search: DefinitionSearch) -> tuple[Decoder, Note | None]:
-    """Return the decoder whose definitions fit a message of the connection, and a note where they are not the bag's.
+    """Return the decoder whose definitions fit a message of the connection, and a note where they are not those of the bag.
 
-    The bag's own definitions count most, then the folder's that was asked for, then those of ROS 2 (Humble), then files
-    beside the bag. Raises LogError when none fits, none can be parsed, two files beside the bag differ, or the folder holds none.
+    Definitions are tried in this order: in the bag, in the folder that the user names, in ROS 2 (Humble), in files near the bag.
+    Raises LogError when none fits or can be parsed, when two files near the bag differ, and when the named folder has none.
     """
     first: LogError | None = None
     for origin, fields in _sources(connection, search):
@@ -56,18 +56,18 @@ def decoder_of(connection: Connection, payload: bytes, search: DefinitionSearch)
 
 
 def _sources(connection: Connection, search: DefinitionSearch) -> Iterator[tuple[str, Any]]:
-    """Yield the definitions to try, as functions, with words for where they are from."""
+    """Yield the definitions to try, as functions that return them, each with its origin in words."""
     folder = _of_folder(search.msg_path, connection)
 
-    def own() -> Fields:
+    def in_bag() -> Fields:
         return _parsed(connection.definition, connection.type_name, connection.language) if connection.definition else {}
 
-    yield "the bag", lambda: {**_shipped(), **folder, **own()}
+    yield "the bag", lambda: {**_shipped(), **folder, **in_bag()}
     if folder:
         yield f"`--msg-path {search.msg_path}`", lambda: {**_shipped(), **folder}
     yield "ROS 2", _shipped
-    beside = (search.log if search.log.is_dir() else search.log.parent).resolve()
-    for files in map(_msg_files, (beside, beside.parent)):
+    near = (search.log if search.log.is_dir() else search.log.parent).resolve()
+    for files in map(_msg_files, (near, near.parent)):
         file = _file_of(connection.type_name, files)
         if file is not None:
             _refuse_several(files, connection, search)
@@ -75,7 +75,7 @@ def _sources(connection: Connection, search: DefinitionSearch) -> Iterator[tuple
 
 
 def _fitting(known: Fields, connection: Connection, payload: bytes) -> Decoder:
-    """Return the decoder that can read a message by these definitions; raises the reason of the first that cannot."""
+    """Return the decoder by these definitions; raises LogError where they do not fit the message."""
     refuse_endless(known, connection.type_name)
     decoder = Decoder(known, connection.type_name, cdr=connection.serialization == CDR)
     decoder.layout(payload)
@@ -104,7 +104,7 @@ def _of_folder(folder: Path | None, connection: Connection) -> Fields:
 
 
 def _of_files(files: Sequence[Path], connection: Connection) -> Fields:
-    """Return the definitions of the connection's type and of what it is made of, as far as there are files for them."""
+    """Return the definitions of the connection's type and of the types inside it, as far as there are files for them."""
     found: Fields = {}
     ahead = [connection.type_name]
     while ahead:
@@ -117,7 +117,7 @@ def _of_files(files: Sequence[Path], connection: Connection) -> Fields:
 
 
 def _file_of(name: str, files: Sequence[Path]) -> Path | None:
-    """Return the file of a type: that of its package, else one of its short name."""
+    """Return the file of a type: in a folder of its package, else any with its short name; None without one."""
     package, _, short = name.partition("/msg/")
     named = [f for f in files if f.stem == short]
     return next((f for f in named if package in (f.parent.name, f.parent.parent.name)), named[0] if named else None)
@@ -125,7 +125,7 @@ def _file_of(name: str, files: Sequence[Path]) -> Path | None:
 
 @cache
 def _msg_files(root: Path) -> tuple[Path, ...]:
-    """Return the .msg files in a folder and the folders below it, as far as they are looked into."""
+    """Return the .msg files in a folder and the folders below it, within the limits DEEPEST and MOST_FOLDERS."""
     found: list[Path] = []
     for count, (folder, folders, names) in enumerate(os.walk(root)):
         if count >= MOST_FOLDERS:
@@ -137,19 +137,19 @@ def _msg_files(root: Path) -> tuple[Path, ...]:
 
 
 def _refuse_several(files: Sequence[Path], connection: Connection, search: DefinitionSearch) -> None:
-    """Raise LogError where two of the files beside a bag define the type itself, and differ."""
-    own = [f for f in files if f.stem == connection.type_name.rpartition("/")[2]]
-    if len({f.read_text(encoding="utf-8", errors="replace") for f in own}) > 1:
+    """Raise LogError where two files near a bag define the type of the connection differently."""
+    same_name = [f for f in files if f.stem == connection.type_name.rpartition("/")[2]]
+    if len({f.read_text(encoding="utf-8", errors="replace") for f in same_name}) > 1:
         raise LogError(
-            f"`{connection.type_name}` has {len(own)} definitions beside the bag that differ",
-            found=", ".join(map(str, own)),
-            hint=f"choose one: `sysid inspect {search.log} --msg-path {own[0].parent}`",
+            f"`{connection.type_name}` has {len(same_name)} definitions beside the bag that differ",
+            found=", ".join(map(str, same_name)),
+            hint=f"choose one: `sysid inspect {search.log} --msg-path {same_name[0].parent}`",
         )
 
 
 @lru_cache(maxsize=MOST_PARSED)
 def _parsed(text: str, name: str, language: str) -> Fields:
-    """Return what a definition says, parsed once: topics share types, and a log is read again for its mapping."""
+    """Return a parsed definition, cached because topics share types and a log is read again with its mapping."""
     try:
         if language == "idl":
             types: dict[str, Any] = {}

@@ -1,11 +1,11 @@
-"""Where the fields of a serialized message lie, and many messages decoded at once.
+"""Find where the fields of a serialized message are, and decode many messages at once.
 
-Over rosbags: chosen numbers 10 times as fast (tests/benchmarks/bag_reading.py), and a damaged message among others is left out.
-rosbags decodes no type and no encoding that is not known here.
+Advantages over rosbags: selected numbers are decoded 10 times as fast (tests/benchmarks/bag_reading.py), and a damaged message
+among others is left out. All types and encodings that rosbags decodes are decoded here as well.
 
-A message is walked once; whatever in it decides the layout (lengths of strings and sequences) is kept as a guard.
-All messages with the same size and the same guards share the layout, so their fields are columns of one block.
-Encodings: ROS 1 (packed, little endian) and CDR (OMG CORBA 3.0, 15.3: a number of k bytes stands at a multiple of k).
+A message is walked through once; the bytes that determine its layout (lengths of strings and sequences) are kept as guards. All
+messages with the same size and the same guards have the same layout, so that their fields are columns of one block.
+Encodings: ROS 1 (packed, little endian) and CDR (OMG CORBA 3.0, 15.3: a number of k bytes is at a multiple of k).
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ DTYPES = {
     "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8",
 }  # fmt: skip
 PADDING = "structure_needs_at_least_one_member"
-"""The name of the member that an empty structure is given."""
+"""Name of the member that ROS 2 adds to an empty structure."""
 QUATERNION = ("x", "y", "z", "w")
 DEEPEST, MOST_PARTS = 50, 100_000
-"""Types inside one another, and fields of all of them together: a message with more could be no message of any length."""
+"""Largest depth of types inside one another, and largest number of fields in all of them; a real message has fewer."""
 ROWS_APART = 32
-"""Layouts tried on whole blocks before messages are taken one by one."""
+"""Number of layouts that are matched against all messages of a block before the rest is decoded one by one."""
 
 Columns = tuple[list[npt.NDArray[Any]], npt.NDArray[np.bool_]]
-"""For each path the numbers of all messages (n, 1) or (n, 4), NaN where one lacks the element, and (n,) which were decoded."""
+"""For each path the numbers of all messages (n, 1) or (n, 4), NaN where the element is missing; mask (n,) of those decoded."""
 
 Definitions = Mapping[str, Sequence[tuple[str, Any]]]
-"""Fields of each message type: name and description, as rosbags parses them."""
+"""Fields of each message type, as name and description in the form of rosbags."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class Leaf:
 
 @dataclass(slots=True)
 class Layout:
-    """What one walk found: numbers and texts by path, and the byte ranges that fix the layout."""
+    """The layout of one message: numbers and texts by path, and the byte ranges (guards) that determine it."""
 
     leaves: dict[str, Leaf] = field(default_factory=dict)
     texts: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -66,7 +66,7 @@ class Layout:
 
 
 class Walker:
-    """Walks one message from its first byte to its last."""
+    """Walk through one message from its first byte to its last."""
 
     def __init__(self, definitions: Definitions, raw: bytes, *, cdr: bool) -> None:
         self.definitions = definitions
@@ -104,7 +104,7 @@ class Walker:
             )
         fields = [f for f in self.definitions[type_name] if f[0] != PADDING]
         if not fields and self.cdr:
-            self._advance(1)  # IDL has no structure without members: ROS 2 gives it one of a byte
+            self._advance(1)  # IDL has no structure without members: ROS 2 adds one of one byte
         for name, description in fields:
             self._field(description, f"{path}.{name}" if path else name)
 
@@ -178,10 +178,10 @@ _STEP = re.compile(r"^(?P<base>.*)\[(?P<key>[^\[\]]+)\]$")
 
 
 def numbers_at(layout: Layout, path: str) -> list[tuple[int, np.dtype[Any]]]:
-    """Return offsets and types of the number at a path, or of the four of a quaternion.
+    """Return offset and type of the number at a path, or of the four numbers of a quaternion.
 
-    `a.b[2]` is an element, `position[rudder]` the one whose name is in the `name` beside it. An element beyond the
-    end gives an empty list. Raises MappingError with the near paths where there is no such field.
+    `a.b[2]` is an element by index, `position[rudder]` an element by its name in the field `name` of the same message. An element
+    beyond the end gives an empty list. Raises MappingError with the near paths where there is no such field.
     """
     leaf = layout.leaves.get(path)
     if leaf is not None and leaf.count is None:
@@ -202,7 +202,7 @@ def numbers_at(layout: Layout, path: str) -> list[tuple[int, np.dtype[Any]]]:
 def _index(layout: Layout, base: str, key: str) -> int:
     if key.isdigit():
         return int(key)
-    path, names = _names_beside(layout, base)
+    path, names = _names_of_elements(layout, base)
     if key not in names:
         raise MappingError(
             f"`{base}` has no element named {key!r}", found=", ".join(names) or "no names beside it", hint=near(key, names)
@@ -217,12 +217,12 @@ def _no_field(layout: Layout, path: str) -> MappingError:
 
 
 def types_in(fields: Sequence[tuple[str, Any]]) -> list[str]:
-    """Return the message types that the fields of a type are made of."""
+    """Return the message types of the fields of a type."""
     return [name for name, _ in _inner(fields)]
 
 
 def refuse_endless(definitions: Definitions, type_name: str) -> None:
-    """Raise LogError for a type that holds itself, or comes to more numbers and texts than a message has."""
+    """Raise LogError for a type that contains itself, or has more numbers and texts than a message can have."""
     known: dict[str, int] = {}
 
     def parts_of(name: str, above: tuple[str, ...]) -> int:
@@ -246,7 +246,7 @@ def refuse_endless(definitions: Definitions, type_name: str) -> None:
 
 
 def _inner(fields: Sequence[tuple[str, Any]]) -> Iterator[tuple[str, Any]]:
-    """Yield the message types that fields are of, with their descriptions."""
+    """Yield the message types among the types of some fields, with the descriptions of these fields."""
     for _, (kind, what) in fields:
         if kind == NAME:
             yield what, (kind, what)
@@ -260,7 +260,7 @@ def _count(description: Any) -> int:
 
 
 class Decoder:
-    """Decodes chosen fields of many messages of one type."""
+    """Decode selected fields of many messages of one type."""
 
     def __init__(self, definitions: Definitions, type_name: str, *, cdr: bool) -> None:
         self.definitions = definitions
@@ -272,20 +272,20 @@ class Decoder:
         return Walker(self.definitions, raw, cdr=self.cdr).walk(self.type_name)
 
     def first_values(self, raw: bytes) -> dict[str, Any]:
-        """Return every number of one message by path; rows of numbers up to eight elements."""
+        """Return every number of one message by path; of an array at most eight elements."""
         layout = self.layout(raw)
         found: dict[str, Any] = {}
         for path, leaf in layout.leaves.items():
             if leaf.count is None:
                 found[path] = np.frombuffer(raw, leaf.dtype, 1, leaf.offset)[0].item()
                 continue
-            _, names = _names_beside(layout, path)
+            _, names = _names_of_elements(layout, path)
             for i, value in enumerate(np.frombuffer(raw, leaf.dtype, leaf.count, leaf.offset)[:8]):
                 found[f"{path}[{names[i] if i < len(names) else i}]"] = value.item()
         return found
 
     def decode(self, payloads: Sequence[bytes], paths: Sequence[str]) -> Columns:
-        """Return for each path the numbers of all messages, and which messages the definition fits."""
+        """Return for each path the numbers of all messages, and a mask of the messages that the definition fits."""
         lengths = np.fromiter(map(len, payloads), dtype=np.int64, count=len(payloads))
         good = np.ones(len(payloads), dtype=np.bool_)
         out = [np.full((len(payloads), 1), np.nan) for _ in paths]
@@ -335,15 +335,15 @@ def _take(
             out[k][rows, j] = column
 
 
-def _names_beside(layout: Layout, base: str) -> tuple[str, tuple[str, ...]]:
-    """Return the path of the texts that name the elements of a row, and them; none where nothing does."""
+def _names_of_elements(layout: Layout, base: str) -> tuple[str, tuple[str, ...]]:
+    """Return the path of the texts that name the elements of an array, and these texts; empty where there are none."""
     parent = base.rpartition(".")[0]
-    beside = (f"{parent}.{name}" if parent else name for name in ("name", "names"))
-    return next(((path, layout.texts[path]) for path in beside if path in layout.texts), ("", ()))
+    paths = (f"{parent}.{name}" if parent else name for name in ("name", "names"))
+    return next(((path, layout.texts[path]) for path in paths if path in layout.texts), ("", ()))
 
 
 def as_floats(values: npt.NDArray[Any]) -> FloatArray:
-    """Return (n, 1) as (n,), (n, 4) as it is, as float64."""
+    """Return values as float64, (n, 1) as (n,) and (n, 4) as (n, 4)."""
     floats = np.asarray(values, dtype=np.float64)
     return floats[:, 0] if floats.shape[1] == 1 else floats
 

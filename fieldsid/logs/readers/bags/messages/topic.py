@@ -1,4 +1,4 @@
-"""One topic's messages, decoded block by block as they are read: only the numbers of the mapped fields are kept."""
+"""Decode the messages of one topic block by block while they are read, and keep only the numbers of the mapped fields."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Stamps = npt.NDArray[np.int64]
 HEADER, TIME = "std_msgs/msg/Header", "builtin_interfaces/msg/Time"
 PRESSURE = "sensor_msgs/msg/FluidPressure"
 FIRST_TRIED = 5
-"""Messages of a block tried as the one that shows what is inside, should the first be damaged."""
+"""Number of messages that are tried to find the fields of a topic, because the first ones may be damaged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +38,13 @@ class TopicSeries:
     header: Stamps | None
     notes: tuple[Note, ...]
 
-    def stamps(self, source: Source, asked_of_all: Stamp | None) -> Stamps:
-        """Return the stamps in ns that a source goes by; raises MappingError for header stamps that are not there."""
-        asked = source.stamp or asked_of_all
-        if asked == "receive":
+    def stamps(self, source: Source, default: Stamp | None) -> Stamps:
+        """Return the stamps in ns that are used for a source; raises MappingError for header stamps that are missing.
+
+        `default` is the kind of stamps that the mapping states for all sources.
+        """
+        stated = source.stamp or default
+        if stated == "receive":
             return self.received
         if self.header is not None and bool(self.header.any()):
             return self.header
@@ -56,14 +59,14 @@ class TopicSeries:
     def series(self, signal: str, stamps: Stamps, origin: int) -> Series:
         """Return one signal's series, in seconds from `origin`."""
         path = self.paths[signal]
-        stated = None if signal == ATTITUDE else unit_of_field(self.connection.topic, path, signal)
-        unit = "Pa" if self.connection.type_name == PRESSURE else stated
+        of_field = None if signal == ATTITUDE else unit_of_field(self.connection.topic, path, signal)
+        unit = "Pa" if self.connection.type_name == PRESSURE else of_field
         label = f"{self.connection.topic}.{path}" if path else self.connection.topic
         return Series((stamps - origin) / 1e9, self.values[signal], label, unit, path.rpartition(".")[2] == "z")
 
 
 class TopicDecoding:
-    """Takes the payloads of one topic as they come and keeps the mapped numbers of each."""
+    """Decode the payloads of one topic as they are read, and keep the mapped numbers of each."""
 
     def __init__(self, sources: Mapping[str, Source], search: DefinitionSearch) -> None:
         self.sources = sources
@@ -76,7 +79,7 @@ class TopicDecoding:
         self.good: list[npt.NDArray[np.bool_]] = []
 
     def settle(self, connection: Connection, packets: TopicPackets) -> None:
-        """Decode what waits; raises LogError without a definition that fits, MappingError for a field that is not there."""
+        """Decode the waiting payloads; raises LogError without a fitting definition, MappingError for a missing field."""
         payloads = packets.payloads
         if connection.is_decodable:
             decoder = self.decoder or self._begin(connection, payloads)
@@ -87,7 +90,7 @@ class TopicDecoding:
         payloads.clear()
 
     def _begin(self, connection: Connection, payloads: list[bytes]) -> Decoder:
-        """Find the definition and the fields by the first message that a definition fits."""
+        """Return the decoder, and set the paths of the fields, by the first message that a definition fits."""
         decoder, note, first = _first_that_fits(connection, payloads, self.search)
         layout = decoder.layout(first)
         self.paths = {signal: field_of(connection, layout, signal, source.path) for signal, source in self.sources.items()}
@@ -97,14 +100,14 @@ class TopicDecoding:
         return decoder
 
     def joined(self, connection: Connection, packets: TopicPackets) -> TopicSeries:
-        """Return the whole topic in the order of its receive stamps; messages that cannot be decoded are left out, and said."""
+        """Return the topic in the order of its receive stamps; messages that cannot be decoded are left out with a note."""
         good = np.concatenate(self.good)
         received = np.frombuffer(packets.stamps, dtype=np.int64)[good]
         order = np.argsort(received, kind="stable")
         columns = [_joined([b[k] for b in self.blocks])[good][order] for k in range(len(self.blocks[0]))]
         values = dict(zip(self.paths, map(as_floats, columns), strict=False))
         if not good.all():
-            self._say_left_out(connection, packets, good)
+            self._note_left_out(connection, packets, good)
         header = _header_stamps(columns[-2:]) if self.header else None
         if header is not None and not header.any():
             message = f"{connection.topic}: header stamps are zero, receive stamps are used"
@@ -112,12 +115,12 @@ class TopicDecoding:
         self._refuse_beyond_the_end(connection, values)
         return TopicSeries(connection, self.sources, self.paths, values, received[order], header, tuple(self.notes))
 
-    def _say_left_out(self, connection: Connection, packets: TopicPackets, good: npt.NDArray[np.bool_]) -> None:
-        lost = int((~good).sum())
+    def _note_left_out(self, connection: Connection, packets: TopicPackets, good: npt.NDArray[np.bool_]) -> None:
+        bad = int((~good).sum())
         at = (packets.stamps[int(np.argmin(good))] - packets.stamps[0]) / 1e9
-        message = f"{connection.topic}: {lost} of {good.size} messages do not fit their definition and were left out, "
+        message = f"{connection.topic}: {bad} of {good.size} messages do not fit their definition and were left out, "
         message += f"the first {at:.3f} s after the topic's first"
-        self.notes.append(Note("damaged", message, {"topic": connection.topic, "count": lost, "of": int(good.size)}))
+        self.notes.append(Note("damaged", message, {"topic": connection.topic, "count": bad, "of": int(good.size)}))
 
     def _refuse_beyond_the_end(self, connection: Connection, values: Mapping[str, FloatArray]) -> None:
         for signal, path in self.paths.items():
@@ -143,7 +146,7 @@ def _first_that_fits(
 
 
 def _joined(blocks: list[npt.NDArray[Any]]) -> npt.NDArray[Any]:
-    """Return blocks (n, 1) or (n, 4) as one; a block where the element was never there is NaN."""
+    """Return the concatenated blocks (n, 1) or (n, 4); a block in which the element was missing is NaN."""
     width = max(b.shape[1] for b in blocks)
     return np.concatenate([b if b.shape[1] == width else np.repeat(b, width, axis=1) for b in blocks])
 
@@ -154,7 +157,7 @@ def _header_stamps(columns: list[npt.NDArray[Any]]) -> Stamps:
 
 
 def field_of(connection: Connection, layout: Layout, signal: str, path: str) -> str:
-    """Return the path of a signal inside a message, filled in where the type leaves no choice."""
+    """Return the path of a signal inside a message; an empty path is completed where the type allows only one."""
     if not path and connection.type_name == PRESSURE:
         return "fluid_pressure"
     if not path and "data" in layout.leaves:
@@ -181,7 +184,7 @@ def quaternions_in(layout: Layout) -> list[str]:
 
 
 def header_of(decoder: Decoder) -> str | None:
-    """Return the path of a message's own stamp, or None."""
+    """Return the path of the stamp inside the messages of a decoder, or None where there is none."""
     for name, (_, what) in decoder.definitions[decoder.type_name]:
         if what == HEADER:
             return f"{name}.stamp"
