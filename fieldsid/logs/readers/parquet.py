@@ -172,9 +172,7 @@ def _cells(column: Any) -> Any:
         return column.cast(arrow.timestamp("ns"), safe=False).to_numpy()
     if kinds.is_duration(arrow_type):
         return column.cast(arrow.duration("ns"), safe=False).cast(arrow.int64()).to_numpy() / 1e9
-    shown = (
-        len(column) if not kinds.is_nested(arrow_type) else LIST_CELLS
-    )  # lists are no signal: only a few are read, to be shown
+    shown = len(column) if not kinds.is_nested(arrow_type) else LIST_CELLS  # lists are no signal: a few are read to be shown
     cells = np.full(len(column), None, dtype=object)
     cells[:shown] = [None if cell is None else str(cell) for cell in column.slice(0, shown).to_pylist()]
     return cells

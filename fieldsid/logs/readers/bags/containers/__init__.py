@@ -1,1 +1,1 @@
-"""The container formats of bags: records with their topic and stamp, and damage read around."""
+"""Read the container formats of bags: records with topic and stamp, skipping damaged places."""

@@ -1,8 +1,8 @@
-"""ROS 2 SQLite files (.db3), their rows read in the order they were written.
+"""Read ROS 2 SQLite files (.db3), with their rows in the order in which they were written.
 
-Over rosbags: packets 2 to 3 times as fast (tests/benchmarks/bag_reading.py; SQLite reads the bytes in both, without counting
-and sorting here), and a file that is cut off, has damaged pages or was left by a crash with a write-ahead log gives what is
-left.
+Advantages over rosbags: packets are read 2 to 3 times as fast (tests/benchmarks/bag_reading.py; SQLite reads the bytes in both,
+but rosbags also counts and sorts the rows), and the readable rows are returned of a file that is cut off, has damaged pages, or
+has a write-ahead log left by a crash.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from fieldsid.logs.unknown_file import COPY_AGAIN
 
 MAGIC = b"SQLite format 3\x00"
 DAMAGE = (sqlite3.DatabaseError, MemoryError, UnicodeDecodeError)
-"""What SQLite raises on a damaged file: it believes a damaged length and finds no memory, and quotes damaged text."""
+"""Errors that SQLite raises on a damaged file; MemoryError for a damaged length, UnicodeDecodeError for damaged text."""
 NO_MESSAGE = (KeyError, TypeError, OverflowError)
-"""What a row raises whose topic is unknown, whose stamp is no whole number of 64 bits, or that has no data."""
+"""Errors for a row whose topic is unknown, whose stamp is no integer of 64 bits, or that has no data."""
 FIRST_ID = 0
-"""Ids of messages count from 1."""
+"""Id below those of all messages, which count from 1."""
 MAPPED_BYTES = 1 << 24
-"""Part of a file that SQLite reads through memory, a tenth faster than by calls."""
+"""Number of bytes of a file that SQLite maps to memory, which is a tenth faster than reading by calls."""
 _LANGUAGES = {"ros2msg": "msg", "ros2idl": "idl"}
 
 
@@ -44,10 +44,10 @@ def scan(path: Path, collector: Collector) -> None:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[sqlite3.Connection]:
-    """Open for reading without touching the file.
+    """Yield a connection that reads a file without changing it.
 
-    What a crash left in the write-ahead log is read in a copy. A file that was cut is read in a copy of its whole
-    pages, which says so itself: SQLite takes a missing page for zeros, and zeros are no data.
+    A file with a write-ahead log left by a crash is read in a copy. A file that was cut off is read in a copy of its complete
+    pages whose head states their number, because SQLite would read missing pages as zeros, which are no data.
     """
     log = path.with_name(path.name + "-wal")
     with ExitStack() as stack:
@@ -65,7 +65,7 @@ def _opened(path: Path) -> Iterator[sqlite3.Connection]:
 
 
 def _pages_left(path: Path) -> tuple[int, int] | None:
-    """Return the page size and the whole pages of a file that is shorter than its head says; None for a whole one."""
+    """Return page size and number of complete pages of a file shorter than its head states; None for a complete file."""
     with path.open("rb") as stream:
         head = stream.read(100)
     size = int.from_bytes(head[16:18], "big")
@@ -73,12 +73,12 @@ def _pages_left(path: Path) -> tuple[int, int] | None:
     stated = int.from_bytes(head[28:32], "big")
     if len(head) < 100 or size < 512:
         return None
-    left, rest = divmod(path.stat().st_size, size)
-    return (size, left) if rest or left < stated else None
+    pages, rest = divmod(path.stat().st_size, size)
+    return (size, pages) if rest or pages < stated else None
 
 
 def _shortened(path: Path, folder: Path, size: int, pages: int) -> Path:
-    """Return a copy of the first pages whose head states that there are no more."""
+    """Return a copy of the first pages, whose head states this number of pages."""
     copy = folder / path.name
     with path.open("rb") as source, copy.open("wb") as target:
         for _ in range(pages):
@@ -119,10 +119,10 @@ def _definitions(base: sqlite3.Connection) -> dict[str, tuple[Any, str]]:
 
 
 class _Rows:
-    """The messages of the wanted topics in the order of their ids, and on behind what cannot be read.
+    """Read the messages of the wanted topics in the order of their ids, continuing after rows that cannot be read.
 
-    A cell that damage has overwritten is a row without a topic or a stamp. Cells lie side by side on a page, so damage may
-    reach into the messages before and behind: these are left out too.
+    A row whose cell was overwritten by damage has no topic or stamp. Cells are next to each other on a page, so the damage may
+    extend to the messages before and after it: these are left out too.
     """
 
     def __init__(self, base: sqlite3.Connection, collector: Collector, packets: Mapping[int, TopicPackets | None]) -> None:
@@ -130,7 +130,7 @@ class _Rows:
         self.base = base
         self.collector = collector
         self.packets = {number: place for number, place in packets.items() if place is not None}
-        # By the topics that nobody wants: a damaged row, of a topic that is none, must not pass unseen.
+        # Exclude the unwanted topics instead of selecting the wanted ones, so that a damaged row of no known topic is noticed.
         marks = ",".join("?" for _ in self.unwanted)
         self.query = (
             "SELECT id, topic_id, timestamp, CAST(data AS BLOB) FROM messages WHERE id >= ? "  # noqa: S608 - marks only
@@ -146,7 +146,7 @@ class _Rows:
             try:
                 self._read_from(start)
             except DAMAGE as error:
-                start = self._behind_damage(start, str(error) or "a row claims more bytes than the memory holds")
+                start = self._skip_damage(start, str(error) or "a row claims more bytes than the memory holds")
             else:
                 start = None
         if self.no_messages:
@@ -156,13 +156,13 @@ class _Rows:
         rows = self.base.execute(self.query, (start, *self.unwanted))
         if start != FIRST_ID:
             self._skip_a_message(rows)
-        while not self._takes_all(rows):
+        while not self._collect_rows(rows):
             self.no_messages += 1
             self._leave_out_last()
             self._skip_a_message(rows)
 
-    def _takes_all(self, rows: sqlite3.Cursor) -> bool:
-        """Take rows up to the last one (True), or up to one that is no message (False)."""
+    def _collect_rows(self, rows: sqlite3.Cursor) -> bool:
+        """Collect rows up to the last one (return True), or up to one that is no message (return False)."""
         add = {number: (p.stamps.append, p.payloads.append) for number, p in self.packets.items()}
         (number, _), topic, waiting = self.last, -1, 0
         try:
@@ -183,7 +183,7 @@ class _Rows:
         return True
 
     def _skip_a_message(self, rows: sqlite3.Cursor) -> None:
-        """Leave out the next message, and what is none before it."""
+        """Skip the rows up to and including the next one that is a message."""
         for _, topic, stamp, data in rows:
             if topic in self.packets and type(stamp) is int and type(data) is bytes:
                 return
@@ -195,25 +195,25 @@ class _Rows:
             packets.leave_out_last()
             self.last = (self.last[0], None)
 
-    def _behind_damage(self, start: int, said: str) -> int | None:
-        """Return the id above `start` behind which rows can be read again, or None; say which rows are lost."""
+    def _skip_damage(self, start: int, reason: str) -> int | None:
+        """Return the first id above `start` from which rows can be read again, or None; note which rows cannot be read."""
         self._leave_out_last()
-        lost = max(self.last[0], start) + 1
-        go_on = self._first_readable(lost)
-        if go_on is None:
-            self.collector.damaged(f"the table of messages from row {lost} on ({said})", {"row": lost})
+        bad = max(self.last[0], start) + 1
+        resume = self._first_readable(bad)
+        if resume is None:
+            self.collector.damaged(f"the table of messages from row {bad} on ({reason})", {"row": bad})
         else:
-            self.collector.damaged(f"rows {lost} to {go_on} of the table of messages ({said})", {"row": lost, "to": go_on})
-        return go_on
+            self.collector.damaged(f"rows {bad} to {resume} of the table of messages ({reason})", {"row": bad, "to": resume})
+        return resume
 
-    def _first_readable(self, lost: int) -> int | None:
-        """Return the least id from which a row can be read, above those that are lost; by doubled steps, then by halves."""
+    def _first_readable(self, bad: int) -> int | None:
+        """Return the first readable id above the unreadable id `bad`, or None: search by doubled steps, then by bisection."""
         step = 1
-        while not self._is_readable(lost + step):
+        while not self._is_readable(bad + step):
             step *= 2
-            if lost + step > LAST_NS:
+            if bad + step > LAST_NS:
                 return None
-        low, high = lost + step // 2, lost + step
+        low, high = bad + step // 2, bad + step
         while high - low > 1:
             middle = (low + high) // 2
             low, high = (low, middle) if self._is_readable(middle) else (middle, high)

@@ -1,6 +1,6 @@
-"""Decompression of chunks and files by their libraries, as far as the data go.
+"""Decompress chunks and files by the libraries of their formats, as far as the data reach.
 
-What a cut leaves of the last block of LZ4 or zstd data is not read: the libraries hand out whole blocks.
+An incomplete last block of LZ4 or zstd data is not read, because the libraries return complete blocks only.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from fieldsid.errors import LogError
 from fieldsid.logs.readers._unpacked import MOST_TIMES, PIECE_BYTES, UnpackedSize
 
 LARGEST = 1 << 26
-"""Bytes of a chunk or message that is one: recorders write some 1e6, and a few packed bytes may claim any number. Larger ones are
-unpacked where so many are packed that they can be meant."""
+"""Largest number of unpacked bytes of a chunk or message that is always accepted: recorders write some 1e6, but damaged data may
+state any number. Larger ones are unpacked if their packed bytes are at least 1/MOST_TIMES of that."""
 KNOWN = ("", "none", "bz2", "lz4", "zstd")
 
 
 def unpacked(data: bytes, compression: str, size: int = LARGEST) -> bytes | None:
-    """Return the plain bytes, or those of the blocks that are whole; None where the data are damaged.
+    """Return the unpacked bytes, of incomplete data those of complete blocks; None where the data are damaged.
 
-    `size` is the number of bytes that they should be: of more no more than one is unpacked, and none where so many are too many.
+    `size` is the expected number of bytes: at most one more is unpacked, and nothing (None) where `size` is implausibly large.
     Raises LogError for a compression that is not one of KNOWN.
     """
     if compression in ("", "none"):
@@ -47,9 +47,9 @@ def _decompressor(compression: str) -> Any:
 
 
 def unpack_file(packed: Path, plain: Path) -> str | None:
-    """Write what a zstd file holds, piece by piece; return `cut off` or `damaged` where it does not go to its end.
+    """Unpack a zstd file into another file, piece by piece; return `cut off` or `damaged`, or None if it is complete.
 
-    Raises LogError where it unpacks to far more than a log does.
+    Raises LogError where it unpacks to far more bytes than a log can have.
     """
     size = UnpackedSize(packed)
     decompressor = _decompressor("zstd")

@@ -1,4 +1,4 @@
-"""What the metadata.yaml of a ROS 2 bag states: how many messages were recorded by topic, and how they are serialized."""
+"""Compare a ROS 2 bag with its metadata.yaml, which states the number of messages and the serialization of each topic."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NAME = "metadata.yaml"
 
 
 def check_against_metadata(path: Path, collector: Collector) -> None:
-    """Note where a bag holds fewer messages than metadata.yaml beside it, or than its own index, counts.
+    """Note where a bag has fewer messages than the metadata.yaml in its folder, or the index of the bag, states.
 
     path: a bag's folder, or a file that is the only one of its bag.
     """
@@ -34,9 +34,9 @@ def check_against_metadata(path: Path, collector: Collector) -> None:
 
 
 def _stated_by(file: Path, only: str | None) -> dict[str, tuple[int, str]] | None:
-    """Return the messages that the file states of each topic, and their serialization; raises FieldsidError.
+    """Return the number of messages and the serialization that metadata.yaml states for each topic; raises FieldsidError.
 
-    None where it is about more files than the one that is read.
+    None where it describes more files than `only`, the one that is read.
     """
     body = read_yaml(file)
     try:
@@ -50,7 +50,7 @@ def _stated_by(file: Path, only: str | None) -> dict[str, tuple[int, str]] | Non
 
 
 def _other_serializations(about: Mapping[str, tuple[int, str]], collector: Collector) -> list[Note]:
-    """Note topics that metadata.yaml and the bag's file state different serializations of."""
+    """Return notes on topics for which metadata.yaml and the file of the bag state different serializations."""
     notes = []
     for topic, (_, stated) in about.items():
         connection = collector.connections.get(topic)
@@ -61,7 +61,7 @@ def _other_serializations(about: Mapping[str, tuple[int, str]], collector: Colle
 
 
 def _share_read(stated: Mapping[str, int], source: str, collector: Collector) -> list[Note]:
-    """Note the topics of which fewer messages were read than are stated."""
+    """Return the note on topics of which fewer messages were read than stated."""
     short = {t: (len(p.stamps), stated[t]) for t, p in collector.packets.items() if len(p.stamps) < stated.get(t, 0)}
     if not short:
         return []

@@ -1,10 +1,10 @@
-"""ROS 1 bags (format 2.0), read from front to back.
+"""Read ROS 1 bags (format 2.0) from front to back.
 
-Over rosbags: packets 3 to 4 times as fast (tests/benchmarks/bag_reading.py), and a bag that is cut off, has no index or
-damaged records gives what is left.
+Advantages over rosbags: packets are read 3 to 4 times as fast (tests/benchmarks/bag_reading.py), and the readable records are
+returned of a bag that is cut off, has no index or has damaged records.
 
-A record is a header (u32 length, then u32 length + `name=value` fields) and data (u32 length, then bytes); a chunk holds
-more records. The index behind the data repeats the connections and counts the messages; it is used where it is there.
+A record is a header (u32 length, then u32 length + `name=value` fields) and data (u32 length, then bytes); a chunk contains
+further records. The index after the data repeats the connections and counts the messages; it is used if it exists.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ NEEDED: Mapping[bytes, frozenset[bytes]] = MappingProxyType({
     CHUNK: frozenset({b"compression", b"size"}), CHUNK_INFO: frozenset({b"chunk_pos", b"count"}),
     CONNECTION: frozenset({b"conn", b"topic"}),
 })  # fmt: skip
-"""The fields without which a record is none of its kind."""
+"""The required fields of each kind of record."""
 MESSAGE_HEADER = 38
 """Bytes of the header of a message: op, conn and time, each with its length."""
 LONGEST_HEADER = 4096
-"""Bytes of a header above which it is taken for damage: its longest field is a topic's name."""
+"""Largest number of bytes of a header, whose longest field is the name of a topic; a longer one is damaged."""
 BEFORE_OP = 128
-"""Bytes of other fields that may stand before the op of a record."""
+"""Largest number of bytes of other fields before the op of a record."""
 
 _U32 = struct.Struct("<I")
 _STAMP, _ENTRY = struct.Struct("<II"), struct.Struct("<III")
@@ -60,11 +60,11 @@ def scan(path: Path, collector: Collector) -> None:
 
 
 Shape = tuple[int, int, int]
-"""Where the op, and the values of conn and time, stand in a message's header, as in the message before."""
+"""Offsets of the op, and of the values of conn and time, in the header of a message."""
 
 
 class _Records(Records):
-    """The records of a file, and of the chunks inside it."""
+    """The records of a ROS 1 bag, and of the chunks inside it."""
 
     cut_where = "inside a record"
 
@@ -73,12 +73,12 @@ class _Records(Records):
         self.shape: Shape | None = None
 
     def index(self, data: Bytes, pos: int) -> None:
-        """Take connections and counts from the index, which a whole bag ends in."""
-        if self._end_of_sound(data, pos, len(data)) is None:
+        """Read connections and counts from the index at the end of a complete bag."""
+        if self._end_of_record(data, pos, len(data)) is None:
             return
         place = _header(data, pos).get(b"index_pos", b"")
         at = int.from_bytes(place, "little") if len(place) == 8 else 0
-        while pos < at < len(data) and (stop := self._end_of_sound(data, at, len(data))) is not None:
+        while pos < at < len(data) and (stop := self._end_of_record(data, at, len(data))) is not None:
             fields = _header(data, at)
             if fields[b"op"] == CONNECTION:
                 self._connection(fields, data, at, stop)
@@ -87,7 +87,7 @@ class _Records(Records):
             at = stop
 
     def run(self, data: Bytes, pos: int, end: int, place: Place) -> None:
-        """Read the records from `pos` to `end`, and on behind damage."""
+        """Read the records from `pos` to `end`, continuing after damaged places."""
         take_u32, take_stamp, by_number = _U32.unpack_from, _STAMP.unpack_from, self.by_number
         self.last = None
         while pos < end:
@@ -110,11 +110,11 @@ class _Records(Records):
                         packets.payloads.append(bytes(data[head + MESSAGE_HEADER + 4 : stop]))
                     pos = stop
                     continue
-            pos = self._behind_other(data, pos, end, place)
+            pos = self._end_of_other(data, pos, end, place)
 
-    def _behind_other(self, data: Bytes, pos: int, end: int, place: Place) -> int:
-        """Take a record that is laid out otherwise than the message before it; return where the next one starts."""
-        stop = self._end_of_sound(data, pos, end)
+    def _end_of_other(self, data: Bytes, pos: int, end: int, place: Place) -> int:
+        """Read a record with another layout than the message before it; return the offset of the next record."""
+        stop = self._end_of_record(data, pos, end)
         if stop is None:
             return self.behind_damage(data, pos, end, place)
         fields = _header(data, pos)
@@ -133,7 +133,7 @@ class _Records(Records):
         return stop
 
     def is_cut(self, data: Bytes, pos: int, end: int) -> bool:
-        """Whether the last record is cut by the end of the file; what is left of a chunk is taken."""
+        """Whether the record at `pos` is cut off by the end of the file; the rest of a chunk that is cut off is read."""
         if pos + 4 > end:
             return True
         (size,) = _U32.unpack_from(data, pos)
@@ -141,15 +141,15 @@ class _Records(Records):
             return bool(size <= LONGEST_HEADER)
         fields = _header(data, pos)
         op = fields.get(b"op", b"")
-        whole = pos + 8 + size + _U32.unpack_from(data, pos + 4 + size)[0]
-        if op not in NEEDED or not NEEDED[op] <= fields.keys() or whole <= end:
+        full_end = pos + 8 + size + _U32.unpack_from(data, pos + 4 + size)[0]
+        if op not in NEEDED or not NEEDED[op] <= fields.keys() or full_end <= end:
             return False
         if op == CHUNK:
-            self._chunk(fields, data, pos, end, whole)
+            self._chunk(fields, data, pos, end, full_end)
         return True
 
-    def _end_of_sound(self, data: Bytes, pos: int, end: int) -> int | None:
-        """Return the end of the record at `pos`, or None where none can be."""
+    def _end_of_record(self, data: Bytes, pos: int, end: int) -> int | None:
+        """Return the end of the record at `pos`, or None where the bytes are no valid record."""
         if pos + 8 > end:
             return None
         (size,) = _U32.unpack_from(data, pos)
@@ -165,14 +165,17 @@ class _Records(Records):
         return stop
 
     def end_behind_damage(self, data: Bytes, pos: int, end: int, place: Place) -> int | None:
-        """Return the end of the record at `pos`, or None where none can be; a message has a stamp near the last one."""
-        stop = self._end_of_sound(data, pos, end)
+        """Return the end of the record at `pos`, or None where the bytes are no valid record.
+
+        The stamp of a message must be near those read before.
+        """
+        stop = self._end_of_record(data, pos, end)
         fields = {} if stop is None else _header(data, pos)
         low, high = max(self.near[0], place.low), min(self.near[1], place.high)
         return None if fields.get(b"op") == MESSAGE and not low <= _stamp(fields) <= high else stop
 
     def _message(self, fields: Fields, data: Bytes, pos: int, stop: int) -> None:
-        """Take a message, and where its fields stand if its header holds only those that each has."""
+        """Read a message; keep the offsets of its fields if its header has only the required ones."""
         (size,) = _U32.unpack_from(data, pos)
         head = bytes(data[pos + 4 : pos + 4 + size])
         if size == MESSAGE_HEADER:
@@ -198,31 +201,31 @@ class _Records(Records):
         self.by_number[number] = self.collector.connect(Connection(topic, f"{package}/msg/{short}", ROS1, definition, "msg"))
 
     def _counts(self, data: Bytes, pos: int, stop: int) -> None:
-        """Take the count of messages that a chunk holds of each connection."""
+        """Add the numbers of messages that the index states for each connection of a chunk."""
         (size,) = _U32.unpack_from(data, pos)
         for at in range(pos + 8 + size, stop - 7, _STAMP.size):
             number, count = _STAMP.unpack_from(data, at)
             if number in self.topics:
                 self.collector.expect(self.topics[number], count)
 
-    def _chunk(self, fields: Fields, data: Bytes, pos: int, stop: int, whole: int) -> None:
-        """Read the records of a chunk that ends at `stop`, in a file that is not cut at `whole`."""
+    def _chunk(self, fields: Fields, data: Bytes, pos: int, stop: int, full_end: int) -> None:
+        """Read the records of a chunk that ends at `stop`; in a file that is not cut off it would end at `full_end`."""
         body = pos + 8 + _U32.unpack_from(data, pos)[0]
         compression = fields[b"compression"].decode(errors="replace")
         size = int.from_bytes(fields[b"size"], "little")
         head = ChunkHead(size, "" if compression == "none" else compression, body, f"{size} bytes")
-        self.take_chunk(data, pos, stop, whole, head)
+        self.take_chunk(data, pos, stop, full_end, head)
 
     def stated_stamps(self, data: Bytes, pos: int) -> Iterator[tuple[int, Iterable[int]]]:
-        """Yield the stamps in ns that the index records at `pos` state, by connection."""
-        while (stop := self._end_of_sound(data, pos, len(data))) is not None and _header(data, pos)[b"op"] == INDEX:
+        """Yield each connection's number with its stamps in ns in the index records at `pos`."""
+        while (stop := self._end_of_record(data, pos, len(data))) is not None and _header(data, pos)[b"op"] == INDEX:
             start = pos + 8 + _U32.unpack_from(data, pos)[0]
             entries = _ENTRY.iter_unpack(data[start : stop - (stop - start) % _ENTRY.size])
             yield _number(_header(data, pos)), (sec * 1_000_000_000 + nanosec for sec, nanosec, _ in entries)
             pos = stop
 
     def candidates(self, data: Bytes, pos: int, end: int) -> Iterator[int]:
-        """Yield the places from which a header may start: its length fits, and an op is among its fields."""
+        """Yield the offsets at which a record may start: the length of its header fits, and one of its fields is an op."""
         for match in _OP.finditer(data, pos, end):
             for start in range(max(pos, match.start() - BEFORE_OP), match.start() - 3):
                 (size,) = _U32.unpack_from(data, start)
@@ -231,13 +234,13 @@ class _Records(Records):
 
 
 def _header(data: Bytes, pos: int) -> Fields:
-    """Return the fields of the header of the record at `pos`; none where they do not fill it."""
+    """Return the fields of the header of the record at `pos`; empty where they do not fill the header."""
     (size,) = _U32.unpack_from(data, pos)
     return _fields(data, pos + 4, pos + 4 + size) or {}
 
 
 def _fields(data: Bytes, pos: int, end: int) -> Fields | None:
-    """Return the values by name that stand from `pos` to `end`, or None where their lengths do not fit that."""
+    """Return the values by name between `pos` and `end`, or None where their lengths do not fit these bounds."""
     found: dict[bytes, bytes] = {}
     while pos + 4 <= end:
         (length,) = _U32.unpack_from(data, pos)
