@@ -74,10 +74,10 @@ def one_clock(
     """Return the time (n,), the signals (n,) resampled to it, and a note that says which clock was chosen."""
     base = base_of(tracks, clock)
     time = tracks[base].time
-    signals = {s: held(t, time) if s in COMMANDS else straight(t, time, gap_factor) for s, t in tracks.items()}
+    signals = {s: zero_order_hold(t, time) if s in COMMANDS else interpolated(t, time, gap_factor) for s, t in tracks.items()}
     for signal in (s for s in ANGLES_AND_RATES if s in tracks and not np.array_equal(tracks[s].time, time)):
         once = tracks[signal].period > SLOWER * tracks[base].period
-        signals[signal] = np.where(np.isfinite(signals[signal]), moved(tracks[signal], time, once=once), np.nan)
+        signals[signal] = np.where(np.isfinite(signals[signal]), shifted(tracks[signal], time, once=once), np.nan)
     for fin, names in STEP_LINES.items():
         line = line_over_steps(tracks[fin], time, gap_factor, is_held=fin in COMMANDS) if fin in tracks else None
         signals |= {} if line is None else dict(zip(names, line, strict=True))
@@ -100,7 +100,7 @@ def summed(tracks: Mapping[str, Track], gap_factor: float) -> dict[str, Track]:
         entries = [t for s, t in tracks.items() if PART in s and signal_of(s) == signal]
         time = np.unique(np.concatenate([t.time for t in entries]))
         seen = np.concatenate([t.time[np.isfinite(t.values)] for t in entries])
-        terms = [held(t, time) if signal in COMMANDS else straight(t, time, gap_factor) for t in entries]
+        terms = [zero_order_hold(t, time) if signal in COMMANDS else interpolated(t, time, gap_factor) for t in entries]
         values = np.where(np.isin(time, seen), np.sum(terms, axis=0), np.nan)
         added_up[signal] = Track(time, values, " + ".join(t.label for t in entries))
     return added_up
@@ -118,9 +118,9 @@ def line_over_steps(track: Track, time: FloatArray, gap_factor: float, *, is_hel
         return None
     knots = np.union1d(time, inside)
     if is_held:
-        start = end = held(track, knots[:-1])
+        start = end = zero_order_hold(track, knots[:-1])
     else:
-        values = straight(track, knots, gap_factor)
+        values = interpolated(track, knots, gap_factor)
         start, end = values[:-1], values[1:]
     step, length = np.searchsorted(time, knots[:-1], side="right") - 1, np.diff(knots)
     full_length = np.diff(time)
@@ -131,7 +131,7 @@ def line_over_steps(track: Track, time: FloatArray, gap_factor: float, *, is_hel
     return np.pad(np.stack([mean - half, mean + half]), ((0, 0), (0, 1)), constant_values=np.nan)
 
 
-def held(track: Track, time: FloatArray) -> FloatArray:
+def zero_order_hold(track: Track, time: FloatArray) -> FloatArray:
     """Return a track held constant between its samples: the last value (n,) at or before each time, NaN before the first."""
     seen = np.isfinite(track.values)
     index = np.searchsorted(track.time[seen], time, side="right") - 1
@@ -139,7 +139,7 @@ def held(track: Track, time: FloatArray) -> FloatArray:
     return np.where(index < 0, np.nan, values[np.maximum(index, 0)]) if values.size else np.full(time.size, np.nan)
 
 
-def moved(track: Track, time: FloatArray, *, once: bool) -> FloatArray:
+def shifted(track: Track, time: FloatArray, *, once: bool) -> FloatArray:
     """Return the sample of a track nearest to each time (n,), shifted to that time along the local slope.
 
     With `once` each sample is used only at the time nearest to it, and all other times are NaN.
@@ -159,7 +159,7 @@ def _nearest(stamps: FloatArray, times: FloatArray) -> npt.NDArray[np.intp]:
     return np.where(times - stamps[above - 1] <= stamps[above] - times, above - 1, above)
 
 
-def straight(track: Track, time: FloatArray, gap_factor: float) -> FloatArray:
+def interpolated(track: Track, time: FloatArray, gap_factor: float) -> FloatArray:
     """Return a track (n,) interpolated linearly at some times, NaN in gaps and outside; samples at these very times are kept."""
     seen = np.isfinite(track.values)
     stamps, values = track.time[seen], track.values[seen]

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.logs.convert.clock import GAP_FACTOR, Track, straight
+from fieldsid.logs.convert.clock import GAP_FACTOR, Track, interpolated
 from fieldsid.logs.convert.frames import unwrapped
 from fieldsid.logs.few_of import few_of
 from fieldsid.logs.run import Note
@@ -57,7 +57,7 @@ def unwrapped_over(heading: Track, rate: Track | None = None, gap_factor: float 
     values = unwrapped(np.where(replaced, np.nan, heading.values))
     if not replaced.any():
         return Track(heading.time, values, heading.label), []
-    values[replaced] = straight(Track(heading.time, values), heading.time[replaced], gap_factor)
+    values[replaced] = interpolated(Track(heading.time, values), heading.time[replaced], gap_factor)
     return Track(heading.time, values, heading.label), [_note(heading.time[replaced], int(np.isnan(values[replaced]).sum()))]
 
 
@@ -128,7 +128,7 @@ class _Path:
 
 
 def _path(time: FloatArray, values: FloatArray, rate: Track | None) -> _Path | None:
-    """Return what a crossing is judged by; None where no step is too fast, or too many are, or noise hides them."""
+    """Return a heading with its steps divided into motion and jumps; None without a jump, or if most steps are jumps (noise)."""
     steps, dt = np.diff(values), np.diff(time)
     turned = within_half_turn(steps)
     noise = noise_of_steps(np.where(np.abs(turned) > FASTEST_RAD_S * dt, np.nan, turned))

@@ -82,12 +82,12 @@ def turned_from_counts(
     if scale is not None:
         return (values - middle) * scale, []
     travel = servo.travel if servo is not None else max(float(np.nanmax(np.abs(values - middle), initial=0.0)), 1.0)
-    guess = FULL_RAD / travel
+    worth = FULL_RAD / travel
     message = (
-        f"{signal} is in {_in_words(unit, middle)}, and what one is worth is not known: taken as {math.degrees(guess):.3g} deg; "
+        f"{signal} is in {_in_words(unit, middle)}, and what one is worth is not known: taken as {math.degrees(worth):.3g} deg; "
         "the fin's authority is per count then: set `scale`, in rad a count, from the servo's range"
     )
-    return (values - middle) * guess, [Note(COUNTS, message, {"signal": signal, "centre": middle, "scale": guess})]
+    return (values - middle) * worth, [Note(COUNTS, message, {"signal": signal, "centre": middle, "scale": worth})]
 
 
 def _in_words(unit: str, middle: float) -> str:

@@ -37,7 +37,7 @@ def _quoted(line: str, separator: str) -> list[str]:
     """Return the parts of a line with quotes, inside which the separator does not count."""
     try:
         return next(csv.reader([line], delimiter=separator, skipinitialspace=True), [""])
-    except csv.Error:  # a quote without its end, or too much between two
+    except csv.Error:  # a quote without an end, or too long a text between two quotes
         return line.split(separator)
 
 

@@ -214,7 +214,7 @@ def _even_clocks(columns: Columns) -> Iterator[Clock]:
         if clock is None:
             continue
         steps = np.diff(clock.time[np.isfinite(clock.time)])
-        # seconds since 1970 are a time however long the logger paused
+        # seconds since 1970 are a time even if the steps are uneven, because the logger paused
         is_epoch = cells.dtype.kind in "iuf" and bool(((cells > YEARS_S[0]) & (cells < YEARS_S[1])).all())
         if is_epoch or float(np.std(steps)) < REGULAR * float(np.mean(steps)):
             yield replace(clock, notes=_note_of_guess(name, clock.source.unit)) if name else clock

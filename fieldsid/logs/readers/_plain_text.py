@@ -101,10 +101,10 @@ class _Slice(io.RawIOBase):
 
 
 @contextmanager
-def plain_text(path: Path, asked: str | None = None, limit: int | None = None) -> Iterator[PlainText]:
+def plain_text(path: Path, stated: str | None = None, limit: int | None = None) -> Iterator[PlainText]:
     """Yield the text of a file; with `limit` only about so many bytes of a packed or transcoded one.
 
-    The encoding is `asked`, else that of the byte order mark, else UTF-8, else Windows-1252. Raises LogError when nothing can be
+    The encoding is `stated`, else that of the byte order mark, else UTF-8, else Windows-1252. Raises LogError when nothing can be
     unzipped, and when the bytes are no text.
     """
     with ExitStack() as stack:
@@ -116,14 +116,14 @@ def plain_text(path: Path, asked: str | None = None, limit: int | None = None) -
             is_cut = _unzip(packed, stream, path, limit)
         stream.seek(0)
         head = stream.read(HEAD)
-        encoding = asked or _encoding(head)
+        encoding = stated or _encoding(head)
         try:
             if _needs_transcoding(encoding, head):
                 other, stream = stream, stack.enter_context(TemporaryFile())
-                _transcode(other, stream, encoding, "strict" if asked else "replace", limit)
+                _transcode(other, stream, encoding, "strict" if stated else "replace", limit)
                 encoding = "utf-8"
-            elif asked:
-                deque(_decoded(stream, asked, "strict"), maxlen=0)  # raises where the bytes do not have this encoding
+            elif stated:
+                deque(_decoded(stream, stated, "strict"), maxlen=0)  # raises where the bytes do not have this encoding
         except (UnicodeDecodeError, LookupError) as error:
             hint = "leave `encoding` out of the mapping: it is found out"
             raise LogError(f"`{path}` is not text in {encoding}", found=str(error), hint=hint) from error

@@ -80,9 +80,8 @@ def _names(line: str, separator: str, width: int) -> tuple[str, ...]:
     if separator == "whitespace":
         names = [n.strip(",;|") for n in names]
     if len(names) != width and separator == "whitespace":
-        names = [
-            n.strip() for n in re.split(r"\s{2,}|\t", bare.strip())
-        ]  # names of several words, separated by at least two blanks
+        # names of several words are separated by at least two blanks
+        names = [n.strip() for n in re.split(r"\s{2,}|\t", bare.strip())]
     if len(names) != width:
         names = _split_by_other(bare, separator, width)
     if len(names) != width or any(is_number_or_date(n) for n in names) or not any(names):
@@ -128,7 +127,10 @@ class Form:
 
 
 def form_of(text: str, stated: TableForm, path: Path) -> Form:
-    """Return the form of a table, with what `stated` states taken as given; raises LogError when there is no row of numbers."""
+    """Return the form of a table, found as far as the mapping leaves it open; raises LogError when there is no row of numbers.
+
+    `stated` is the form by the mapping.
+    """
     lines = text.split("\n", LOOKED_AT + AGREEING)[: LOOKED_AT + AGREEING]
     lines = [line.rstrip("\r") for line in lines]
     first = stated.skip or 0

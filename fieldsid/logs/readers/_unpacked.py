@@ -17,7 +17,7 @@ from fieldsid.errors import LogError
 GZIP = b"\x1f\x8b"
 PIECE_BYTES = 1 << 20
 _SMALL_PIECE = 512
-"""Bytes of a gzip stream that are unpacked at once; at most so many before a damaged place are lost."""
+"""Bytes of a gzip stream that are unpacked at once; at most so many before a damaged place cannot be read."""
 SMALL = 128 << 20
 """Unpacked bytes that are always accepted, whatever the ratio to the packed ones."""
 MOST_TIMES = 300

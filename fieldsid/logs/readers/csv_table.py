@@ -50,7 +50,7 @@ class GrowingColumn:
         self._cells[self._count : end] = block
         self._count = end
 
-    def whole(self) -> npt.NDArray[Any]:
+    def finished(self) -> npt.NDArray[Any]:
         """Return all cells (n,), read-only; no block may be added after this."""
         self._cells.resize(self._count, refcheck=False)
         self._cells.setflags(write=False)
@@ -112,23 +112,23 @@ def _head_of(path: Path, text: PlainText) -> str:
 
 
 @contextmanager
-def opened(path: Path, asked: TableForm, options: ReadOptions) -> Iterator[_Table]:
+def opened(path: Path, stated: TableForm, options: ReadOptions) -> Iterator[_Table]:
     """Yield the table of a file, its text and the form in which it is written."""
-    with plain_text(path, asked.encoding) as text:
-        yield _Table(path, text, asked, options)
+    with plain_text(path, stated.encoding) as text:
+        yield _Table(path, text, stated, options)
 
 
 class _Table:
     """The text of one file, with its form and its cells."""
 
-    def __init__(self, path: Path, text: PlainText, asked: TableForm, options: ReadOptions) -> None:
+    def __init__(self, path: Path, text: PlainText, stated: TableForm, options: ReadOptions) -> None:
         self.path = path
         self.text = text
         self.options = options
         self.notes: list[Note] = []
         if text.is_blank():
             raise LogError(f"`{path}` is empty", found="no text inside", hint=COPY_AGAIN)
-        self.form: Form = form_of(_head_of(path, text), asked, path)
+        self.form: Form = form_of(_head_of(path, text), stated, path)
         self.begin = text.offset_of_line(self.form.start)
         self.end = text.size
         if text.is_cut:
@@ -167,15 +167,15 @@ class _Table:
 
     def _cells(self, wanted: Sequence[int]) -> dict[int, npt.NDArray[Any]]:
         """Return the cells (n,) of the wanted columns; lines of words that do not fit the columns are left out."""
-        with TemporaryFile() as blanked, TemporaryFile() as own, TemporaryFile() as plain:
+        with TemporaryFile() as without_errors, TemporaryFile() as without_nmea, TemporaryFile() as without_words:
             if self.text.holds(ERRORS, b"#", self.begin, self.end):
-                self._without_errors(blanked)
+                self._without_errors(without_errors)
             if not self.form.is_sentences and self.text.holds(SENTENCE, b"$", self.begin, self.end):
-                self._without_sentences(own)
+                self._without_sentences(without_nmea)
             try:
                 return self._parsed(wanted)
             except LogError:
-                if not self._without_words(plain):
+                if not self._without_words(without_words):
                     raise
                 return self._parsed(wanted)
 
@@ -249,7 +249,7 @@ class _Table:
                 raise self._misfit(error) from error
         if self.options.salvage:
             self._count_bad_rows(count)
-        return {i: self._with_points(column.whole()) for i, column in grown.items()}
+        return {i: self._with_points(column.finished()) for i, column in grown.items()}
 
     def _with_points(self, cells: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return cells with decimal points: pandas does not read decimal commas in a column that contains words."""
@@ -282,11 +282,15 @@ class _Table:
             hint=f"mend the line, or leave such rows out: {self.options.with_option('--salvage')}",
         )
 
-    def _count_bad_rows(self, kept: int) -> None:
+    def _count_bad_rows(self, parsed: int) -> None:
+        """Note how many rows were left out because they do not fit the columns.
+
+        `parsed` is the number of rows that pandas returned.
+        """
         with self.text.between(self.begin, self.end) as rows:
             # a closing quote alone on a line ends a cell of the row before, and is no row
             lines = (line.strip(b"\"' \t\r\n") for line in rows)
-            left_out = sum(1 for line in lines if line and not line.startswith(b"#")) - kept
+            left_out = sum(1 for line in lines if line and not line.startswith(b"#")) - parsed
         if left_out > 0:
             self.notes.append(
                 Note("bad_rows", f"rows left out because they have too many cells: {left_out}", {"count": left_out})

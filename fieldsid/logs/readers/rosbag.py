@@ -1,4 +1,4 @@
-"""ROS 1 and ROS 2 bags: .bag, .mcap and .db3, as a file or as the folder that ROS 2 writes.
+"""Read ROS 1 and ROS 2 bags: .bag, .mcap and .db3, as a file or as the folder that ROS 2 writes.
 
 Only the mapped topics are decoded, and of them only the mapped fields: see bags/message_layout.py.
 """

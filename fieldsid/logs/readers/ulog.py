@@ -46,7 +46,7 @@ def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
     try:
         with path.open("rb") as stream, silenced():
             log = pyulog.ULog(stream)
-    except Exception as error:  # pyulog has no error of its own for what it cannot parse
+    except Exception as error:  # pyulog has no special class of errors for what it cannot parse
         raise unreadable(path, "a damaged ULog file", error) from error
     topics = {}
     for part in log.data_list:

@@ -66,12 +66,12 @@ def test_a_growing_column_keeps_numbers_until_words_come():
     column = GrowingColumn()
     for block in (np.arange(3), np.arange(2) + 0.5, np.array([True])):
         column.add(block, 4.0)
-    assert column.whole().tolist() == [0.0, 1.0, 2.0, 0.5, 1.5, 1.0]
-    assert not column.whole().flags.writeable
+    assert column.finished().tolist() == [0.0, 1.0, 2.0, 0.5, 1.5, 1.0]
+    assert not column.finished().flags.writeable
     words = GrowingColumn()
     words.add(np.arange(2), 2.0)
     words.add(np.array(["x", None], dtype=object), 4.0)
-    assert words.whole().tolist() == [0, 1, "x", None]
+    assert words.finished().tolist() == [0, 1, "x", None]
 
 
 @pytest.mark.parametrize("kind", ["csv", "csv.gz", *KINDS])

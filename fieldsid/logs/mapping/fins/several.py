@@ -18,7 +18,7 @@ import numpy as np
 
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.channels import AXES
-from fieldsid.logs.convert.clock import Track, held
+from fieldsid.logs.convert.clock import Track, zero_order_hold
 from fieldsid.logs.convert.servo_counts import COUNTS, SERVOS, Servo
 from fieldsid.logs.convert.units import pick_unit
 from fieldsid.logs.doctor.together import width_of
@@ -199,7 +199,7 @@ def _read(log: Log, body: Mapping[str, Any], family: Family, run: Run) -> list[_
 
 def _on_clock(series: Series, time: FloatArray) -> FloatArray:
     good = np.isfinite(series.time) & np.isfinite(series.values)
-    return held(Track(series.time[good], series.values[good]), time)
+    return zero_order_hold(Track(series.time[good], series.values[good]), time)
 
 
 def _conversion(names: list[str], unit: str | None, values: FloatArray) -> Reading:

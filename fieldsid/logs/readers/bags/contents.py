@@ -88,7 +88,7 @@ class Contents:
         """Return the inventory of a bag that was read; raises LogError for a bag of which nothing can be decoded."""
         check_not_empty(self.path, collector)
         errors = [found.error for _, found in sorted(self.topics.items()) if found.error is not None]
-        if errors and len(errors) == len(self.topics):  # such a bag is no log yet
+        if errors and len(errors) == len(self.topics):  # without a topic that can be decoded the bag is no usable log
             raise errors[0]
         names = sorted(t for t in collector.connections if t in self.topics)
         channels = [self._channel(collector.connections[t], collector.packets[t]) for t in names]

@@ -66,7 +66,7 @@ Settle = Callable[[Connection, TopicPackets], None]
 
 
 def keep_all(connection: Connection, packets: TopicPackets) -> None:
-    """Keep all payloads until the whole bag is read."""
+    """Keep all payloads until the bag is read to its end."""
 
 
 def keep_first(connection: Connection, packets: TopicPackets) -> None:
@@ -171,7 +171,7 @@ class Collector:
         self.expected[topic] = self.expected.get(topic, 0) + count
 
     def note_further_places(self) -> None:
-        """Note the number of damaged places that have no note of their own."""
+        """Note the number of damaged places without a separate note."""
         if self.damages > MOST_PLACES_NOTED:
             more = self.damages - MOST_PLACES_NOTED
             self.notes.append(Note("damaged", f"{more} more places are damaged and were left out", {"places": more}))
