@@ -1,6 +1,6 @@
 """Read ROS 2 SQLite files (.db3), with their rows in the order in which they were written.
 
-Advantages over rosbags: packets are read 2 to 3 times as fast (tests/benchmarks/bag_reading.py; SQLite reads the bytes in both,
+Over rosbags: packets read 2 to 3 times as fast (tests/benchmarks/bag_reading.py; SQLite reads the bytes in both,
 but rosbags also counts and sorts the rows), and the readable rows are returned of a file that is cut off, has damaged pages, or
 has a write-ahead log left by a crash.
 """

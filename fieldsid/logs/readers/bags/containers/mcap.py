@@ -1,6 +1,6 @@
 """Read MCAP files (mcap.dev, specification 0) from front to back.
 
-Advantages over rosbags: packets are read 3 times as fast (tests/benchmarks/bag_reading.py), the readable records are returned of
+Over rosbags: packets read 3 times as fast (tests/benchmarks/bag_reading.py), the readable records are returned of
 a file that is cut off, has no footer or has damaged records, and files of other recorders than that of ROS 2 can be read.
 
 A record is an opcode (u8), a length (u64) and that many bytes; a chunk contains further records. The summary after the data

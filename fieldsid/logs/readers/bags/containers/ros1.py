@@ -1,6 +1,6 @@
 """Read ROS 1 bags (format 2.0) from front to back.
 
-Advantages over rosbags: packets are read 3 to 4 times as fast (tests/benchmarks/bag_reading.py), and the readable records are
+Over rosbags: packets read 3 to 4 times as fast (tests/benchmarks/bag_reading.py), and the readable records are
 returned of a bag that is cut off, has no index or has damaged records.
 
 A record is a header (u32 length, then u32 length + `name=value` fields) and data (u32 length, then bytes); a chunk contains

@@ -1,6 +1,6 @@
 """Find where the fields of a serialized message are, and decode many messages at once.
 
-Advantages over rosbags: selected numbers are decoded 10 times as fast (tests/benchmarks/bag_reading.py), and a damaged message
+Over rosbags: selected numbers 10 times as fast (tests/benchmarks/bag_reading.py), and a damaged message
 among others is left out. All types and encodings that rosbags decodes are decoded here as well.
 
 A message is walked through once; the bytes that determine its layout (lengths of strings and sequences) are kept as guards. All
