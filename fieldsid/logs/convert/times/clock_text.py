@@ -52,11 +52,12 @@ def clock_of_text(cells: npt.NDArray[Any], form: str | None = None) -> Clock | N
     day, first, second, third = (n.astype("float64").to_numpy(na_value=np.nan) for n in numbers)
     if np.isfinite(third).mean() <= MOSTLY:
         return None
-    if form == "hh:mm":
-        return Clock(HOUR_S * second + 60.0 * third, DAY_S)
-    if not np.isfinite(first).any():
-        return Clock(60.0 * second + third, HOUR_S)
     half_day = parts[4].str.lower().map({"a": 0.0, "p": 12.0}).to_numpy(dtype=np.float64)
+    has_hours = bool(np.isfinite(first).any())
+    if form == "hh:mm" or (not has_hours and np.isfinite(half_day).any()):
+        first, second, third = second, third, np.zeros_like(third)
+    elif not has_hours:
+        return Clock(60.0 * second + third, HOUR_S)
     hours = np.where(np.isfinite(half_day), first % 12.0 + np.nan_to_num(half_day), first)
     counts_days = bool(np.isfinite(day).any())
     return Clock(DAY_S * np.nan_to_num(day) + HOUR_S * hours + 60.0 * second + third, np.inf if counts_days else DAY_S)
