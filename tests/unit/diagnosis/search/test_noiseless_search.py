@@ -10,7 +10,7 @@ from truth.noise import Clock
 from truth.physics import Physics
 
 from fieldsid.diagnosis.evidence.likelihood_fit import fit_output_error
-from fieldsid.diagnosis.search.noiseless_search import Seen, _backward_eliminate, _evaluate, noiseless_search
+from fieldsid.diagnosis.search.noiseless_search import Explored, _backward_eliminate, _evaluate, noiseless_search
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import MAX_FREE_RUN_ERROR_RATIO
 from fieldsid.diagnosis.verdict import added_effects
@@ -54,7 +54,7 @@ def test_an_effect_that_the_others_have_made_idle_is_left_out(work):
     whole = noiseless_search(work, lambda _h: True).output_error_fit
     problem, x = with_effect(whole.problem, whole.x, pick_effect("gyro_bias"), {})
     more = _evaluate(work, fit_output_error(problem, x, whole.weights))
-    best, less = _backward_eliminate(work, more, Seen())
+    best, less = _backward_eliminate(work, more, Explored())
     assert set(best.output_error_fit.names) == {"servo_lag", "quadratic_damping"}
     assert len(less) == 2
     assert all(best.error_ratio <= MAX_FREE_RUN_ERROR_RATIO * f.error_ratio for f in less)
