@@ -77,16 +77,14 @@ def read_groups(
 
 
 def say_how_read(runs: Sequence[Run], *, several: bool, also: Sequence[str] = ()) -> None:
-    """Print on stderr how logs without a mapping were read; `also` are the codes of other notes on that."""
-    from fieldsid.cli.console import say
+    """Print on stderr how logs without a mapping were read, each sentence once; `also` are the codes of other notes on that."""
+    from fieldsid.cli.console import one_of_each_kind, say
     from fieldsid.logs.run import READ_AS, READ_WITH
 
-    for run in runs:
-        if any(note.code == READ_WITH for note in run.notes):
-            continue
-        for note in run.notes:
-            if note.code in (READ_AS, *also):
-                say(f"{run.name}: {note.message}" if several else note.message)
+    unmapped = [run for run in runs if all(note.code != READ_WITH for note in run.notes)]
+    found = ((n.message, run.name if several else "", n) for run in unmapped for n in run.notes if n.code in (READ_AS, *also))
+    for note in one_of_each_kind(found):
+        say(note.message)
 
 
 def _apart(runs: Sequence[Run], used: Sequence[Path], paths: Sequence[Path]) -> list[Run]:

@@ -125,7 +125,8 @@ def map_for(
     is_open = mapping is None and not channels and (chosen is None or chosen.origin is None)
     mapped_signals = frozenset[str]() if complete is None else frozenset(complete.sources)
     may_join = is_open and (recognise or is_enough(mapped_signals))
-    if complete is None or (may_join and not (is_enough(mapped_signals) and mapped_signals >= WANTED)):
+    has_all = is_enough(mapped_signals) and (mapped_signals >= WANTED or _uses_every_column(complete, path, reader))
+    if complete is None or (may_join and not has_all):
         from fieldsid.logs.mapping.certain import certain_of
         from fieldsid.logs.mapping.propose import propose
 
@@ -177,9 +178,18 @@ def to_map(log: Path, joined: Sequence[Path] = ()) -> str:
 
 def _is_in_log(mapping: ChannelMap, found: Inventory) -> bool:
     """Return whether a log contains every column and topic that a mapping names."""
+    return _places_of(mapping) <= {c.name for c in found.channels}
+
+
+def _uses_every_column(mapping: ChannelMap | None, path: Path, reader: Reader) -> bool:
+    """Whether a mapping names every column of a table, so that no column is left to be recognised."""
+    return mapping is not None and reader.names_of is not None and set(reader.names_of(path)) <= _places_of(mapping)
+
+
+def _places_of(mapping: ChannelMap) -> set[str]:
+    """Return the columns and topics that a mapping names."""
     sources = [*mapping.sources.values(), *([] if mapping.time is None else [mapping.time])]
-    named = {str(place) for s in sources for place in (s.places if s.topic is None else (s.topic,))}
-    return named <= {c.name for c in found.channels}
+    return {str(place) for s in sources for place in (s.places if s.topic is None else (s.topic,))}
 
 
 def _as_channel_map(mapping: ChannelMap | Path) -> ChannelMap:

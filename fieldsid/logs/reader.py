@@ -172,7 +172,11 @@ def never_canonical(path: Path, options: ReadOptions) -> ChannelMap | None:
 
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """One kind of log. `own_map` returns the mapping of a file whose names are canonical, or None where they are not."""
+    """One kind of log.
+
+    `own_map` returns the mapping of a file whose names are canonical, or None where they are not. `names_of` returns the names of
+    the columns of a table from the head of the file; it is None for logs of topics.
+    """
 
     name: str
     says: str
@@ -181,6 +185,7 @@ class Reader:
     inventory: Callable[[Path, ReadOptions, TableForm], Inventory]
     read: Callable[[Path, ChannelMap, ReadOptions], RawLog]
     own_map: Callable[[Path, ReadOptions], ChannelMap | None] = never_canonical
+    names_of: Callable[[Path], tuple[str, ...]] | None = None
 
 
 def reader_of(path: Path, joined: Sequence[Path] = ()) -> Reader:

@@ -32,11 +32,12 @@ from fieldsid.records.schedule import SCHEDULE
 
 
 class Kind(NamedTuple):
-    """The shape of one kind of record, its name in an error, and how it is made again."""
+    """The shape of one kind of record, its name in an error, how it is made again, and the command that makes one."""
 
     shape: Shape
     name: str
     again: str
+    made_by: str = ""
 
 
 DIAGNOSIS: Shape = {
@@ -95,12 +96,14 @@ RUN_HEAD: Shape = {
 ANY = Kind(HEAD, "record", "make it again")
 """A record of a kind of which only the head is read back."""
 KINDS = {
-    "fieldsid/model": Kind(MODEL, "model file", "identify again, with `--force`"),
-    "fieldsid/fit": Kind(FIT, "fit file", "make it again: `sysid fit MODEL...`"),
-    "fieldsid/schedule": Kind(SCHEDULE, "schedule", "design it again, with `--force`"),
+    "fieldsid/model": Kind(MODEL, "model file", "identify again, with `--force`", "sysid identify RUN... -o models/"),
+    "fieldsid/fit": Kind(FIT, "fit file", "make it again: `sysid fit MODEL...`", "sysid fit MODEL... -o laws.yaml"),
+    "fieldsid/schedule": Kind(
+        SCHEDULE, "schedule", "design it again, with `--force`", "sysid schedule design MODEL... -o gains.yaml"
+    ),
     "fieldsid/diagnosis": Kind(DIAGNOSIS, "diagnosis", "diagnose again, with `-o`"),
     "fieldsid/turn-radius": Kind(TURN_RADIUS, "prediction of turns", "predict it again, with `--force`"),
     "fieldsid/run": Kind(RUN_HEAD, "run", "import the log again, with `--force`"),
-    "fieldsid/plan": Kind(PLAN, "plan", "plan again, with `--force`"),
+    "fieldsid/plan": Kind(PLAN, "plan", "plan again, with `--force`", "sysid plan --axis yaw -o plan.yaml"),
     "fieldsid/prior": Kind(HEAD, "prior", "correct it; `sysid init NAME` writes an example"),
 }

@@ -15,7 +15,6 @@ from copy import deepcopy
 from functools import lru_cache
 from pathlib import Path
 from shlex import quote
-from types import MappingProxyType
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -100,17 +99,6 @@ def yaml_mapping(text: str, path: Path) -> dict[str, Any]:
     return body
 
 
-MADE_BY: Mapping[str, str] = MappingProxyType(
-    {
-        "fieldsid/model": "`sysid identify RUN... -o models/`",
-        "fieldsid/fit": "`sysid fit MODEL... -o laws.yaml`",
-        "fieldsid/schedule": "`sysid schedule design MODEL... -o gains.yaml`",
-        "fieldsid/plan": "`sysid plan --axis yaw -o plan.yaml`",
-    }
-)
-"""The command that makes a kind of record."""
-
-
 def load_record(path: Path, kind: str) -> dict[str, Any]:
     """Read a record back and check that it is one of `kind` (`fieldsid/model` for `fieldsid/model/1`).
 
@@ -119,10 +107,11 @@ def load_record(path: Path, kind: str) -> dict[str, Any]:
     body = read_yaml(path)
     schema = body.get("schema")
     if not isinstance(schema, str) or not schema.startswith(f"{kind}/"):
+        made_by = KINDS.get(kind, ANY).made_by
         raise ArtifactError(
             f"`{path}` is not a {kind} file",
             found=f"schema: {shortened(schema)}",
-            hint=f"{MADE_BY[kind]} makes one" if kind in MADE_BY else f"give a file with a line `schema: {kind}/1`",
+            hint=f"`{made_by}` makes one" if made_by else f"give a file with a line `schema: {kind}/1`",
         )
     if schema != f"{kind}/1":
         number = schema.rpartition("/")[2]
@@ -135,7 +124,7 @@ def load_record(path: Path, kind: str) -> dict[str, Any]:
 
 def check_kind(body: Mapping[str, Any], kind: str, path: Path) -> None:
     """Raise ArtifactError where a record does not have the shape of its kind, with the key and what is wrong."""
-    shape, name, again = KINDS.get(kind, ANY)
+    shape, name, again, _ = KINDS.get(kind, ANY)
     try:
         check(body, shape)
     except ShapeError as error:

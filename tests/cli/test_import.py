@@ -342,3 +342,14 @@ def test_import_reads_what_identify_reads_and_says_what_it_leaves_out(run_cli, t
     run = load_run(tmp_path / "run.parquet")
     assert run["surge_m_s"] == pytest.approx(columns[4] * 1852.0 / 3600.0, abs=1e-5)
     assert run.signals.keys() == load_run(log, recognise=True).signals.keys()
+
+
+def test_what_several_logs_leave_out_alike_is_said_once(run_cli, tmp_path):
+    header = "time_s,yaw_rad,yaw_rate_rad_s,rudder_rad,battery_temp"
+    for i in range(3):
+        columns = [TIME, SIGNALS["yaw_rad"] + 0.001 * i, SIGNALS["yaw_rate_rad_s"], SIGNALS["rudder_rad"], TIME]
+        np.savetxt(tmp_path / f"a{i}.csv", np.column_stack(columns), delimiter=",", header=header, comments="", fmt="%.6g")
+    answer = run_cli("import", *sorted(tmp_path.glob("a*.csv")), "-o", tmp_path / "runs")
+    assert answer.code == 0
+    assert answer.err.count("columns that are not used: battery_temp") == 1
+    assert "a0: columns that are not used: battery_temp (and 2 more like it)" in answer.err

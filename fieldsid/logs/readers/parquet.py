@@ -186,4 +186,5 @@ READER = Reader(
     inventory=inventory,
     read=read,
     own_map=own_map,
+    names_of=names_of,
 )

@@ -96,9 +96,9 @@ def _refined(
 
     best = start[:free]
     for _ in range(4):
-        scaled, tolerance = HUBER * max(_robust_sd(distances(best)), 1e-9), 1e-14
+        spread = max(_robust_sd(distances(best)), 1e-9)
         fit = least_squares(
-            distances, best, loss="huber", f_scale=scaled, x_scale="jac", xtol=tolerance, ftol=tolerance, gtol=tolerance
+            distances, best, loss="huber", f_scale=HUBER * spread, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14
         )
         best = np.asarray(fit.x)
     residual = distances(best)
