@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from fieldsid.effects._user_folder import add_user_effects
-from fieldsid.errors import ArtifactError, FieldsidError, UsageError
+from fieldsid.errors import ArtifactError, UsageError
 from fieldsid.models.allocation import PlaneFins
 from fieldsid.models.axis import Axis
 from fieldsid.records.named_inputs import where_now
@@ -96,54 +96,34 @@ def read_again(log: NamedLog, mapping: ChannelMap | None = None) -> Run:
     return load_run(str(log.now), log.mapping if mapping is None else mapping, recognise=True)
 
 
-def run_files(source: ParameterSource, say: Callable[[str], None]) -> list[NamedLog]:
-    """Return the logs that the model files of a source name and that still exist; say: called where some are missing.
+def runs_of_models(
+    source: ParameterSource, say: Callable[[str], None], mapping: ChannelMap | None = None, *, hint: str = ""
+) -> list[Run]:
+    """Return the runs to which the models of a yaw source were fitted, which show the speed lost in turns.
 
-    None for models without effects: their turning radius follows from a formula, without runs.
+    Each is read with the mapping, else with its former one. Those that cannot be read again are left out, and say is called with
+    their names and the hint. Empty for pitch, and for a source that is no model.
     """
-    from fieldsid.plant.parameter_source import logs_of
-
-    if not any(m.effects for m in source.models):
-        return []
-    named = logs_of(source.paths)
-    present = [log for log in named if log.now is not None]
-    if len(present) < len(named):
-        say("some runs of the models are not where they were: name them with `--runs` for the loss of speed")
-    return present
-
-
-def readable_runs(source: ParameterSource, say: Callable[[str], None], mapping: ChannelMap | None = None) -> list[Run]:
-    """Return the runs that the model files of a source name and that can still be read; say names the others.
-
-    They are read by a mapping, else each by that of then.
-    """
-    from fieldsid.logs.several.sifting import attempt
-
-    outcomes = {str(log.now): attempt(lambda named: read_again(named, mapping), log) for log in run_files(source, say)}
-    if unreadable := [f"`{path}`" for path, outcome in outcomes.items() if isinstance(outcome, FieldsidError)]:
-        names = ", ".join(unreadable)
-        say(f"runs of the models that cannot be read again: {names}: name them with `--runs`, the turn is fitted to all")
-    return [outcome for outcome in outcomes.values() if not isinstance(outcome, FieldsidError)]
-
-
-def runs_of_models(source: ParameterSource, say: Callable[[str], None]) -> list[Run]:
-    """Return the runs that the models of a yaw source were fitted to, where they still exist: they show the speed lost in turns.
-
-    say: called where some cannot be read. Empty for pitch, and for a source that is no model.
-    """
+    from fieldsid.logs.few_of import few_of
+    from fieldsid.logs.run import Run
     from fieldsid.logs.several.sifting import attempt
     from fieldsid.plant.parameter_source import logs_of
     from fieldsid.runtime.parallel_map import parallel_map
 
-    if not source.models or not source.paths or source.axis is not Axis.YAW:
+    if not source.models or source.axis is not Axis.YAW:
         return []
     named = logs_of(source.paths)
-    present = [log for log in named if log.now is not None]
-    runs = [run for run in parallel_map(lambda log: attempt(read_again, log), present) if not isinstance(run, FieldsidError)]
-    if len(runs) < len(named):
-        missing = f"{len(named) - len(runs)} of {len(named)} runs of the models"
-        say(f"{missing} are gone, closed or outside of this folder: the speed lost in a turn is not measured in them")
-    return runs
+    outcomes = parallel_map(lambda log: None if log.now is None else attempt(lambda of: read_again(of, mapping), log), named)
+    if missing := [f"`{log.now or log.named}`" for log, run in zip(named, outcomes, strict=True) if not isinstance(run, Run)]:
+        say(f"the speed lost in a turn is not measured in runs of the models that cannot be read again: {few_of(missing)}{hint}")
+    return [run for run in outcomes if isinstance(run, Run)]
+
+
+def runs_of_turn(source: ParameterSource, say: Callable[[str], None], mapping: ChannelMap | None = None) -> list[Run]:
+    """Return the runs of `runs_of_models` for a turning radius; none for models without effects, whose radius is a formula."""
+    if not any(m.effects for m in source.models):
+        return []
+    return runs_of_models(source, say, mapping, hint="; `--runs` takes others")
 
 
 def designed_from(schedule: Schedule, name: str) -> list[Path]:

@@ -13,8 +13,8 @@ from fieldsid.face.arguments import (
     fin_limit_of,
     fins_of,
     load_user_effects,
-    readable_runs,
     runs_of_models,
+    runs_of_turn,
     vehicle_of,
 )
 from fieldsid.face.models import Models, source_of
@@ -69,7 +69,7 @@ def turn_radius(
     load_user_effects()
     source, known = source_of(models, law), vehicle_of(vehicle)
     if runs is None:
-        fitted: Sequence[Run] = readable_runs(source, _say, loaded_mapping(mapping))
+        fitted: Sequence[Run] = runs_of_turn(source, _say, loaded_mapping(mapping))
     else:
         fitted = runs_mapped(runs, mapping, models=source.paths)
     return radius_over_speed(

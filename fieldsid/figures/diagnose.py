@@ -51,7 +51,7 @@ def figure(found: Diagnosis) -> Figure:
     draw(bars_of(found), left, noiseless=found.noiseless)
     for ax in right:
         where.draw(found.where[:MOST_BARS], ax)
-        most = f"the model as it is fails most at {DEGREES.words(found.where[0].condition)}"
+        most = f"the model as it is fails most at\n{DEGREES.words(found.where[0].condition)}"
         ax.set_title(f"{most}\nbeside a bar: rms there over that of the whole run", loc="left", fontsize=10)
     return sheet
 

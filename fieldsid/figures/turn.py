@@ -13,8 +13,10 @@ from fieldsid.turning.prediction import SIDES, TurnPrediction, TurnRow
 
 COLOURS = {"port": canvas.SIMULATED, "starboard": canvas.SECOND}
 SHIFT = 0.004
-"""Shift between the sides where there are few speeds, so that their error bars do not overlap."""
+"""Shift of a side where there are few speeds, as a share of the speed, so that the error bars of the sides do not overlap."""
 FEW = 12
+LEAST_HALF_SPAN = 0.1
+"""Smallest half width of the speed axis, as a share of the speed: at a single speed the shift is not to look like another one."""
 
 
 def figure(prediction: TurnPrediction) -> Figure:
@@ -23,6 +25,10 @@ def figure(prediction: TurnPrediction) -> Figure:
     top, bottom = np.ravel(sheet.subplots(2, 1, sharex=True, height_ratios=(1.6, 1.0)))
     draw_radius(prediction, top)
     draw_time(prediction, bottom)
+    low, high = bottom.get_xlim()
+    middle = 0.5 * (low + high)
+    half = max(0.5 * (high - low), LEAST_HALF_SPAN * middle)
+    bottom.set_xlim(middle - half, middle + half)
     bottom.set_xlabel("speed before the turn, m/s")
     return sheet
 

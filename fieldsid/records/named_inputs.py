@@ -21,9 +21,9 @@ LARGEST_HASHED = 1 << 28
 """Most bytes of a named file, or of all files of a named folder, that are hashed: this takes at most a second."""
 MOST_HASHED = 1000
 """Most files and folders in a named folder, such as a bag, for which it is hashed."""
-ABOVE = 3
-"""Number of folders above a record that are searched: its folder (`models`), the trial, and the folder that contains the
-trial."""
+ABOVE = 4
+"""Number of folders above a record that are searched: up to two in its trial (`final/speeds`), the trial, and the folder that
+contains the trial."""
 
 
 def sha256_of(path: Path) -> str:

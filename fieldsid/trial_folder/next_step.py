@@ -302,15 +302,16 @@ def trained_runs(state: FolderState, model: Item) -> list[str]:
 def diagnosed_runs(state: FolderState, model: Item) -> tuple[list[str], list[str]]:
     """Return the training and the validation runs for an addition to a model, as in the diagnosis that named it.
 
-    Without a diagnosis of the model's plane, or where one of its runs is missing, the training runs are those to which the model
-    was fitted, and there are no validation runs.
+    Runs of the diagnosis that are no longer in the folder are left out. Without a diagnosis of the model's plane, or where none
+    of its training runs remains, the training runs are those to which the model was fitted, and there are no validation runs.
     """
     made = state.newest(i for i in state.of_kind("diagnosis") if i.axis == model.axis)
     if made is not None:
         named = {stem_of(Path(r)): r for r in run_words(state)}
-        fitted, judged = ([str(r) for r in made.body.get(key) or ()] for key in ("runs", "validation_runs"))
-        if fitted and all(r in named for r in (*fitted, *judged)):
-            return [named[r] for r in fitted], [named[r] for r in judged]
+        of_diagnosis = ([str(r) for r in made.body.get(key) or ()] for key in ("runs", "validation_runs"))
+        fitted, judged = ([named[r] for r in runs if r in named] for runs in of_diagnosis)
+        if fitted:
+            return fitted, judged
     return trained_runs(state, model), []
 
 

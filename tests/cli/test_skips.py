@@ -157,7 +157,7 @@ def test_a_run_of_a_model_that_cannot_be_read_again_does_not_end_its_turn_radius
     answer = run_cli("turn-radius", tmp_path / "run7_yaw.yaml", "--rudder-max", 0.3, "--json")
     assert answer.code == 0
     assert json.loads(answer.out)["skipped_runs"] == []
-    unread = f"cannot be read again: `{log}`: name them with `--runs`"
+    unread = f"cannot be read again: `{log}`; `--runs` takes others"
     assert unread in answer.err
     with caplog.at_level("INFO", "fieldsid"):
         fieldsid.turn_radius(tmp_path / "run7_yaw.yaml", rudder_max=0.3)

@@ -433,12 +433,16 @@ def diagnosis(folder, runs, judges=(), effects=("servo_lag",)):
 
 
 @pytest.mark.parametrize(
-    ("judges", "taken"),
-    [((), BOTH_RUNS), (("pulses_1.4",), (BOTH_RUNS[0], "--validate", BOTH_RUNS[1]))],
+    ("gone", "judges", "taken"),
+    [
+        ((), (), BOTH_RUNS),
+        ((), ("pulses_1.4",), (BOTH_RUNS[0], "--validate", BOTH_RUNS[1])),
+        (("pulses_0.6",), ("pulses_1.4",), (BOTH_RUNS[0], "--validate", BOTH_RUNS[1])),
+    ],
 )
-def test_extend_takes_the_runs_of_the_diagnosis_that_names_the_effect(run_cli, folder, judges, taken):
+def test_extend_takes_the_runs_of_the_diagnosis_that_names_the_effect(run_cli, folder, gone, judges, taken):
     assert run_cli("identify", "runs/pulses_1.0.parquet", "--axis", "yaw", "--no-figures").code == 0
-    diagnosis(folder, [r for r in ("pulses_1.0", "pulses_1.4") if r not in judges], judges)
+    diagnosis(folder, [r for r in ("pulses_1.0", "pulses_1.4", *gone) if r not in judges], judges)
     answer = run_cli("extend", "--add", "servo_lag")
     assert answer.code == 0
     command = journal(folder)[-1]["command"]

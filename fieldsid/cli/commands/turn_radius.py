@@ -63,7 +63,7 @@ def command(
     from fieldsid.cli.headlines.gains import caveat, headline_of_turn
     from fieldsid.cli.inputs import mapping_of, models_among, read_runs
     from fieldsid.cli.user_effects import read_source
-    from fieldsid.face.arguments import fin_limit_of, readable_runs, vehicle_of
+    from fieldsid.face.arguments import fin_limit_of, runs_of_turn, vehicle_of
     from fieldsid.face.speeds import speeds_of
     from fieldsid.results.turning import TurnRadius
     from fieldsid.turning.radius import turn_radius
@@ -79,7 +79,7 @@ def command(
         source,
         speeds_of(speeds) or source.knots,
         fin_limit_of(known, source, say, "rudder") if given is None else given,
-        runs=fitted if runs else readable_runs(source, say, mapping_of(mapping)),
+        runs=fitted if runs else runs_of_turn(source, say, mapping_of(mapping)),
         measured=circles,
         method=method,
         fin_zero=_fin_zero(fin_zero),

@@ -239,6 +239,11 @@ def test_logs_are_found_from_another_folder_and_where_the_trial_was_moved_to(tmp
     monkeypatch.chdir(tmp_path / "day" / "models")
     assert logs_of([Path("m.yaml")]) == (("runs/log.csv", Path("../runs/log.csv"), None),)
     assert inputs_of(Path("m.yaml")) == (Path("../runs/log.csv"),)
+    (tmp_path / "day" / "final" / "speeds").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path)
+    save_model(yaw_model(1.0, ()), Path("day/final/speeds/m.yaml"), inputs=[Path("day/runs/log.csv")])
+    monkeypatch.chdir(tmp_path / "day")  # named from the folder that contains the trial
+    assert logs_of([Path("final/speeds/m.yaml")]) == (("day/runs/log.csv", Path("runs/log.csv"), None),)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "day").rename(tmp_path / "moved")
     assert logs_of([Path("moved/models/m.yaml")]) == (("runs/log.csv", Path("moved/runs/log.csv"), None),)
