@@ -79,7 +79,7 @@ def _as_usage(error: typer.TyperException, arguments: Sequence[str]) -> UsageErr
     """Give an error of the option parser our three parts; its own sentence already names the option."""
     unknown = getattr(error, "option_name", None) if hasattr(error, "possibilities") else None
     said = error.format_message() if unknown is None else f"no such option: {unknown}"
-    words = said.strip().removesuffix(".").replace("Value error, ", "")  # pydantic's own words
+    words = " ".join(said.split()).removesuffix(".").replace("Value error, ", "")  # pydantic's own words
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else f"sysid {arguments[0]}"
     words, hint = words[:1].lower() + words[1:], f"see `{path} --help`"

@@ -38,7 +38,6 @@ SHAPE: Shape = {
     "verdict": text,
     "inputs": [STAMP],
     "outputs": [STAMP],
-    "named": [text],
 }
 """The shape of a line of the journal."""
 _OF_FOLDER = -1
@@ -60,10 +59,7 @@ class Stamp(Brief):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Entry(Brief):
-    """One command: when (ISO 8601, UTC), its words, exit code, seconds, the line it gave as its result, files in and out.
-
-    `named` are the effects that a diagnosis named.
-    """
+    """One command: when (ISO 8601, UTC), its words, exit code, seconds, the line it gave as its result, files in and out."""
 
     time: Annotated[str, Key("When it was run, ISO 8601 in UTC.")]
     command: Annotated[tuple[str, ...], Key("Its words.")]
@@ -72,7 +68,6 @@ class Entry(Brief):
     verdict: Annotated[str, Key("The first line of what it said.")]
     inputs: tuple[Stamp, ...] = ()
     outputs: tuple[Stamp, ...] = ()
-    named: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -168,8 +163,7 @@ def _entry(body: Any) -> Entry:
     if not body["schema"].startswith("fieldsid/journal/") or len(body["command"]) < 2:
         raise ShapeError(f"`schema` is {shortened(body['schema'])}, or no command is named")
     ins, outs = (tuple(Stamp(**{f: s[f] for f in STAMP}) for s in body[k]) for k in ("inputs", "outputs"))
-    words, named = tuple(body["command"]), tuple(body["named"])
-    return Entry(body["time"], words, body["exit"], float(body["seconds"]), body["verdict"], ins, outs, named)
+    return Entry(body["time"], tuple(body["command"]), body["exit"], float(body["seconds"]), body["verdict"], ins, outs)
 
 
 def _last_byte(stream: BinaryIO) -> bytes:

@@ -168,7 +168,7 @@ def _identify_or_extend(state: FolderState) -> tuple[str, str] | None:
     if (unsettled := _follow_up(state, diagnosis)) is not None:
         return unsettled
     best = state.models[0]
-    named = diagnosis.named if diagnosis is not None else saved.effects if saved is not None else ()
+    named = () if (made := _diagnosis_of(state, best)) is None else made.effects
     lacking = [e for e in named if e not in best.effects]
     since = "" if diagnosis is None else diagnosis.time
     if lacking and not any(e.time >= since for e in state.done("extend")):
@@ -305,7 +305,7 @@ def diagnosed_runs(state: FolderState, model: Item) -> tuple[list[str], list[str
     Runs of the diagnosis that are no longer in the folder are left out. Without a diagnosis of the model's plane, or where none
     of its training runs remains, the training runs are those to which the model was fitted, and there are no validation runs.
     """
-    made = state.newest(i for i in state.of_kind("diagnosis") if i.axis == model.axis)
+    made = _diagnosis_of(state, model)
     if made is not None:
         named = {stem_of(Path(r)): r for r in run_words(state)}
         of_diagnosis = ([str(r) for r in made.body.get(key) or ()] for key in ("runs", "validation_runs"))
@@ -313,6 +313,11 @@ def diagnosed_runs(state: FolderState, model: Item) -> tuple[list[str], list[str
         if fitted:
             return fitted, judged
     return trained_runs(state, model), []
+
+
+def _diagnosis_of(state: FolderState, model: Item) -> Item | None:
+    """Return the newest diagnosis of a model's plane."""
+    return state.newest(i for i in state.of_kind("diagnosis") if i.axis == model.axis)
 
 
 def logs_to_import(state: FolderState, *, again: bool = False) -> list[str]:

@@ -135,6 +135,12 @@ def test_what_is_missing_is_shown_by_the_example_of_the_command(run_cli, tmp_pat
     assert answer.err.endswith(f"\nhint: {example}, or see `sysid schedule verify --help`\n")
 
 
+def test_a_missing_option_is_one_line_with_what_it_takes(run_cli, tmp_path):
+    answer = run_cli("batch", tmp_path / "log.csv")
+    assert answer.code == 2
+    assert answer.err.startswith("error: missing option '--axis'. Choose from: yaw, pitch\n")
+
+
 @pytest.mark.parametrize("name", sorted(entries()))
 def test_every_command_explains_itself_and_has_a_module_of_its_name(run_cli, name):
     answer = run_cli(name, "--help")

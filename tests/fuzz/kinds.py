@@ -408,7 +408,7 @@ def as_journal(folder):
     path.unlink(missing_ok=True)
     stamps = (Stamp("models/m.yaml", "0" * 64, 3000, 10**18), Stamp("runs/x.parquet", "1" * 64, 9000, 10**18))
     for i, words in enumerate((("identify", "x"), ("diagnose", "x"), ("schedule", "verify", "gains.yaml"), ("report",))):
-        done = Entry(f"2026-05-01T10:0{i}:00+00:00", ("sysid", *words), 0, 1.5, "says so", stamps[:1], stamps, ("servo_lag",))
+        done = Entry(f"2026-05-01T10:0{i}:00+00:00", ("sysid", *words), 0, 1.5, "says so", stamps[:1], stamps)
         append(folder, done)
     return path
 

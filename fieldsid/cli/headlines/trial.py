@@ -39,8 +39,8 @@ def headline_of_plan(result: Planned, model: Path | None) -> Headline:
     speeds = {leg.speed for leg in legs}
     which = f", the least sure of {len(speeds)} speeds" if len(speeds) > 1 else f", by the least sure of {len(legs)} legs"
     at = f" at {legs[hardest].speed:g} m/s{which}" if len(legs) > 1 else ""
-    what = "minutes" if plan.minutes != 1 else "minute"
-    says = f"{counted(len(legs), 'leg')} of {plan.minutes:.1f} {what} buy {bought or 'what tells the effects apart'}{at}"
+    what = f"{'minutes' if plan.minutes != 1 else 'minute'} {'buys' if len(legs) == 1 else 'buy'}"
+    says = f"{counted(len(legs), 'leg')} of {plan.minutes:.1f} {what} {bought or 'what tells the effects apart'}{at}"
     known_by = str(model) if model is not None else f"the prior {plan.prior}"
     unlimited = [name for name, limit in plan.limits.items() if limit == NOT_LIMITED]
     risk = f"risk of leaving the envelope {100.0 * plan.break_probability:.1f} %"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
@@ -57,7 +57,7 @@ def run_in_trial(arguments: Sequence[str], run: Callable[[Sequence[str]], Any]) 
     except Exception as error:
         recorder.write(OUR_BUG, f"{type(error).__name__}: {error}")
         raise
-    recorder.write(result if isinstance(result, int) else DONE, take_verdict(), result)
+    recorder.write(result if isinstance(result, int) else DONE, take_verdict())
     return result
 
 
@@ -74,15 +74,13 @@ class _Recorder:
         self._inputs = self._stamps(dict.fromkeys(p for p in read_from if is_there(p)))
         self._before = _snapshot(folder)
 
-    def write(self, code: int, verdict: str, result: Any = None) -> None:
+    def write(self, code: int, verdict: str) -> None:
         """Add the line: exit code, verdict, and the files that were made or changed since the start."""
         after = _snapshot(self._folder)
         outputs = self._stamps(Path(p) for p, seen in after.items() if self._before.get(p) != seen)
-        body: Mapping[str, Any] = result if isinstance(result, Mapping) else {}
-        named = body.get("effects") if self._words[0] == "diagnose" else None
         entry = Entry(
             self._time, ("sysid", *self._words), code, round(perf_counter() - self._began, 3),
-            verdict[:LONGEST_VERDICT], self._inputs, outputs, tuple(named or ()),
+            verdict[:LONGEST_VERDICT], self._inputs, outputs,
         )  # fmt: skip
         try:
             append(self._folder, entry)

@@ -10,7 +10,7 @@ from fieldsid.cli.app import main
 from fieldsid.trial_folder.journal import JOURNAL, Entry, Stamp, append, is_trial, made_by, read
 
 STAMP = Stamp("models/m.yaml", "0" * 64, 10, 20)
-GOOD = Entry("2026-05-01T10:00:00+00:00", ("sysid", "identify"), 0, 1.5, "says", (STAMP,), (STAMP,), ("servo_lag",))
+GOOD = Entry("2026-05-01T10:00:00+00:00", ("sysid", "identify"), 0, 1.5, "says", (STAMP,), (STAMP,))
 
 
 def line_of(tmp_path, **changes):
@@ -27,7 +27,7 @@ STAMPED = {"path": "a", "sha256": "b", "size": 1, "modified_ns": 2}
     [
         {"exit": 10**30}, {"exit": 1e400}, {"exit": "0"}, {"exit": None}, {"seconds": "x"}, {"seconds": float("nan")},
         {"time": "noon"}, {"time": 3}, {"time": "0001-01-01T00:00:00+23:59"}, {"command": "sysid"}, {"command": ["sysid"]},
-        {"command": [["sysid"], {}]}, {"verdict": []}, {"named": None}, {"named": [3]}, {"inputs": {}}, {"inputs": [3]},
+        {"command": [["sysid"], {}]}, {"verdict": []}, {"inputs": {}}, {"inputs": [3]},
         {"inputs": [{**STAMPED, "path": ["a"]}]}, {"outputs": [{**STAMPED, "size": [1]}]}, {"outputs": [{"path": "a"}]},
         {"schema": []}, {"schema": "other/1"}, {"verdict": "\\ud800"},
     ],
