@@ -70,7 +70,7 @@ def _lesson(model: Model, maneuver: Maneuver, speed: float, seed: int, leg: Leg)
         return flown(model, maneuver, speed, seed)
     window, candidate = leg.window, leg.candidate
     schedule = Schedule(window.rate_hz, window.lead, window.recover)
-    return flown(model, candidate.record, speed, seed, schedule=schedule, **candidate.parameters)
+    return flown(model, candidate.record, speed, seed, schedule=schedule, parameters=candidate.parameters)
 
 
 def _save(runs: list[tuple[str, Run]], folder: Path, *, force: bool) -> Iterator[Path]:

@@ -118,9 +118,10 @@ def training_maneuver(model: Model) -> Maneuver:
 
 
 def flown(
-    model: Model, maneuver: Maneuver, speed: float, seed: int, *, schedule: Schedule | None = None, **parameters: float
-) -> Run:
-    """Return a maneuver flown by the vehicle at a speed in m/s, measured with its sensors' noise."""
+    model: Model, maneuver: Maneuver, speed: float, seed: int, *,
+    schedule: Schedule | None = None, parameters: Mapping[str, float] = MappingProxyType({}),
+) -> Run:  # fmt: skip
+    """Return a maneuver flown by the vehicle at a speed in m/s, measured with its sensors' noise of a seed."""
     effects = tuple(pick_effect(n) for n in model.effects)
     values = maneuver.checked(parameters)
     run = dry_run(

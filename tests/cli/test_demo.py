@@ -11,9 +11,9 @@ from guide.session import TOUR
 from fieldsid.cli.commands import demo
 from fieldsid.demo import steps, vehicle
 from fieldsid.demo.steps import PLAN, STEPS, Step
-from fieldsid.demo.vehicle import SPEED, SPEED_NOISE
+from fieldsid.demo.vehicle import SPEED, SPEED_NOISE, flown, hidden_vehicle
 from fieldsid.logs import load_run
-from fieldsid.maneuvers import pick_maneuver
+from fieldsid.maneuvers import all_maneuvers, pick_maneuver
 from fieldsid.planning import request
 from fieldsid.planning.design.leg import commands_of
 from fieldsid.planning.output.plan_file import load_plan
@@ -39,6 +39,21 @@ def test_the_tour_is_told_on_one_screen_and_ends_with_the_report(tour, folder):
     assert tour["steps"][-1]["command"] == f"sysid report {tour['folder']}"
     assert (folder / "report.html").is_file()
     assert "servo_lag, probability 0.99" in told
+
+
+@pytest.mark.parametrize("name", sorted(all_maneuvers()))
+def test_the_vehicle_flies_any_maneuver_that_the_plan_may_choose(name):
+    maneuver = pick_maneuver(name)
+    run = flown(hidden_vehicle("heave_coupling"), maneuver, SPEED, 1, parameters=maneuver.checked({}))
+    assert np.isfinite(run["pitch_rate_rad_s"]).all()
+
+
+def test_a_step_that_cannot_use_all_logs_ends_the_tour_with_its_command(run_cli, tmp_path, monkeypatch):
+    monkeypatch.setattr(demo, "run", lambda *_asked: 1)
+    answer = run_cli("demo", "-o", tmp_path / "a")
+    assert answer.code == 2
+    assert "the tour ends at its step 1, which could not use all logs" in answer.err
+    assert f"`sysid plan --axis yaw --speeds 1.4 --fin-rate 1.5 --write csv -o {tmp_path}/a/plan` ended" in answer.err
 
 
 @pytest.fixture

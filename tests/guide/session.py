@@ -129,7 +129,7 @@ def circle() -> Any:
     """Return the run of a full circle by the tour's vehicle, its positions by dead reckoning, with a receiver's noise."""
     from dataclasses import replace
 
-    run = flown(hidden_vehicle(HIDDEN), pick_maneuver("turning_circle"), SPEED, CIRCLE_SEED, amplitude=0.26)
+    run = flown(hidden_vehicle(HIDDEN), pick_maneuver("turning_circle"), SPEED, CIRCLE_SEED, parameters={"amplitude": 0.26})
     rng, steps = np.random.default_rng(CIRCLE_SEED), np.diff(run.time, prepend=run.time[0])
     north, east = (np.cumsum(run["surge_m_s"] * turn(run["yaw_rad"]) * steps) for turn in (np.cos, np.sin))
     fixes = {"x_m": north + rng.normal(0.0, FIX_M, len(run)), "y_m": east + rng.normal(0.0, FIX_M, len(run))}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext, redirect_stderr, redirect_stdout
@@ -17,7 +18,7 @@ from fieldsid.cli.options import Force, OutputDir, flag, option
 from fieldsid.cli.progress import compiling
 from fieldsid.cli.session import Session
 from fieldsid.cli.voice import voice
-from fieldsid.errors import ArtifactError
+from fieldsid.errors import ArtifactError, UsageError
 from fieldsid.page import Page, folded, written
 from fieldsid.runtime.background_tasks import BackgroundTasks
 
@@ -138,6 +139,12 @@ def _run_step(place: int, step: Step, known: Mapping[str, str], session: Session
     with nullcontext() if detail == VERBOSE else _silence():
         result = run([*expanded(words), *(["--force"] if force else [])], session)
     sys.stderr.flush()
+    if isinstance(result, int):
+        raise UsageError(
+            f"the tour ends at its step {place}, which could not use all logs",
+            found=f"`{shlex.join(['sysid', *words])}` ended with exit code {result}",
+            hint="run that command to see why, or hide another effect",
+        )
     brief, meaning = step.tells(result)
     if detail == BRIEF:
         said = f"{place:2d}. {step.title}{'' if step.title.endswith('?') else ':'} {brief}"
