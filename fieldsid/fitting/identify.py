@@ -10,6 +10,7 @@ from fieldsid.fitting.checks.closed_loop import refuse_feedback_alone
 from fieldsid.fitting.checks.run_checks import offset_findings, run_checks, sign_findings
 from fieldsid.fitting.checks.sampling_checks import sampling_findings
 from fieldsid.fitting.fit import AUTO, Fit, check, check_signals, fit
+from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
 from fieldsid.fitting.problem.estimator import Options
 from fieldsid.logs import Note, Run, segment
 from fieldsid.logs.several.sifting import Refused, attempt, sifted
@@ -54,7 +55,7 @@ def identify(
         found = fit(records, axis, method=method, effects=effects, options=options)
         done()
         model_notes = (
-            *sampling_findings(found.model, records),
+            *sampling_findings(found.model, records, goodness_of_fit(found.predictions), found.floor),
             *sign_findings(found.model, vehicle),
             *offset_findings(found.model, vehicle),
         )

@@ -11,7 +11,7 @@ fin, n = (sum |d|)^2 / sum d^2 of its changes d, their mean time has the error h
 
 Where h > T_hat and the uncertainty is at least T_hat, a vehicle that responds instantly fits too: then only the gain and a lower
 bound of the damping are known. The test is left out for a model with a lag or a hidden state, whose slowest pole is not the
-hull's.
+hull's, and for one that does not follow the motion: a damping at its bound then has another cause, such as a clock that is off.
 """
 
 from __future__ import annotations
@@ -22,21 +22,25 @@ import numpy as np
 
 from fieldsid.dynamics.free_run import effects_of
 from fieldsid.errors import DataError
+from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import NAMES
-from fieldsid.models.model import Model
+from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
 
 INTERVAL_STD_ERRORS = 2.0
 """Half the width of a 95 % interval."""
+MAX_UNEXPLAINED = 0.1
+"""Largest rms error beyond the noise, as a share of the motion: the unknown times of commands leave 0.06 of a glider's heading."""
 
 
-def sampling_findings(model: Model, records: Sequence[Record]) -> tuple[Note, ...]:
+def sampling_findings(model: Model, records: Sequence[Record], merit: GoodnessOfFit, floor: Noise) -> tuple[Note, ...]:
     """Return the finding that the unknown time of the command between samples changes the damping by more than its error.
 
-    Raises DataError where the sampling of no run distinguishes the time constant from zero.
+    merit: the model's fit to the records. Raises DataError where the sampling of no run distinguishes the time constant from zero.
     """
-    if any(e.extra_states or any(c.unit == "s" for c in e.shared) for e in effects_of(model)):
+    has_slower_pole = any(e.extra_states or any(c.unit == "s" for c in e.shared) for e in effects_of(model))
+    if has_slower_pole or not _follows_motion(merit, floor):
         return ()
     names = NAMES[model.axis]
     damping, authority = model.values[names.damping], model.values[names.authority]
@@ -67,6 +71,14 @@ def sampling_findings(model: Model, records: Sequence[Record]) -> tuple[Note, ..
             f"{1.0 / longest:.2g} and {1.0 / max(constant - fit_margin, 1e-9):.2g} 1/s; log the measured fin, or log more often",
             {"value": damping, "low": 1.0 / longest, "limit": 1.0 / step, "run": records[0].name},
         ),
+    )
+
+
+def _follows_motion(merit: GoodnessOfFit, floor: Noise) -> bool:
+    """Whether angle or rate are followed to MAX_UNEXPLAINED of their size, the sensor's noise apart."""
+    channels = ((merit.angle_rms, merit.angle_fit, floor.angle), (merit.rate_rms, merit.rate_fit, floor.rate))
+    return any(
+        (1.0 - fit / 100.0) ** 2 * (1.0 - (noise / rms) ** 2) <= MAX_UNEXPLAINED**2 for rms, fit, noise in channels if rms > 0.0
     )
 
 

@@ -8,6 +8,7 @@ import pytest
 from fieldsid.errors import DataError
 from fieldsid.fitting.checks.sampling_checks import sampling_findings
 from fieldsid.fitting.identify import identify
+from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise
@@ -91,8 +92,23 @@ def test_a_model_with_slower_poles_than_the_hulls_is_not_asked(effects, asked):
     values = {"a22": 40.0, "b2": -10.0, "C0": 0.0} | {k: v for e in effects for k, v in own[e].items()}
     model = Model(Axis.YAW, effects, values, {}, ("a22",), np.array([[400.0]]), SpeedLaw(1.4), Noise(0.005, 0.005))
     records = [record_of(run, Axis.YAW)]
+    good = GoodnessOfFit(0.005, 0.006, 97.0, 94.0)
     if asked:
         with pytest.raises(DataError, match="too coarse"):
-            sampling_findings(model, records)
+            sampling_findings(model, records, good, model.noise)
     else:
-        assert sampling_findings(model, records) == ()
+        assert sampling_findings(model, records, good, model.noise) == ()
+
+
+def test_no_sampling_is_blamed_where_the_clock_of_the_fin_is_off():
+    """The rate shows each pulse 0.15 s before the fin does: no damping explains it, and the one at its bound is not the hull's."""
+    time = FINE_S * np.arange(1200)
+    fin = 0.2 * np.sign(np.sin(2.0 * np.pi * time / 6.0)) * (time > 3.0)
+    rate = np.zeros(time.size)
+    for i in range(1, time.size):
+        rate[i] = rate[i - 1] + FINE_S * (-1.1 * rate[i - 1] - 1.2 * fin[i - 1])
+    random, late = np.random.default_rng(3), np.roll(fin, 3)
+    signals = {"yaw_rad": np.cumsum(rate) * FINE_S, "yaw_rate_rad_s": rate, "rudder_rad": late}
+    noisy = {n: v + (0.0 if n == "rudder_rad" else 0.003) * random.standard_normal(time.size) for n, v in signals.items()}
+    (found,) = identify([Run("early", time, noisy)], Axis.YAW)
+    assert not {"coarse_sampling"} & {n.code for n in found.notes}
