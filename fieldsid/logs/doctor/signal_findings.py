@@ -36,7 +36,7 @@ def signal_findings(run: Run, name: str, stated: Stated) -> list[Note]:
     seen = np.isfinite(values)
     if not seen.any():
         return [Note("empty", f"{name} has no sample", {"signal": name})]
-    present = values[seen]
+    present = values[seen] + 0.0  # a zero turned by a frame is -0
     found = [*_missing(name, seen), *_size(run, name, present, stated)]
     if present.size > 2 and float(np.ptp(present)) == 0.0 and name not in GOALS.union(MOTORS):
         message = f"{name} is constant at {present[0]:.6g} over {present.size} samples; check the sensor, or map another one"

@@ -71,6 +71,7 @@ def draft_of(inventory: Inventory) -> Draft:
     samples = inventory.samples
     attitude = None if samples is None else quaternion_of(names, samples.columns)
     signals = _combined(best, attitude)
+    notes = [note for note in notes if note.data["signal"] in signals]
     if inventory.by_topic:
         body["frame"] = _frame_of_topics(inventory)
     else:
@@ -135,7 +136,8 @@ def _combined(best: dict[str, Guess], attitude: dict[str, Any] | None) -> dict[s
 
 
 def _is_called(signals: Mapping[str, Any], signal: str, word: str) -> bool:
-    words = words_of(str(signals.get(signal, {}).get("column", "")))
+    item = signals.get(signal, {})
+    words = words_of(str(item.get("column", item.get("field", ""))))
     return words == [word] or (len(word) > 1 and word in words)
 
 

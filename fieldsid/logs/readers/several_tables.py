@@ -156,7 +156,11 @@ def _attitudes(topics: Mapping[str, Topic]) -> Means:
     """Return the meaning of the four columns that are a quaternion, for each table that has them."""
     columns: dict[str, dict[str | int, FloatArray]] = {name: dict(topic.fields.items()) for name, topic in topics.items()}
     found = {name: quaternion_of(list(topics[name].fields), fields) for name, fields in columns.items()}
-    return {f"{name.partition('[')[0]}.{', '.join(four)}": (ATTITUDE, {}) for name, four in found.items() if four}
+    return {
+        f"{name.partition('[')[0]}.{', '.join(four['columns'])}": (ATTITUDE, {k: v for k, v in four.items() if k != "columns"})
+        for name, four in found.items()
+        if four
+    }
 
 
 def _reason_not_to_join(parts: Mapping[str, Part]) -> LogError | None:

@@ -85,6 +85,19 @@ def test_the_proposal_of_a_folder_can_be_imported(tmp_path):
     assert found.run is not None
 
 
+def test_the_quaternion_and_the_speed_of_one_table_of_several_are_taken(tmp_path):
+    half = 0.5 * YAW
+    names = ["time_s", "phi_r", "q.w", "q.x", "q.y", "q.z", "wz"]
+    table(tmp_path / "run" / "imu.csv", names, *listed(TIME, 40 * YAW, np.cos(half), 0 * half, 0 * half, np.sin(half), RATE))
+    table(tmp_path / "run" / "drive.csv", ["time_s", "V", "delta"], *listed(STAMPS, 1.5 + STAMPS, RUDDER))
+    inspection = inspect_log(tmp_path / "run")
+    signals = inspection.proposal.body["signals"]
+    assert signals["attitude"] == {"topic": "imu", "field": "q.x, q.y, q.z, q.w"}
+    assert (signals["surge_m_s"]["field"], "sway_m_s" in signals, "roll_rad" in signals) == ("V", False, False)
+    assert not any("roll_rad is taken from" in note.message for note in inspection.proposal.notes)
+    assert_allclose(load_run(tmp_path / "run", mapping_of(inspection.proposal.body))["yaw_rad"][:290], YAW[:290], atol=1e-6)
+
+
 def test_devices_in_the_rows_of_one_table_are_topics_of_their_own(tmp_path):
     motion(tmp_path / "State.csv", EPOCH, "timestamp")
     rows = [(EPOCH + t, "auv", k, v * (k - 1)) for t, v in zip(STAMPS, RUDDER, strict=True) for k in range(3)]
