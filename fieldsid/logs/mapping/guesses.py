@@ -65,7 +65,7 @@ def _of_number(
     """Yield the guess for the numbers of a column, or of a field of messages, from a name."""
     first = [float(v) for v in info.first if isinstance(v, (int, float))]
     span = info.span or ((min(first), max(first)) if first else None)
-    signal, sure = meaning_of(name, span) or (TIME, 0)
+    signal, sure = meaning_of(name, span, channel.unit) or (TIME, 0)
     if signal == TIME or not channel.count or (of_message and signal in (LATITUDE, LONGITUDE)):
         return
     unit_text = channel.unit

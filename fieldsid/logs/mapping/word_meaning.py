@@ -6,7 +6,7 @@ import re
 
 from fieldsid.logs.channels import ANGLES
 from fieldsid.logs.doctor.angle_and_rate import PAIRS
-from fieldsid.logs.mapping.canonical_names import canonical, unit_among_words, words_of
+from fieldsid.logs.mapping.canonical_names import canonical, stated_unit, unit_among_words, words_of
 from fieldsid.logs.mapping.vocabulary import (
     COMMANDED,
     EULER,
@@ -25,10 +25,10 @@ CANONICAL, STANDARD = 9, 8
 """Scores of a canonical name and of a component of a standard message, comparable with those of rules."""
 
 
-def meaning_of(name: str, span: Span | None = None) -> tuple[str, int] | None:
+def meaning_of(name: str, span: Span | None = None, unit_text: str | None = None) -> tuple[str, int] | None:
     """Return the signal that a name probably means, and its score; None where there is none.
 
-    `span` holds the smallest and largest number of the column.
+    `span` holds the smallest and largest number of the column. `unit_text` is a unit that the log states beside the name.
     """
     stated = canonical(name)
     if stated is not None:
@@ -45,7 +45,8 @@ def meaning_of(name: str, span: Span | None = None) -> tuple[str, int] | None:
     if best[0] == 2 and is_abbreviation(words_of(re.split(r"[/ .]", name.strip())[-1])):
         return None
     signal = best[1].signal
-    is_rate = (
-        signal in RATES and unit_among_words(name, ("angle",)) is None and unit_among_words(name, ("angle rate",)) is not None
+    has_unit_of_rate = unit_among_words(name, ("angle rate",)) is not None or (
+        signal in RATES and unit_text is not None and stated_unit(unit_text, RATES[signal]) is not None
     )
+    is_rate = signal in RATES and unit_among_words(name, ("angle",)) is None and has_unit_of_rate
     return as_command_or_measurement(RATES[signal] if is_rate else signal, best[0], set(words))

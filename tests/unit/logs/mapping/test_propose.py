@@ -106,6 +106,16 @@ def test_of_a_gliders_table_only_what_is_measured_or_commanded_is_proposed(tmp_p
     assert body["time"]["unit"] == "s"
 
 
+def test_the_row_of_units_says_that_a_yaw_in_degrees_a_second_is_the_rate(tmp_path):
+    log = tmp_path / "units.asc"
+    columns = (TIME, np.degrees(TRUTH["yaw_rad"]), np.degrees(TRUTH["yaw_rate_rad_s"]), np.degrees(TRUTH["rudder_rad"]))
+    rows = "\n".join(" ".join(f"{v:.9f}" for v in row) for row in zip(*columns, strict=True))
+    log.write_text("T heading yaw rudder\ns deg deg/s deg\n" + rows + "\n")
+    proposal = inspect_log(log).proposal
+    assert proposal.body["signals"]["yaw_rate_rad_s"] == {"column": "yaw", "unit": "deg/s"}
+    assert not [note for note in proposal.notes if note.code == "alternatives"]
+
+
 def test_a_table_written_from_messages_gives_its_quaternion_and_its_vectors(tmp_path):
     yaw = 0.4 + TRUTH["yaw_rad"]  # of a message's frame: from east, against the clock
     stem = "field.pose.pose.orientation."
