@@ -26,9 +26,9 @@ def word_set(text: str) -> frozenset[str]:
 
 
 COMMANDED = word_set(
-    "cmd command commanded setpoint sp desired des target tgt reference ref demand demanded goal next ordered wanted"
+    "cmd command commanded setpoint set sp desired des target tgt reference ref demand demanded goal next order ordered wanted"
 )
-MEASURED = word_set("measured meas feedback fb actual state states encoder position")
+MEASURED = word_set("measured meas feedback fb actual state states encoder position pos")
 OF_ANOTHER = word_set(
     "error err cov covariance std sigma variance var bias limit lim max min quality valid flag gain gains temp temperature sound "
     "wind ws air variation status mode enabled count id"
@@ -111,7 +111,7 @@ RULES = (
     Rule(LONGITUDE, "longitude, long, lon, lng", holds=within(360.0)),
     Rule("x_m", "north, northing, pos x, position x, utm y", OF_SPEED),
     Rule("y_m", "east, easting, pos y, position y, utm x", OF_SPEED),
-    Rule("rudder_rad", "rudder, rud, delta r, deltar, fin yaw, fin, drud, delr", word_set("roll")),
+    Rule("rudder_rad", "rudder, rud, rdr, delta r, deltar, fin yaw, fin, drud, delr", word_set("roll")),
     Rule("elevator_rad", "elevator, elev, stern plane, sternplane, sternplanes, delta s, deltas, delta e, fin pitch, delv"),
     Rule("thrust", "thrust, thruster, throttle, motor, motor speed"),
     Rule("propeller_rpm", "rpm, propeller, prop"),

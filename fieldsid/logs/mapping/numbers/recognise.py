@@ -20,6 +20,7 @@ from fieldsid.logs.convert.frames import north_and_east
 from fieldsid.logs.convert.units import CLEARLY, UNITS
 from fieldsid.logs.doctor.angle_and_rate import PAIRS
 from fieldsid.logs.doctor.together import FEWEST, change, width_of
+from fieldsid.logs.few_of import few_of
 from fieldsid.logs.mapping.fins.shares import EXPLAINS, beyond, explained, explains, moved_by
 from fieldsid.logs.mapping.fins.shares import WINDOWS_S as SHORT_S
 from fieldsid.logs.mapping.numbers.unit_inference import Reading, fin_reading, in_radians
@@ -282,6 +283,9 @@ def _fin_column(
     why = f"it explains {explains(alone[best], 'yaw_rate')}"
     if rival is not None:
         why += f", and adds {100 * added[best]:.0f} % to the others, column {names[rival]} {100 * added[rival]:.0f} %"
+    alike = [f"column {name}" for i, name in enumerate(names) if i not in every]
+    if alike:
+        why += f"; {few_of(alike)} moves as it does: the command is the one that leads, and the other is `rudder_measured_rad`"
     return names[best], why, alone[best]
 
 

@@ -87,3 +87,15 @@ def test_the_fin_is_what_explains_the_turning_alone_though_sway_and_roll_follow_
         "deg/s",
         "deg",
     )
+
+
+def test_of_two_fins_that_move_alike_the_other_is_named(tmp_path):
+    time, columns = ship()
+    columns += [np.interp(time - 0.1, time, columns[-1])]
+    rows = [",".join(f"{v:.5f}" for v in row) for row in zip(time, *columns, strict=True)]
+    (tmp_path / "ship.csv").write_text("\n".join(rows) + "\n")
+    proposal = inspect_log(tmp_path / "ship.csv").proposal
+    taken = proposal.body["signals"]["rudder_rad"]["column"]
+    (why,) = (n.message for n in proposal.notes if n.data.get("signal") == "rudder_rad" and n.code == "evidence")
+    assert {taken, 17 - taken} == {8, 9}
+    assert f"column {17 - taken} moves as it does" in why

@@ -52,3 +52,11 @@ def test_a_v_alone_is_the_speed_and_beside_a_u_the_sway(tmp_path, names, signal)
     columns = {"time": TRUTH["time_s"], "heading": np.degrees(TRUTH["yaw_rad"]), **dict.fromkeys(names, TRUTH["surge_m_s"])}
     signals = inspect_log(write_table(tmp_path / "log.csv", columns)).proposal.body["signals"]
     assert signals[signal]["column"] == "v"
+
+
+@pytest.mark.parametrize(("command", "angle"), [("Set_rdr_deg", "Actual_rdr_deg"), ("rudder_order_deg", "rudder_pos_deg")])
+def test_a_set_or_ordered_rudder_is_the_command_and_its_position_the_measurement(tmp_path, command, angle):
+    fin = np.degrees(TRUTH["rudder_rad"])
+    columns = {"time": TRUTH["time_s"], "heading": np.degrees(TRUTH["yaw_rad"]), angle: fin, command: fin}
+    signals = inspect_log(write_table(tmp_path / "log.csv", columns)).proposal.body["signals"]
+    assert (signals["rudder_rad"]["column"], signals["rudder_measured_rad"]["column"]) == (command, angle)
