@@ -27,8 +27,10 @@ def candidates(body: Mapping[str, Any], angles: Angles) -> tuple[Block, str]:
     ]
     of = f"in {angles.unit} and {angles.unit}/s, in logs with next to no noise"
     if not body.get("noiseless"):
-        floor = [number(angles.factor * (body["noise_floor"][name] or 0.0), 2) for name in ("angle_rad", "rate_rad_s")]
-        of = f"over the noise floor, {floor[0]} {angles.unit} and {floor[1]} {angles.unit}/s"
+        sides, floor = body["base"].values(), body["noise_floor"]
+        channels = (("angle_rad", "angle_rms_rad", angles.unit), ("rate_rad_s", "rate_rms_rad_s", f"{angles.unit}/s"))
+        logged = [(floor[name] or 0.0, unit) for name, rms, unit in channels if any(number(side[rms]) != "-" for side in sides)]
+        of = f"over the noise floor, {' and '.join(f'{number(angles.factor * value, 2)} {unit}' for value, unit in logged)}"
     return (
         Block("", tuple(rows), COLUMNS),
         f"fitted, unseen: free-run error of those runs {of}; evidence: log, over the first row",

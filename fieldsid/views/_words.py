@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from math import isfinite
+from math import isfinite, nan
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.page import Block, counted, cut, facts
@@ -80,9 +80,9 @@ def merit_blocks(runs: Iterable[tuple[str, float, GoodnessOfFit, Noise]], angles
         (
             name,
             number(speed, 3),
-            *(number(angles.factor * v, 2) for v in (m.angle_rms, floor.angle)),
+            *(number(angles.factor * v, 2) for v in (m.angle_rms, floor.angle if isfinite(m.angle_rms) else nan)),
             number(m.angle_fit, 3),
-            *(number(angles.factor * v, 2) for v in (m.rate_rms, floor.rate)),
+            *(number(angles.factor * v, 2) for v in (m.rate_rms, floor.rate if isfinite(m.rate_rms) else nan)),
             number(m.rate_fit, 3),
         )
         for name, speed, m, floor in runs

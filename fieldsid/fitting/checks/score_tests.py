@@ -109,10 +109,12 @@ def _timing(problem: Problem, solution: Solution) -> Iterator[Note]:
         "bias_percent": bias,
     }  # fmt: skip
     if found.late > 0.0:
+        is_measured = any(record.fin_is_measured for record in problem.records)
+        fin, remedy = ("measured fin", "use") if is_measured else ("logged fin", "log the measured fin, or use")
         yield Note(
             "ignored_delay",
-            f"the vehicle answers about {1e3 * found.late:.0f} ms after the logged fin: {moves}; "
-            "log the measured fin, or use `--effects delay` or `--effects servo_lag`",
+            f"the vehicle answers about {1e3 * found.late:.0f} ms after the {fin}: {moves}; "
+            f"{remedy} `--effects delay` or `--effects servo_lag`",
             data,
         )
     else:

@@ -6,6 +6,7 @@ import pkgutil
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
 from importlib import import_module
+from math import nan
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -17,10 +18,14 @@ from fieldsid.cli.console import out, print_page
 from fieldsid.display import LONGEST, Brief, Displayed, Plotted, page_of, view_of
 from fieldsid.errors import UsageError
 from fieldsid.face.several import Several
+from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit
 from fieldsid.logs import Note
+from fieldsid.models.model import Noise
 from fieldsid.records.keys import body_of
 from fieldsid.registry import members
 from fieldsid.rounding import DEGREES, RADIANS
+from fieldsid.views._candidates import candidates
+from fieldsid.views._words import merit_blocks
 
 KINDS = (
     "Candidate", "Change", "Check", "Comparison", "Diagnosis", "Extension", "Fit", "Laws", "MeasuredRow", "MeasuredTurn", "Model",
@@ -316,3 +321,12 @@ def test_several_fits_are_one_table_and_their_runs_another(made):
 def test_a_record_is_made_anew_with_replace_and_keeps_its_words(held):
     other = replace(held["Run"], name="other")
     assert repr(other).startswith("<Run other: 400 samples")
+
+
+def test_a_channel_that_was_not_logged_has_no_noise_either():
+    floor, merit = Noise(0.005, 1e-7), GoodnessOfFit(0.006, nan, 99.0, nan)
+    block, _ = merit_blocks([("run", 1.4, merit, floor)], RADIANS)
+    assert block.rows[0] == ("run", "1.40", "0.0060", "0.0050", "99.0", "-", "-", "-")
+    base = {side: {"angle_rms_rad": 0.006, "rate_rms_rad_s": None} for side in ("train", "validation")}
+    body = {"base": base, "candidates": [], "noise_floor": {"angle_rad": 0.005, "rate_rad_s": 1e-7}}
+    assert "over the noise floor, 0.0050 rad; evidence" in candidates(body, RADIANS)[1]

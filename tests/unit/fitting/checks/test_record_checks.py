@@ -75,6 +75,15 @@ def test_what_a_long_delay_costs_is_that_of_a_fit_with_it(numbers, late):
         assert found["with"] == pytest.approx(YAW[1].a22, rel=0.03)
 
 
+def test_where_the_measured_fin_is_used_nobody_is_told_to_log_it():
+    late = pulsed(delay=0.1)
+    signals = {name: late[name] for name in late.signals}
+    measured = Run("paper", late.time, {**signals, "rudder_measured_rad": late["rudder_rad"]})
+    for run, is_told in ((late, True), (measured, False)):
+        (note,) = (n for n in identify([run], Axis.YAW, whole=True)[0].notes if n.code == "ignored_delay")
+        assert ("log the measured fin" in note.message, "after the logged fin" in note.message) == (is_told, is_told)
+
+
 @pytest.mark.parametrize("offset", [0.05, 0.1])
 def test_how_far_a_clock_is_off_is_that_of_a_fit_with_it(offset):
     assert notes(pulsed(clock_offset=offset))["negative_delay"]["value"] == pytest.approx(-offset, abs=0.015)
