@@ -11,10 +11,12 @@ from fieldsid.logs.doctor.holes import usual_step
 from fieldsid.logs.doctor.pair_findings import goes_with_way
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import FINS, GOALS, MEASURED, MOTORS, SIGNALS, Note, Run
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 FITTED = frozenset({"yaw_rad", "pitch_rad", "yaw_rate_rad_s", "pitch_rate_rad_s"})
 """The signals to which the free run is fitted."""
+PLACE = frozenset({"x_m", "y_m"})
+"""The coordinates of one sensor: neither is frozen while the other changes."""
 MISSING_LIMIT = 0.05
 FROZEN_S = 1.0
 COARSE_LIMIT = 0.3
@@ -42,7 +44,14 @@ def signal_findings(run: Run, name: str, stated: Stated) -> list[Note]:
         message = f"{name} is constant at {present[0]:.6g} over {present.size} samples; check the sensor, or map another one"
         return [*found, Note("constant", message, {"signal": name, "value": float(present[0])})]
     if name in MEASURED and present.size > 20:
-        found += [*_frozen(name, run.time[seen], present), *_coarse(name, present), *_spikes(name, run.time[seen], present)]
+        still = np.diff(present) == 0.0
+        for other in PLACE & run.signals.keys() - {name} if name in PLACE else ():
+            still &= np.diff(run[other][seen]) == 0.0  # who goes due north has one east
+        found += [
+            *_frozen(name, run.time[seen], present, still),
+            *_coarse(name, present),
+            *_spikes(name, run.time[seen], present),
+        ]
     return found
 
 
@@ -80,9 +89,8 @@ def _size(run: Run, name: str, values: FloatArray, stated: Stated) -> list[Note]
     return found
 
 
-def _frozen(name: str, time: FloatArray, values: FloatArray) -> list[Note]:
-    """Return the finding that a sensor repeats one value for long, among values that otherwise change."""
-    same = np.diff(values) == 0.0
+def _frozen(name: str, time: FloatArray, values: FloatArray, same: BoolArray) -> list[Note]:
+    """Return the finding that a sensor repeats one value for long, by the `same` (n - 1,), among values that otherwise change."""
     if same.mean() > COARSE_LIMIT:
         return []
     starts, ends = blocks_of(same)

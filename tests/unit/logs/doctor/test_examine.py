@@ -279,6 +279,14 @@ def test_a_frozen_stretch_at_an_end_is_left_out_at_that_end(where, ways):
     assert [w for w in ("--to", "--from") if w in said] == ways
 
 
+def test_a_place_is_frozen_where_both_of_its_coordinates_are():
+    run = healthy()
+    east = changed(run, x_m=with_value(run["x_m"], slice(300, 360), run["x_m"][300]))
+    assert not {c for c in codes(east) if c[0] == "frozen"}
+    stopped = changed(east, y_m=with_value(run["y_m"], slice(300, 360), run["y_m"][300]))
+    assert {("frozen", "x_m"), ("frozen", "y_m")} <= codes(stopped)
+
+
 def test_a_sign_that_is_set_is_taken_back_and_stamps_are_named_where_they_were_chosen():
     run = healthy()
     against, astern = changed(run, yaw_rate_rad_s=-run["yaw_rate_rad_s"]), changed(run, surge_m_s=-run["surge_m_s"])
