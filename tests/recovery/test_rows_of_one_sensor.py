@@ -31,10 +31,13 @@ def told(angle_hz, rate_hz, *, every=0.8, angle_late=0.013, rate_late=0.017):
     return dict(zip(NAMES, (commands, (at, angle), (then, rate)), strict=True))
 
 
-def as_rows(signals, path):
-    """A table with a row for each reading, all other cells blank."""
+def as_rows(signals, path, *, is_filled=False):
+    """A table with a row for each reading, all other cells blank, or filled with the last number of their sensor."""
     rows = sorted((t, i, v) for i, track in enumerate(signals.values()) for t, v in zip(*track, strict=True))
-    cells = (f"{t:.6f}," + ",".join(f"{v:.9g}" if i == k else "" for k in range(len(signals))) for t, i, v in rows)
+    last, cells = [""] * len(signals), []
+    for t, i, v in rows:
+        last = [f"{v:.9g}" if i == k else (last[k] if is_filled else "") for k in range(len(signals))]
+        cells.append(f"{t:.6f}," + ",".join(last))
     path.write_text("\n".join([",".join(("time_s", *signals)), *cells]) + "\n")
     return load_run(path)
 
@@ -51,13 +54,14 @@ def fitted(run):
     return found.model.values["a22"], np.array(left) / (found.floor.angle, found.floor.rate)
 
 
-def test_a_row_for_each_reading_says_what_topics_say(tmp_path):
+@pytest.mark.parametrize("is_filled", [False, True])
+def test_a_row_for_each_reading_says_what_topics_say(tmp_path, is_filled):
     signals = told(10, 10)
-    run = as_rows(signals, tmp_path / "rows.csv")
+    run = as_rows(signals, tmp_path / "rows.csv", is_filled=is_filled)
     damping, left = fitted(run)
     assert damping == pytest.approx(DAMPING, rel=5e-3)
     np.testing.assert_allclose(left, 1.0, atol=0.08)
-    assert {n.code for n in run.notes} <= {"clock", "constant"}
+    assert {n.code for n in run.notes} <= {"clock", "constant", *(["repeated"] if is_filled else [])}
     topics = as_topics(signals)
     for name in topics.signals:
         np.testing.assert_allclose(run[name], topics[name], atol=1e-7, err_msg=name)

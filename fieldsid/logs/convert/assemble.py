@@ -15,13 +15,13 @@ from fieldsid.logs.convert.clock import ANGLES_AND_RATES, Track, one_clock, summ
 from fieldsid.logs.convert.conditioning import MAX_GAP_S, in_order, possible, refuse_impossible_steps, refuse_long_gaps
 from fieldsid.logs.convert.faults.dropouts import SENSED, without_dropouts
 from fieldsid.logs.convert.faults.heading_fills import without_fills
-from fieldsid.logs.convert.faults.repeats import without_repeats
+from fieldsid.logs.convert.faults.repeats import measured_anew, note_on_repeats, without_repeats
 from fieldsid.logs.convert.frames import SWAPPED_BY_WORLD, about_level, angles_of_quaternion, north_and_east, to_ned_frd
 from fieldsid.logs.convert.heading_unwrap import unwrapped_over
 from fieldsid.logs.convert.servo_counts import counts_unit, turned_from_counts
 from fieldsid.logs.convert.units import DEGREE, depth_of_pressure, factor_to, pick_unit, scaled
 from fieldsid.logs.reader import RawLog, ReadOptions, Series
-from fieldsid.logs.run import COLUMNS, PART, Note, Run, signal_of
+from fieldsid.logs.run import COLUMNS, COMMANDS, FINS, PART, Note, Run, signal_of
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 WHOLE = (-np.inf, np.inf)
@@ -37,6 +37,8 @@ ON_BASE_ROWS = 0.5
 
 Below it the table has a separate row for each reading of a sensor.
 """
+FIN_MOVES = 0.1
+"""Smallest share of a measured fin's numbers that differ from the last at which it is repeated, and not at rest."""
 
 
 def assemble(
@@ -114,9 +116,9 @@ def _split_by_sensor(raw: RawLog) -> RawLog:
 
     Most cells of such a table are blank. A table with one row for all sensors also has blanks, where a sensor is slower or fails,
     but there the numbers of the slower sensor are in rows in which the faster one has a number too. In a table of separate rows
-    they are not, so that the times of the rows are the clock of no sensor.
+    they are not, so that the times of the rows are the clock of no sensor. The cells may be filled with the last number instead.
     """
-    seen = {signal: _rows_of(series) for signal, series in raw.series.items()}
+    seen = {signal: _rows_of(signal, series) for signal, series in raw.series.items()}
     filled = {signal: rows for signal, rows in seen.items() if rows.any()}
     if not raw.one_clock or not filled or all(rows.all() for rows in filled.values()):
         return raw
@@ -126,11 +128,21 @@ def _split_by_sensor(raw: RawLog) -> RawLog:
     series = {
         s: replace(raw.series[s], time=raw.series[s].time[rows], values=raw.series[s].values[rows]) for s, rows in filled.items()
     }
-    return replace(raw, series=series, one_clock=False)
+    numbers = {s: int(_numbers(raw.series[s]).sum()) for s in filled}
+    repeats = tuple(note_on_repeats(s, rows, numbers[s]) for s, rows in filled.items() if rows.sum() < numbers[s])
+    return replace(raw, series=series, notes=(*raw.notes, *repeats), one_clock=False)
 
 
-def _rows_of(series: Series) -> BoolArray:
-    """Return a mask (n,) of the rows in which a signal has a number."""
+def _rows_of(signal: str, series: Series) -> BoolArray:
+    """Return a mask (n,) of the rows in which a signal has a number, without those in which a measured one only repeats it."""
+    numbers = _numbers(series)
+    if signal_of(signal) in COMMANDS:
+        return numbers
+    own = measured_anew(series.values)
+    return numbers if signal_of(signal) in FINS and own.sum() < FIN_MOVES * numbers.sum() else own
+
+
+def _numbers(series: Series) -> BoolArray:
     return np.asarray(np.isfinite(series.values.reshape(series.time.size, -1)).all(axis=1))
 
 

@@ -10,10 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.run import Note
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 FEWEST = 10
 """Smallest number of changes from which the sensor's interval is estimated."""
+DIGITS = 1.5
+"""Smallest ratio of the median change to the smallest one at which a sensor that measures anew seldom repeats a number."""
 
 
 def without_repeats(name: str, values: FloatArray) -> tuple[FloatArray, list[Note]]:
@@ -22,7 +24,8 @@ def without_repeats(name: str, values: FloatArray) -> tuple[FloatArray, list[Not
     changed = np.flatnonzero(np.diff(values[seen]) != 0.0)
     every = _rows_per_measurement(changed)
     if every == 1:
-        return values, []
+        own = measured_anew(values)
+        return (values, []) if own[seen].all() else (np.where(own, values, np.nan), [note_on_repeats(name, own, seen.size)])
     measured = np.full(values.shape, np.nan)
     fresh = seen[(changed[0] + 1) % every :: every]
     measured[fresh] = values[fresh]
@@ -44,3 +47,30 @@ def _rows_per_measurement(changed: npt.NDArray[np.intp]) -> int:
     apart = np.diff(changed)
     every = int(np.gcd.reduce(apart))
     return every if every == int(np.median(apart)) else 1
+
+
+def measured_anew(values: FloatArray) -> BoolArray:
+    """Return a mask of the rows (n,) in which a sensor has a number, or several (n, k), without those that it repeats by turns.
+
+    A table that is written at each message repeats the other sensors, now once and now several times. Most changes are then more
+    than a row apart, though they are larger than the last digit. Of a sensor that stops, with its vehicle or by a fault, most
+    changes follow on each other, and of one with few digits most are by the last digit: those keep all rows.
+    """
+    columns = values.reshape(len(values), -1)
+    rows = np.asarray(np.isfinite(columns).all(axis=1))
+    steps = np.abs(np.diff(columns[rows], axis=0)).max(axis=1, initial=0.0)
+    changed = np.flatnonzero(steps)
+    if changed.size < FEWEST or _rows_per_measurement(changed) > 1 or float(np.median(np.diff(changed))) < 2.0:
+        return rows
+    if float(np.median(steps[changed])) > DIGITS * float(steps[changed].min()):
+        rows[rows] = np.append(True, steps > 0.0)
+    return rows
+
+
+def note_on_repeats(name: str, own: BoolArray, seen: int) -> Note:
+    """Return the note that of the `seen` samples of a signal only its `own` (n,) were measured."""
+    message = (
+        f"{name} was measured at {100 * own.sum() / seen:.0f} % of its samples only ({own.sum()}), and repeated until the next, "
+        "as in a table that is written at each message; the repeats are missing now"
+    )
+    return Note("repeated", message, {"signal": name, "count": int(own.sum())})

@@ -29,7 +29,8 @@ def test_a_number_that_comes_twice_is_a_sample_of_its_own():
     assert np.isfinite(own).sum() == held.size // 5
 
 
-OWN = (MOVING, np.round(MOVING, 1), np.repeat(MOVING[:40], 15)[::7], np.zeros(600), np.full(600, np.nan))
+STOPPED = np.concatenate((np.round(MOVING[:200], 4), np.full(400, 0.5)))
+OWN = (MOVING, np.round(MOVING, 1), STOPPED, np.zeros(600), np.full(600, np.nan))
 
 
 @pytest.mark.parametrize("values", OWN)
@@ -37,3 +38,13 @@ def test_a_signal_of_its_own_rate_is_left_as_it_is(values):
     own, notes = without_repeats("yaw_rad", values)
     assert not notes
     assert own is values
+
+
+def test_of_a_number_that_is_repeated_now_and_then_the_first_sample_stays():
+    fresh = np.flatnonzero(np.random.default_rng(5).random(600) < 0.3)
+    at = np.searchsorted(fresh, np.arange(600), side="right") - 1
+    held = np.where(at < 0, np.nan, np.round(MOVING, 4)[fresh[at]])
+    own, (note,) = without_repeats("yaw_rad", held)
+    assert set(np.flatnonzero(np.isfinite(own))) >= set(fresh[np.append(True, np.diff(held[fresh]) != 0.0)])
+    assert np.isfinite(own).sum() == note.data["count"] <= fresh.size
+    assert note.code == "repeated"
