@@ -154,4 +154,6 @@ def _counts_turns(note: Note, signals: Mapping[str, Any], run: Run) -> bool:
 
 
 def _evidence(signals: list[str], what: str, note: Note) -> Note:
-    return Note("evidence", f"{signals[0]} is taken with {what}: {note.message}", {"signal": signals[0], "finding": note.code})
+    """Return the note on a correction with what the finding saw, without its advice, which is followed now."""
+    seen = note.message.partition(": ")[0]
+    return Note("evidence", f"{signals[0]} is taken with {what}: {seen}", {"signal": signals[0], "finding": note.code})

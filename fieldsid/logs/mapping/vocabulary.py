@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from fieldsid.logs.run import GOALS
+from fieldsid.logs.run import FINS, GOALS
 
 TIME = "time_s"
 LATITUDE, LONGITUDE = "latitude", "longitude"
@@ -188,7 +188,7 @@ def as_command_or_measurement(signal: str, sure: int, words: set[str]) -> tuple[
     """Return the signal, its command or its measurement, by the words of a name, and its score; None where it is no signal."""
     if COMMANDED & words:
         return (
-            (AS_COMMANDED[signal], sure + (AS_COMMANDED[signal] in GOALS and "next" not in words))
+            (AS_COMMANDED[signal], sure + (AS_COMMANDED[signal] in GOALS.union(FINS) and "next" not in words))
             if signal in AS_COMMANDED
             else None
         )

@@ -60,7 +60,7 @@ def fin_reading(values: FloatArray) -> Reading | None:
         return as_counts(servo)
     if largest > LARGEST_DEG:
         return None
-    return Reading({"unit": "deg"}, DEGREE) if largest > LARGEST["rudder_rad"][0] else Reading({"unit": "rad"})
+    return Reading({"unit": "deg"}, DEGREE) if largest > LARGEST["rudder_rad"][0] else Reading({})
 
 
 def in_radians(values: FloatArray, unit: str | None = None) -> FloatArray:

@@ -60,3 +60,33 @@ def test_a_set_or_ordered_rudder_is_the_command_and_its_position_the_measurement
     columns = {"time": TRUTH["time_s"], "heading": np.degrees(TRUTH["yaw_rad"]), angle: fin, command: fin}
     signals = inspect_log(write_table(tmp_path / "log.csv", columns)).proposal.body["signals"]
     assert (signals["rudder_rad"]["column"], signals["rudder_measured_rad"]["column"]) == (command, angle)
+
+
+@pytest.mark.parametrize("command", ["rudder_cmd", "Rudder Order"])
+def test_of_two_rudders_the_one_that_is_called_a_command_is_it(tmp_path, command):
+    fin = np.degrees(TRUTH["rudder_rad"])
+    columns = {"time": TRUTH["time_s"], "heading": np.degrees(TRUTH["yaw_rad"]), "Rudder Angle": fin, command: fin}
+    signals = inspect_log(write_table(tmp_path / "log.csv", columns)).proposal.body["signals"]
+    assert signals["rudder_rad"]["column"] == command
+
+
+def test_a_fin_without_a_unit_that_is_known_by_numbers_has_one_that_is_assumed(tmp_path):
+    columns = {"t": TRUTH["time_s"], "psi": TRUTH["yaw_rad"], "r": TRUTH["yaw_rate_rad_s"], "helm": 2.0 * TRUTH["rudder_rad"]}
+    proposal = inspect_log(write_table(tmp_path / "log.csv", columns)).proposal
+    assert proposal.body["signals"]["rudder_rad"] == {"column": "helm"}
+    (assumed,) = (n for n in proposal.notes if n.code == "unit_assumed")
+    assert "rudder_rad from `helm` in rad" in assumed.message
+
+
+def test_a_correction_that_is_made_says_what_was_seen_and_not_what_to_set(tmp_path):
+    minutes = 60.0 * np.degrees(TRUTH["yaw_rate_rad_s"])
+    columns = {
+        "time": TRUTH["time_s"],
+        "HDG": np.degrees(TRUTH["yaw_rad"]) + 180.0,
+        "ROT": minutes,
+        "Rudder": TRUTH["rudder_rad"],
+    }
+    proposal = inspect_log(write_table(tmp_path / "log.csv", columns)).proposal
+    assert proposal.body["signals"]["yaw_rate_rad_s"]["unit"] == "deg/min"
+    (why,) = (n.message for n in proposal.notes if n.data.get("signal") == "yaw_rate_rad_s" and n.code == "evidence")
+    assert why.endswith("as numbers in deg/min are")
