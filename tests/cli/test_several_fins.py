@@ -87,9 +87,17 @@ def test_thrusters_make_the_yaw_command_and_the_thrust(brought):
     assert [e["scale"] for e in signals["thrust"]["sum"]] == [0.5, 0.5]
 
 
+def test_thrusters_in_shares_of_one_are_not_converted(run_cli, tmp_path):
+    parts = {"thruster_left": made.of(0.5 + made.RUDDER), "thruster_right": made.of(0.5 - made.RUDDER)}
+    log = made.table(tmp_path / "x.csv", {"time_s": made.of(made.TIME), **made.angles(made.motion(made.RUDDER)), **parts})
+    _, record = imported(run_cli, log, tmp_path)
+    assert [e["scale"] > 0.0 for e in record["mapping"]["signals"]["rudder_rad"]["sum"]] == [False, True]
+    assert all("unit" not in e for e in record["mapping"]["signals"]["rudder_rad"]["sum"])
+
+
 def test_of_many_outputs_the_one_that_turns_the_vehicle_is_named(brought):
     _, _, record = brought(made.ulog_tables)
-    assert record["mapping"]["signals"]["rudder_rad"] == {"topic": "actuator_outputs_0", "field": "output[2]", "unit": "rad"}
+    assert record["mapping"]["signals"]["rudder_rad"] == {"topic": "actuator_outputs_0", "field": "output[2]"}
 
 
 def test_a_fin_of_another_share_keeps_it(run_cli, tmp_path):

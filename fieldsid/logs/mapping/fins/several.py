@@ -211,7 +211,7 @@ def _conversion(names: list[str], unit: str | None, values: FloatArray) -> Readi
     if unit is not None:
         return Reading({}, pick_unit(unit).factor)
     fin = fin_reading(values)
-    if all(map(is_thruster, names)) and (fin is None or fin.item["unit"] != COUNTS):
+    if all(map(is_thruster, names)) and (fin is None or fin.item.get("unit") != COUNTS):
         return Reading({})
     centre = float(round(np.nanmedian(values)))
     return fin or as_counts(Servo("counts", centre, float(np.nanmax(np.abs(values - centre))), 0.0, 0.0))
