@@ -212,11 +212,13 @@ class _Problem:
     ) -> Fitted:
         """Return the fit from a start vector and start nuisances `local` of the runs, by default their prior means.
 
-        keep_noise: the noise is not estimated.
+        keep_noise: the noise is not estimated. Else that of the start vector is its upper limit: its residuals show that the
+        equations follow each channel so far, and a channel they then follow less would be weighted, and followed, ever less.
         """
         local = [cut.first for cut in self.cuts] if local is None else list(local)
         damping = 1e-2
         cost = self._cost(vector, local, noise)
+        largest = noise if keep_noise else self._noise(vector, local)
         for _ in range(MAX_ITERATIONS):
             parts = [_normal(cut, vector, own, noise) for cut, own in zip(self.cuts, local, strict=True)]
             precision = self.prior.precision(vector)
@@ -233,7 +235,7 @@ class _Problem:
                     break
                 damping *= 6.0
             small = before - cost < (START_TOLERANCE if keep_noise else TOLERANCE)
-            updated = noise if keep_noise else self._noise(vector, local)
+            updated = noise if keep_noise else np.minimum(self._noise(vector, local), largest)
             steady = bool(np.all(np.abs(np.log(updated / noise)) < 0.05))
             noise = updated
             cost = self._cost(vector, local, noise)
