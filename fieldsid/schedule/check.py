@@ -19,6 +19,9 @@ from fieldsid.schedule.search.objective import Outcome
 class StepCheck(Brief):
     """The response to a step of one size (rad): overshoot as a share of the step, settling time in s (5 %).
 
+    Of the steps to both sides it is the later one, with the worst of both in the other numbers: a trim takes from the fin's reach
+    to one side, and a saturated fin overshoots less.
+
     `..._most` is the worst over 95 % of the draws. Overshoot and settling of a draw are relative to its steady state; `off` (rad)
     is the steady error, from the error of the trim, worst over 95 % of the draws. `settling_median` and `settling95` (s) are the
     median and the 95 % band of the draws: settling jumps by half a period where an overshoot just leaves the corridor. `swing` is

@@ -21,6 +21,7 @@ from fieldsid.schedule.flown.response import (
     LIMIT_CYCLE_SHARE,
     LONGER,
     SETTLING_BAND,
+    SIDES,
     Flight,
     Pace,
     Steps,
@@ -184,11 +185,11 @@ def plants_behind(schedule: Schedule, source: ParameterSource, runs: Sequence[Ru
 
 
 def promised_step(schedule: Schedule, of: Plants, speed: float, size: float) -> StepCheck:
-    """Return the check of one step (rad) at one speed (m/s), as in a verification."""
+    """Return the check of one step (rad, negative to the negative side) at one speed (m/s), as in a verification."""
     limit = schedule.at(speed).fin_limit
     plant = of.family_at(speed, limit, VERIFY_DRAWS, SEED)
     flown = _flown_to_rest(plant, schedule.rows, size, pace_of(plant, limit, schedule.wish.step_of(schedule.axis)))
-    return _without_unsupported(_step(flown, size), flown, plant, of.tightest_flown)
+    return _without_unsupported(_step(flown, abs(size)), flown, plant, of.tightest_flown)
 
 
 def steps_of(schedule: Schedule) -> tuple[float, float, float]:
@@ -229,9 +230,8 @@ def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) ->
     phase, gain, delay = (float(part[0]) for part in (found.phase_deg, found.gain_db, found.delay_s))
     least_phase, least_gain, least_delay = found.worst()
     sizes = steps_of(schedule)
-    flights = [_flown_to_rest(plant, rows, size, pace) for size in sizes]
-    small, usual, large = (_step(s, size) for s, size in zip(flights, sizes, strict=True))
-    large = _without_unsupported(large, flights[2], plant, flight.curvature)
+    (small, usual, large), flights, others = zip(*(_to_both_sides(plant, rows, size, pace) for size in sizes), strict=True)
+    large = _without_unsupported(large, max(flights[2], others[2], key=tightest), plant, flight.curvature)
     compensated = [replace(r, feed_forward=r.feed_forward - FIN_OFFSET_RAD) for r in rows]
     one = plant.one()
     bent, unknown = (fly(one, r, Flight(pace.flight, pace.step, offset=FIN_OFFSET_RAD)) for r in (compensated, rows))
@@ -240,7 +240,7 @@ def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) ->
     check = Check(
         row.speed, flight.knot, row.supported, constant, phase, gain, delay, least_phase, least_gain, least_delay,
         int(np.sum(found.phase_deg < 0.0)),
-        (small, usual, large), float(np.min(flights[2].speed[:, 0])),
+        (small, usual, large), float(min(np.min(flown.speed[:, 0]) for flown in (flights[2], others[2]))),
         float(steady_error(bent.angle, 0.0)[0]), float(steady_error(unknown.angle, 0.0)[0]),
         float(np.std(leg.angle[:, 0])), float(np.std(leg.fin[:, 0])), depth_over, depth_settled, pace.leg,
         flight.place.outcome(row.gains),
@@ -248,14 +248,30 @@ def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) ->
     return check, (flights[0].one(), flights[1].one(), flights[2].one()), leg
 
 
+def _to_both_sides(plant: LinearPlant, rows: Sequence[Row], size: float, pace: Pace) -> tuple[StepCheck, Steps, Steps]:
+    """Return the check of a step, and its flights to the side on which it settles later and to the other one."""
+    flights = [_flown_to_rest(plant, rows, sign * size, pace) for sign in SIDES]
+    sides = sorted(
+        ((_step(flown, size), flown) for flown in flights), key=lambda side: (side[0].settling, side[0].off), reverse=True
+    )
+    (later, late), (other, early) = sides
+    worse = {
+        n: max(getattr(later, n), getattr(other, n)) for n in ("overshoot", "overshoot_most", "settling_most", "swing", "off")
+    }
+    return replace(later, **worse), late, early
+
+
 def _flown_to_rest(plant: LinearPlant, rows: Sequence[Row], size: float, pace: Pace) -> Steps:
-    """Return the simulation of a step, repeated over a longer time if it has not settled, as a slow loop then does."""
+    """Return the simulation of a step, mirrored where `size` (rad) is negative.
+
+    It is repeated over a longer time if it has not settled, as a slow loop then does.
+    """
     for times in LONGER:
         flight = fly(plant, rows, Flight(times * pace.flight, pace.step, reference=size))
         has_settled = np.isfinite(settling(flight.time, flight.angle[:, :1], size)[0])
         if has_settled and worst_of(swing(flight.angle, size), most=True) <= AT_REST_SHARE:
             break
-    return flight
+    return flight.mirrored() if size < 0.0 else flight
 
 
 def _step(flown: Steps, size: float) -> StepCheck:

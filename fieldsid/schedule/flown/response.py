@@ -8,7 +8,7 @@ slower and faster ones both are longer or shorter in the same proportion.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate
 
 import numpy as np
@@ -23,6 +23,8 @@ from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.record import Row
 from fieldsid.turning.steady.transient import LEAST_SURGE_M_S
 
+SIDES = (1.0, -1.0)
+"""The signs of the steps that are simulated: a trim leaves less of the fin to one side than to the other."""
 STEP_S, FLIGHT_S = 0.02, 60.0
 SLOWEST_RAD_S, QUICKEST_RAD_S = 25.0 / FLIGHT_S, 2.0
 """Bandwidths of the full fin: below the first 60 s are less than 25/w, above the second a step of 0.02 s is too coarse."""
@@ -111,6 +113,10 @@ class Steps(Brief):
     def one(self) -> Steps:
         """Return the first case only."""
         return Steps(self.time, self.angle[:, :1], self.fin[:, :1], self.depth[:, :1], self.speed[:, :1])
+
+    def mirrored(self) -> Steps:
+        """Return the responses with angle and fin of the other sign."""
+        return replace(self, angle=-self.angle, fin=-self.fin)
 
 
 def overshoot(values: FloatArray, size: float) -> FloatArray:

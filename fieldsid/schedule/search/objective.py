@@ -25,6 +25,7 @@ from fieldsid.schedule.flown.response import (
     FLIGHT_ERROR_SHARE,
     LIMIT_CYCLE_SHARE,
     SETTLING_BAND,
+    SIDES,
     Flight,
     Pace,
     about_rest,
@@ -206,19 +207,22 @@ class Place:
             return Outcome(tuple(own), tuple(drawn), inf, fin, kp)
         time, angle = self.step(gains)
         about = about_rest(angle, demand.step)
-        own[4] = max(float(overshoot(angle, demand.step)[0]) - demand.own_overshoot, 0.0)
-        drawn[1] = _of_draws(overshoot(about, demand.step) - demand.draws_overshoot)
-        drawn[2] = _of_draws(swing(angle, demand.step) - LIMIT_CYCLE_SHARE)
-        settled = smooth_settling(time, about, demand.step)
-        settled[0] = smooth_settling(time, angle[:, :1], demand.step)[0]  # its trim is known: its steady error counts
+        own[4] = max(float(overshoot(angle[..., 0], demand.step).max()) - demand.own_overshoot, 0.0)
+        drawn[1] = _of_draws(overshoot(about, demand.step).max(axis=0) - demand.draws_overshoot)
+        drawn[2] = _of_draws(swing(angle, demand.step).max(axis=0) - LIMIT_CYCLE_SHARE)
+        about[..., 0] = angle[..., 0]  # its trim is known: its steady error counts
+        settled = smooth_settling(time, about, demand.step).max(axis=0)
         return Outcome(tuple(own), tuple(drawn), max(float(settled[0]), worst_of(settled, most=True)), fin, kp)
 
     def step(self, gains: Gains) -> tuple[FloatArray, FloatArray]:
-        """Return time (t,) s and angle (t, d) rad of the simulated step; the feed-forward cancels the trim of the estimate."""
+        """Return time (t,) s and angle (t, 2, d) rad of the simulated step to both sides, that to the negative one mirrored.
+
+        The feed-forward cancels the trim of the estimate, and leaves less of the fin to one side than to the other.
+        """
         plant, demand = self.plant, self.demand
         row = Row(plant.speed, gains, -float(plant.offset[0]), plant.reference_gain, demand.fin_limit)
-        steps = fly(plant, (row,), Flight(demand.pace.flight, demand.pace.step, reference=demand.step))
-        return steps.time, steps.angle
+        sides = [fly(plant, (row,), Flight(demand.pace.flight, demand.pace.step, reference=s * demand.step)) for s in SIDES]
+        return sides[0].time, np.stack([s * steps.angle for s, steps in zip(SIDES, sides, strict=True)], axis=1)
 
     def draws_served(self, gains: Gains) -> tuple[float, float]:
         """Return the share of the draws that meet the requirements on draws, and the settling time (s) of 95 % of the draws."""
@@ -229,7 +233,8 @@ class Place:
         )
         required = (DRAWS_MARGIN_SHARE - 2.0 * ROUNDING) * demand.phase_margin_deg
         has_margin = margins(self.plant, gains).phase_deg >= required
-        return float(np.mean(rests & has_margin)), worst_of(settling(time, about, demand.step), most=True)
+        settled = settling(time, about, demand.step).max(axis=0)
+        return float(np.mean(rests.all(axis=0) & has_margin)), worst_of(settled, most=True)
 
 
 def smooth_settling(time: FloatArray, values: FloatArray, size: float) -> FloatArray:

@@ -9,7 +9,7 @@ import pytest
 from fieldsid.plant.parameter_source import load_parameter_source
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.verdict import Gate, against_constant, verdict_of
-from fieldsid.schedule.verify import verify_schedule
+from fieldsid.schedule.verify import plants_behind, promised_step, verify_schedule
 from fieldsid.schedule.wish import Wish
 
 LIMIT = 0.26
@@ -43,6 +43,24 @@ def test_a_small_step_that_stays_off_is_no_schedule_that_holds(tmp_path):
     verdict, says = verdict_of(checked, schedule, ())
     assert verdict == "does not hold"
     assert re.match(r"at 1\.45 m/s a 2 deg step is not within 5 % after \d+ s: it is still 0\.\d+ deg off", says)
+
+
+@pytest.mark.parametrize("kind", ["pd", "pid"])
+def test_a_fin_off_to_one_side_is_designed_and_verified_as_one_off_to_the_other(kind, tmp_path):
+    """Its trim takes from the fin on one side, where a large step is slower; on the other a PID overshoots more."""
+    (tmp_path / "other").mkdir()
+    checks, promised = [], []
+    for folder, trim in ((tmp_path, 0.045), (tmp_path / "other", -0.045)):
+        source = source_of(folder, f"speed_m_s,a22,b2,C0\n1.0,0.8,-0.6,{trim}\n")
+        schedule = design_schedule(source, LIMIT, wish=Wish(kind))
+        checks.append(verify_schedule(schedule, source, draws=1).scheduled[0])
+        of = plants_behind(schedule, source, ())
+        promised.append([promised_step(schedule, of, 1.0, side * 1.5708).settling for side in (1.0, -1.0)])
+    one, other = ([number for s in check.steps for number in (s.overshoot, s.settling, s.off)] for check in checks)
+    assert one == pytest.approx(other)
+    assert promised[0] == pytest.approx(promised[1][::-1])
+    assert checks[0].steps[2].settling == pytest.approx(max(promised[0]), rel=1e-3)
+    assert max(promised[0]) > 1.2 * min(promised[0])
 
 
 def test_a_gate_that_fails_by_little_shows_that_it_does():
