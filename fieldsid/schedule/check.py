@@ -22,11 +22,12 @@ class StepCheck(Brief):
     Of the steps to both sides it is the later one, with the worst of both in the other numbers: a trim takes from the fin's reach
     to one side, and a saturated fin overshoots less.
 
-    `..._most` is the worst over 95 % of the draws. Overshoot and settling of a draw are relative to its steady state; `off` (rad)
-    is the steady error, from the error of the trim, worst over 95 % of the draws. `settling_median` and `settling95` (s) are the
-    median and the 95 % band of the draws: settling jumps by half a period where an overshoot just leaves the corridor. `swing` is
-    the peak-to-peak oscillation in the last quarter of the flight as a share of the step, worst over 95 % of the draws; `flown`
-    (s) is the simulated time. Overshoot and settling are NaN where the data do not support them (`_without_unsupported`).
+    `..._most` is the worst over 95 % of the draws. Overshoot and settling of a draw are relative to its steady state, without an
+    integral; `off` (rad) is the error at the end, of the trim or of an integral that is not done, worst over 95 % of the draws.
+    `settling_median` and `settling95` (s) are the median and the 95 % band of the draws: settling jumps by half a period where an
+    overshoot just leaves the corridor. `swing` is the peak-to-peak oscillation in the last quarter of the flight as a share of
+    the step, worst over 95 % of the draws; `flown` (s) is the simulated time. Overshoot and settling are NaN where the data do
+    not support them (`_without_unsupported`).
     """
 
     size: Annotated[float, Key("Its size.", "step_rad")]
@@ -44,7 +45,8 @@ class StepCheck(Brief):
     off: Annotated[
         Number,
         Key(
-            "How far from what was asked it comes to rest, by 95 % of the draws: the error of the trim.", "steady_error_most_rad"
+            "How far off it ends by 95 % of the draws: the error of the trim, or what an integral has yet to take up.",
+            "steady_error_most_rad",
         ),
     ]
     flown: Annotated[Number, Key("How long it was flown.", "flown_s")]

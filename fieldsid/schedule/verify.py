@@ -15,7 +15,7 @@ from fieldsid.models.model import Noise
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.runtime.parallel_map import parallel_map
 from fieldsid.schedule.check import READ_OFF, Check, StepCheck
-from fieldsid.schedule.controller import HELD_SHARE, margins, worst_of
+from fieldsid.schedule.controller import HELD_SHARE, Gains, margins, worst_of
 from fieldsid.schedule.flown.response import (
     FLIGHT_ERROR_SHARE,
     LIMIT_CYCLE_SHARE,
@@ -189,7 +189,7 @@ def promised_step(schedule: Schedule, of: Plants, speed: float, size: float) -> 
     limit = schedule.at(speed).fin_limit
     plant = of.family_at(speed, limit, VERIFY_DRAWS, SEED)
     flown = _flown_to_rest(plant, schedule.rows, size, pace_of(plant, limit, schedule.wish.step_of(schedule.axis)))
-    return _without_unsupported(_step(flown, abs(size)), flown, plant, of.tightest_flown)
+    return _without_unsupported(_step(flown, abs(size), schedule.rows[0].gains), flown, plant, of.tightest_flown)
 
 
 def steps_of(schedule: Schedule) -> tuple[float, float, float]:
@@ -252,7 +252,9 @@ def _to_both_sides(plant: LinearPlant, rows: Sequence[Row], size: float, pace: P
     """Return the check of a step, and its flights to the side on which it settles later and to the other one."""
     flights = [_flown_to_rest(plant, rows, sign * size, pace) for sign in SIDES]
     sides = sorted(
-        ((_step(flown, size), flown) for flown in flights), key=lambda side: (side[0].settling, side[0].off), reverse=True
+        ((_step(flown, size, rows[0].gains), flown) for flown in flights),
+        key=lambda side: (side[0].settling, side[0].off),
+        reverse=True,
     )
     (later, late), (other, early) = sides
     worse = {
@@ -274,8 +276,8 @@ def _flown_to_rest(plant: LinearPlant, rows: Sequence[Row], size: float, pace: P
     return flight.mirrored() if size < 0.0 else flight
 
 
-def _step(flown: Steps, size: float) -> StepCheck:
-    about, off = about_rest(flown.angle, size), np.abs(steady_error(flown.angle, size))
+def _step(flown: Steps, size: float, gains: Gains) -> StepCheck:
+    about, off = about_rest(flown.angle, size, gains), np.abs(steady_error(flown.angle, size))
     over, oscillation = overshoot(about, size), swing(flown.angle, size)
     settled, wide, narrow = (
         np.where(off < size, settling(flown.time, about, size, band), np.inf)

@@ -58,7 +58,7 @@ def blocks_of(found: Verification) -> Iterator[Block | str]:
         yield Whole(against_constant(found))
     bent, unknown = max(abs(c.bent_error) for c in checks), max(abs(c.bent_error_unknown) for c in checks)
     yield f"a fin 3 deg off: steady error {degrees(bent):.2f} deg with the feed-forward, {degrees(unknown):.2f} deg without"
-    if found.spread:
+    if found.spread and not found.schedule.rows[0].gains.ki:  # an integral leaves no error of the trim
         off = degrees(max(c.steps[1].off for c in checks))
         yield f"the trim is known so far that a straight course is held to {off:.2f} deg by 95 % of the draws"
     if found.disturbance > 0:

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from fieldsid.display import Brief
 from fieldsid.models.model import Noise
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.flown.closed_loop_kernel import MOTION, Plants, close_loop
 from fieldsid.schedule.flown.hull_kernel import close_hull_loop
 from fieldsid.schedule.linear_plant import LinearPlant
@@ -146,8 +147,13 @@ def tightest(steps: Steps) -> float:
     return float(np.max(turned / np.maximum(steps.speed[width:, 0], LEAST_SURGE_M_S)))
 
 
-def about_rest(values: FloatArray, size: float) -> FloatArray:
-    """Return steps (t, n) of `size` shifted by their steady errors, so that an error of the trim does not count as motion."""
+def about_rest(values: FloatArray, size: float, gains: Gains) -> FloatArray:
+    """Return steps (t, n) of `size` shifted by their steady errors, so that an error of the trim does not count as motion.
+
+    Under an integral they are returned as they are: the trim leaves no error, and what is left is the integral's own tail.
+    """
+    if gains.ki != 0.0:
+        return values.copy()
     final = size - steady_error(values, size)
     return np.asarray(values + np.where(np.isfinite(final), size - final, 0.0))
 

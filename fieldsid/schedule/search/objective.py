@@ -206,7 +206,7 @@ class Place:
         if sum(own) > ROUNDING:
             return Outcome(tuple(own), tuple(drawn), inf, fin, kp)
         time, angle = self.step(gains)
-        about = about_rest(angle, demand.step)
+        about = about_rest(angle, demand.step, gains)
         own[4] = max(float(overshoot(angle[..., 0], demand.step).max()) - demand.own_overshoot, 0.0)
         drawn[1] = _of_draws(overshoot(about, demand.step).max(axis=0) - demand.draws_overshoot)
         drawn[2] = _of_draws(swing(angle, demand.step).max(axis=0) - LIMIT_CYCLE_SHARE)
@@ -227,7 +227,7 @@ class Place:
     def draws_served(self, gains: Gains) -> tuple[float, float]:
         """Return the share of the draws that meet the requirements on draws, and the settling time (s) of 95 % of the draws."""
         time, angle = self.step(gains)
-        demand, about = self.demand, about_rest(angle, self.demand.step)
+        demand, about = self.demand, about_rest(angle, self.demand.step, gains)
         rests = (overshoot(about, demand.step) <= demand.draws_overshoot + ROUNDING) & (
             swing(angle, demand.step) <= LIMIT_CYCLE_SHARE + ROUNDING
         )

@@ -115,7 +115,7 @@ def test_overshoot_step_and_share_of_the_fin_are_kept():
     assert max(made.column("fin_use")) == pytest.approx(0.6, abs=2e-3)
     assert abs(made.rows[0].gains.kp) * 0.5 == pytest.approx(0.6 * LIMIT, rel=2e-3)
     for place, row in zip(places(source, made), made.rows, strict=True):
-        assert overshoot(place.step(row.gains)[1], 0.5).max() < 0.022
+        assert overshoot(place.step(row.gains)[1][..., 0], 0.5).max() < 0.022
 
 
 def test_what_was_asked_comes_back_from_the_file_and_a_file_from_before_is_the_quickest(tmp_path):
