@@ -117,7 +117,7 @@ def _compared_step(schedule: Schedule, of: Plants, run: Run, start: int, end: in
         settling=float(settling(time, moved, abs(size), band)[0]),
         steady_error=float(steady_error(moved, abs(size))[0]),
     )
-    promised = promised_step(schedule, of, speed, size)
+    promised = promised_step(schedule, of, speed, size, float(time[-1]))
     return KeptStep(run.name, float(run.time[start]), float(time[-1]), speed, size, flown, noise, promised)
 
 

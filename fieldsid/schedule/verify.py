@@ -184,12 +184,17 @@ def plants_behind(schedule: Schedule, source: ParameterSource, runs: Sequence[Ru
     return plants_of(source, limits, runs, schedule.provenance.get("length_m"))
 
 
-def promised_step(schedule: Schedule, of: Plants, speed: float, size: float) -> StepCheck:
-    """Return the check of one step (rad, negative to the negative side) at one speed (m/s), as in a verification."""
+def promised_step(schedule: Schedule, of: Plants, speed: float, size: float, held: float) -> StepCheck:
+    """Return the check of one step (rad, negative to the negative side) at one speed (m/s), as in a verification.
+
+    Its error at the end is that after `held` s, when an integral may have some left.
+    """
     limit = schedule.at(speed).fin_limit
     plant = of.family_at(speed, limit, VERIFY_DRAWS, SEED)
     flown = _flown_to_rest(plant, schedule.rows, size, pace_of(plant, limit, schedule.wish.step_of(schedule.axis)))
-    return _without_unsupported(_step(flown, abs(size), schedule.rows[0].gains), flown, plant, of.tightest_flown)
+    off = np.abs(steady_error(flown.angle[flown.time <= held], abs(size)))
+    step = replace(_step(flown, abs(size), schedule.rows[0].gains), off=worst_of(off, most=True))
+    return _without_unsupported(step, flown, plant, of.tightest_flown)
 
 
 def steps_of(schedule: Schedule) -> tuple[float, float, float]:
