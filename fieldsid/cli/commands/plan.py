@@ -89,7 +89,7 @@ def command(
 
     The best of the catalogue and of optimised switching signals is flown by hundreds of draws of the prior;
     each leg says the standard error of every parameter, minutes, metres and the risk. With `-o` the plan, fin
-    commands, mission snippets and a figure are written. Every limit is printed, NOT LIMITED where there is none. With
+    commands about trim, mission snippets and a figure are written. Every limit is printed, NOT LIMITED where there is none. With
     `--separate` or `--from` there is one leg at every speed, the maneuver that tells the effects apart best.
 
     Example: sysid plan --axis yaw --speeds 1.0,1.4,1.8 --want a22=5%,b2=3% --area 200x60 -o plan

@@ -226,7 +226,7 @@ def limits_said(envelope: Envelope) -> dict[str, str]:
         return NOT_LIMITED if value is None else f"{said(value)}{per}"
 
     return {
-        "fin": angle(envelope.fin),
+        "fin": angle(envelope.fin, " about trim"),
         "fin rate": angle(fin_rate, " per s"),
         "heading": angle(envelope.heading),
         "track": NOT_LIMITED if envelope.track is None else f"{envelope.track:g} m to either side",
