@@ -20,6 +20,7 @@ from fieldsid.schedule.linear_plant import FinLimits, not_counted, plants_at
 from fieldsid.schedule.plants import Plants, models_plants, plants_of
 from fieldsid.schedule.record import Answer, Schedule
 from fieldsid.schedule.rows import DESIGN_DRAWS, SEED, design_rows
+from fieldsid.schedule.verify import PITCH_LIMIT_RAD
 from fieldsid.schedule.wish import PROPORTIONAL, Wish, check_wish
 
 FIN = {Axis.YAW: "rudder", Axis.PITCH: "elevator"}
@@ -81,7 +82,9 @@ def design_schedule(
         depth=depth,
         rows=rows,
         actuator=plants.actuator,
-        provenance=_provenance(plants, wish, knots) | {"belief_refused": refused, "length_m": length} | _fins_entry(fins),
+        provenance=_provenance(plants, wish, knots, depth=depth)
+        | {"belief_refused": refused, "length_m": length}
+        | _fins_entry(fins),
         stated=body_of(limits),
         notes=() if plants.note is None else (plants.note,),
         answer=Answer(answer, wish.step_of(source.axis), wish.settling, wish.bandwidth, wish.overshoot, wish.fin_use),
@@ -122,7 +125,7 @@ def _refuse_offsets(source: ParameterSource, knots: Sequence[float], fin_limit: 
     )
 
 
-def _provenance(plants: Plants, wish: Wish, knots: Sequence[float]) -> dict[str, Any]:
+def _provenance(plants: Plants, wish: Wish, knots: Sequence[float], *, depth: bool) -> dict[str, Any]:
     source = plants.source
     names = NAMES[source.axis]
     sign = float(np.sign(source.base_at(float(source.speeds[0]))[names.authority]))
@@ -143,7 +146,8 @@ def _provenance(plants: Plants, wish: Wish, knots: Sequence[float]) -> dict[str,
         "supported_m_s": [low, high],
         "sign_convention": f"{TURNS[source.axis, sign]}; angles rad, NED, body forward-starboard-down",
         "law": f"{FIN[source.axis]} = kp (ref - {source.axis.value}) + ki int(ref - {source.axis.value}) dt - kd rate "
-        "+ feed_forward + reference_gain ref, limited to +/- fin_limit",
+        "+ feed_forward + reference_gain ref, limited to +/- fin_limit"
+        + (f"; ref = depth_gain (depth - wanted depth), limited to +/- {PITCH_LIMIT_RAD:.3g} rad" if depth else ""),
         "wished": {"controller": wish.kind, "damping_ratio": wish.damped, "phase_margin_deg": wish.phase_margin_deg},
     }
 

@@ -314,6 +314,7 @@ def test_feed_forward_removes_the_error_of_a_bent_fin_and_its_absence_leaves_it(
 
 def test_depth_through_pitch_settles_without_overshoot_to_speak_of(pitch):
     schedule = design_schedule(pitch, 0.26, wish=Wish(kind="pd"), depth=True)
+    assert schedule.provenance["law"].endswith("; ref = depth_gain (depth - wanted depth), limited to +/- 0.349 rad")
     own = plants_at(pitch, 1.67, FinLimits(0.2), 1, 0)[0][0]
     steps = fly(own, schedule.rows[2:3], Flight(120.0, depth=2.0, pitch_limit=0.35))
     assert steps.depth[-1, 0] == pytest.approx(2.0, abs=0.1)
