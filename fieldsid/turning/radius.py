@@ -138,6 +138,8 @@ def _formula_rows(
             coverage = _reach(source, speed, rudder, float(turn.yaw_rate_max[0]), float(turn.time[0]) / 2)
             spread = model_error((), coverage, formula=method == "u_turn").factors(draws, SEED)
             found = _found(coverage, radius, spread, turn.time, float(radius[0]))
+            if any(model.effects for model in source.models):
+                found["of_model"] = np.nan  # the model turns by its effects too
             rows.append(
                 predicted_row(
                     float(speed), side, rudder, **found, method=method, steady_radius=float(turn.steady_radius[0]),
@@ -276,6 +278,10 @@ def _notes(
         )
     if method in ("simulated", "maneuvering") and (surge is None or not surge.surge_measured):
         notes.append(Note("surge_not_measured", "no surge in the runs: the loss of speed in a turn is taken as 15 % (5 .. 50 %)"))
+    shaping = sorted({e.name for m in source.models for e in effects_of(m) if e.extra_states or e.limits_rate})
+    if method in ("u_turn", "steady") and shaping:
+        words = "the formula has damping and authority alone: in it and its band is nothing of "
+        notes.append(Note("effects_not_in_formula", f"{words}{', '.join(shaping)}, by which the models turn as well"))
     if method == "u_turn":
         notes += _offset_notes(source, fin_zero)
     return [*notes, *source.notes]

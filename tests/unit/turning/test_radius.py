@@ -63,6 +63,16 @@ def test_effects_are_simulated_and_the_steady_circle_is_the_radius(tmp_path):
     assert np.isfinite([row.advance, row.transfer, row.tactical_diameter]).all()
 
 
+@pytest.mark.parametrize("method", ["u_turn", "steady"])
+def test_a_formula_says_what_of_the_model_is_not_in_it_and_is_not_called_the_models_own(method, tmp_path):
+    found = turn_radius(source_of(tmp_path, FULL), [1.5], 0.3, method=method)
+    assert all(np.isnan(row.of_model) for row in found.rows)
+    assert any(n.code == "effects_not_in_formula" and "quadratic_damping" in n.message for n in found.notes)
+    plain = turn_radius(source_of(tmp_path, FULL, effects=()), [1.5], 0.3, method=method)
+    assert all(row.of_model > 0.0 for row in plain.rows)
+    assert "effects_not_in_formula" not in {n.code for n in plain.notes}
+
+
 def test_a_fit_file_turns_as_its_models_do(tmp_path):
     paths = []
     for speed in (1.0, 2.0):
