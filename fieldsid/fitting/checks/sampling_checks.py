@@ -31,13 +31,13 @@ from fieldsid.models.record import Record
 INTERVAL_STD_ERRORS = 2.0
 """Half the width of a 95 % interval."""
 MAX_UNEXPLAINED = 0.1
-"""Largest rms error beyond the noise, as a share of the motion: the unknown times of commands leave 0.06 of a glider's heading."""
+"""Largest rms error beyond the noise, as a share of the motion: the unknown times of commands leave 0.06 of a glider's turns."""
 
 
 def sampling_findings(model: Model, records: Sequence[Record], merit: GoodnessOfFit, floor: Noise) -> tuple[Note, ...]:
     """Return the finding that the unknown time of the command between samples changes the damping by more than its error.
 
-    merit: the model's fit to the records. Raises DataError where the sampling of no run distinguishes the time constant from zero.
+    merit: the model's fit to the records. Raises DataError where the sampling of no run tells the time constant from zero.
     """
     has_slower_pole = any(e.extra_states or any(c.unit == "s" for c in e.shared) for e in effects_of(model))
     if has_slower_pole or not _follows_motion(merit, floor):

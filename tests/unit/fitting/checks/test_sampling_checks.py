@@ -101,7 +101,7 @@ def test_a_model_with_slower_poles_than_the_hulls_is_not_asked(effects, asked):
 
 
 def test_no_sampling_is_blamed_where_the_clock_of_the_fin_is_off():
-    """The rate shows each pulse 0.15 s before the fin does: no damping explains it, and the one at its bound is not the hull's."""
+    """The rate shows each pulse 0.15 s before the fin does: no damping explains it, and that at its bound is not the hull's."""
     time = FINE_S * np.arange(1200)
     fin = 0.2 * np.sign(np.sin(2.0 * np.pi * time / 6.0)) * (time > 3.0)
     rate = np.zeros(time.size)
