@@ -132,7 +132,10 @@ class Canonical(NamedTuple):
 
 
 def canonical(column: str) -> Canonical | None:
-    """Return the signal and unit that a column name states; None where it is not a canonical name."""
+    """Return the signal and unit that a column name states; None where it is not a canonical name.
+
+    `yaw_degs` is none: it may be a heading in degrees or a rate in deg/s.
+    """
     name = column.strip().lower()
     if name in ("thrust", "thrust_ratio"):
         return Canonical(name, "1")
@@ -141,7 +144,7 @@ def canonical(column: str) -> Canonical | None:
     for at in (found.start() for found in re.finditer("_", name)):
         signal, spelled = {**STEMS, "time": TIME}.get(name[:at], ""), name[at + 1 :].replace("_", "/")
         units = [SPELLINGS[d][spelled] for d in fitting(signal) if spelled in SPELLINGS[d] and spelled in ALL_UNITS]
-        if units:
+        if units and not any(spelled in SPELLINGS[change] for change, of in OF_CHANGES.items() if of == units[0].dimension):
             return Canonical(signal, units[0].name)
     return None
 

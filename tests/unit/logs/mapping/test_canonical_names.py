@@ -32,7 +32,9 @@ def test_a_suffix_states_the_unit(name, signal, unit):
     assert canonical(name) == (signal, unit)
 
 
-@pytest.mark.parametrize("name", ["yaw", "heading_deg", "yaw_m", "x_deg", "time", "time_deg", "", "_", "yaw_rate", "surge_dbar"])
+@pytest.mark.parametrize(
+    "name", ["yaw", "yaw_degs", "heading_deg", "yaw_m", "x_deg", "time", "time_deg", "", "_", "yaw_rate", "surge_dbar"]
+)
 def test_other_names_are_not_canonical(name):
     assert canonical(name) is None
 
