@@ -53,7 +53,7 @@ class StepCheck(Brief):
 
     @property
     def said(self) -> Annotated[bool, Key()]:
-        """Whether overshoot and settling are said; not those of a large step of an unstable hull that no run turned as tight."""
+        """Whether overshoot and settling are said; not where the fin cannot hold it, nor of an unstable hull in a tight turn."""
         return not np.isnan(self.settling)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import degrees
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,8 @@ from fieldsid.schedule.verify import PITCH_LIMIT_RAD
 from fieldsid.schedule.wish import PROPORTIONAL, Wish, check_wish
 
 FIN = {Axis.YAW: "rudder", Axis.PITCH: "elevator"}
+HELD_STEP_SHARE = 0.8
+"""Share of the steady fin beyond trim that a smaller step may use: the rest moves the vehicle there."""
 TURNS = {
     (Axis.YAW, 1.0): "positive rudder turns to starboard (b2 > 0)",
     (Axis.YAW, -1.0): "positive rudder turns to port (b2 < 0)",
@@ -64,7 +67,7 @@ def design_schedule(
             hint=f"write `--fin-max {fins.reach:.4g}`, or leave it out",
         )
     source.require(knots)
-    _refuse_offsets(source, knots, fin_limit, limits)
+    _refuse_fin_too_small(source, knots, fin_limit, limits, wish.step_of(source.axis))
     plants, refused = plants_of(source, limits, runs, length), False
     try:
         rows, answer = design_rows(plants, knots, wish, fin_limit, depth=depth)
@@ -111,13 +114,25 @@ def _knots(source: ParameterSource, speeds: Sequence[float]) -> list[float]:
     return knots
 
 
-def _refuse_offsets(source: ParameterSource, knots: Sequence[float], fin_limit: float, limits: FinLimits) -> None:
-    """Raise UsageError where the fin limit is below the largest offset over the speeds."""
+def _refuse_fin_too_small(
+    source: ParameterSource, knots: Sequence[float], fin_limit: float, limits: FinLimits, step: float
+) -> None:  # fmt: skip
+    """Raise UsageError where the fin limit is below the offset, or below what holds a pitch of `step` rad beside it."""
     plants = {speed: plants_at(source, speed, limits, 1, 0) for speed in knots}
     offsets = {speed: sum(share * float(plant.offset[0]) for plant, share in at) for speed, at in plants.items()}
-    speed = max(offsets, key=lambda s: abs(offsets[s]))
-    if abs(offsets[speed]) < fin_limit:
+    gains = {speed: abs(sum(share * plant.reference_gain for plant, share in at)) for speed, at in plants.items()}
+    speed = max(knots, key=lambda s: abs(offsets[s]) + gains[s] * step)
+    held = abs(offsets[speed]) + gains[speed] * step
+    if held < fin_limit:
         return
+    if abs(offsets[speed]) < fin_limit:
+        possible = degrees(HELD_STEP_SHARE * (fin_limit - abs(offsets[speed])) / gains[speed])
+        raise UsageError(
+            f"the fin cannot hold a step of {degrees(step):.3g} deg at {speed:.3g} m/s to both sides",
+            found=f"limit {fin_limit:.4g} rad; {held:.4g} rad against stiffness and trim",
+            hint=f"ask a smaller step, `--step {possible:.2g}deg`, or leave slow speeds out, `--speeds`",
+        )
+    speed = max(offsets, key=lambda s: abs(offsets[s]))
     raise UsageError(
         f"the fin limit is below the offset at {speed:.3g} m/s: holding a straight run would take the whole {FIN[source.axis]}",
         found=f"limit {fin_limit:.4g} rad, offset {NAMES[source.axis].trim_fin} = {offsets[speed]:.4g} rad",

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import degrees, inf, isfinite
 from typing import Annotated
 
+from fieldsid.models.axis import Axis
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.records.keys import Key, Number
 from fieldsid.rounding import number, number_against
@@ -74,7 +75,8 @@ def verdict_of(checked: Verification, schedule: Schedule, gates: tuple[Gate, ...
 
 def _settles(checked: Verification, step: float) -> str:
     """Return the longest settling time of a step (deg) over the speeds in words, of the estimate and of the draws."""
-    slowest, latest = max(c.settling for c in checked.scheduled), max(c.settling_most for c in checked.scheduled)
+    slowest = max(c.settling for c in checked.scheduled)
+    latest = max(slowest, *(c.settling_most for c in checked.scheduled))  # a draw is measured to where it comes to rest
     most, longest = f"{100 * HELD_SHARE:.0f} % of the draws", f"{_longest(checked):.0f} s"
     by_draws = f"within {latest:.1f} s by {most}" if isfinite(latest) else f"by fewer than {most} within {longest}"
     return f"a {step:.0f} deg step settles within {slowest:.1f} s at every speed" + (f", {by_draws}" if checked.spread else "")
@@ -183,6 +185,7 @@ def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource)
             disturbance,
             *([UNSTABLE] if checked.unstable else []),
             *_extrapolated(checked),
+            *_beyond_fin(checked),
             *ignored_effects(source),
         )
     )
@@ -199,6 +202,15 @@ def _extrapolated(checked: Verification) -> list[str]:
     large = f"a {degrees(steps_of(checked.schedule)[2]):.0f} deg step"
     why = "the hull alone is unstable, and what its fin does against such a turn was not measured"
     return [f"{step}: {why}; how {large} settles is not said (`-`) until a turn that tight is flown"]
+
+
+def _beyond_fin(checked: Verification) -> list[str]:
+    """Return a sentence on the speeds at which the fin cannot hold the large step of pitch; empty without such."""
+    if checked.schedule.axis is not Axis.PITCH or not checked.unsaid:
+        return []
+    speeds = [c.speed for c in checked.scheduled if not c.steps[2].said]
+    where = " .. ".join(number(speed, 3) for speed in dict.fromkeys((min(speeds), max(speeds))))
+    return [f"a {degrees(steps_of(checked.schedule)[2]):.0f} deg step takes more than the fin at {where} m/s: not said (`-`)"]
 
 
 def fin_of(actuator: Mapping[str, float | None]) -> str:

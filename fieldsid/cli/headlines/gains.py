@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import isfinite
+from math import degrees, inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from fieldsid.cli.headlines.words import first_names, next_use
 from fieldsid.cli.voice import angles
 from fieldsid.page import counted
 from fieldsid.rounding import MANY, number, with_error
+from fieldsid.schedule.wish import QUICKEST, STEP_ANGLE_RAD
 from fieldsid.trial_folder.journal import is_trial
 from fieldsid.views._words import times
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from fieldsid.models.model import Model
     from fieldsid.results.gains import Design, Exported, Patched, Verified
     from fieldsid.results.turning import FittedLaws
+    from fieldsid.schedule.record import Schedule
     from fieldsid.turning.prediction import TurnPrediction
 
 TARGET = "ros2"
@@ -89,19 +91,43 @@ def headline_of_design(result: Design, models: Sequence[Path], caveat: str = "")
     return Headline(f"{caveat}kp {kp}, {schedule.kind}; {margin}", rests, next_)
 
 
-def headline_of_verification(result: Verified, schedule: Path, models: Sequence[Path]) -> Headline:
-    """Return the verdict on the gains; gains that fail need more data where their margin is wide, else a wider margin."""
+def headline_of_verification(result: Verified, schedule: Path, known: Schedule, models: Sequence[Path]) -> Headline:
+    """Return the verdict on the gains; those that fail need rows between, more data where their margin is wide, else margin."""
     says, rests = f"{result.verdict}: {result.says}", result.rests_on.removeprefix("rests on ")
     if result.verdict in ("holds", "passed") and result.passed:
         out = Path(f"{schedule.stem}_{TARGET}.yaml")
         return Headline(says, rests, pasted("schedule", "export", schedule, "--to", TARGET, "-o", out))
+    by_size = ([c for c in result.scheduled if c.steps[i].settling == inf] for i in range(3))
+    unsettled = next((checks for checks in by_size if checks), [])  # of the smallest step that fails, as in the verdict
+    if unsettled and not any(c.knot for c in unsettled):
+        speeds = ",".join(number(u, 3) for u in sorted(c.speed for c in result.scheduled if c.knot or c in unsettled))
+        closer = schedule.with_name(f"{schedule.stem}_closer.yaml")
+        return Headline(
+            says, rests, pasted("schedule", "design", models, *_designed_with(known), "--speeds", speeds, "-o", closer)
+        )
     redesigned = schedule.with_name(f"{schedule.stem}_slower.yaml")
     required = (g.wanted for g in result.gates if g.name == "phase_margin_deg" and not g.passed)
     margin = max(required, default=WIDE_MARGIN)
     if isfinite(result.worst["phase_margin_deg"]) and result.worst["phase_margin_deg"] >= margin:
         to = () if is_trial(Path()) else ("-o", "plan")
         return Headline(says, rests, pasted("plan", "--axis", result.axis.value, "--model", models[0], *to))
-    return Headline(says, rests, pasted("schedule", "design", models, "--phase-margin", f"{margin:g}", "-o", redesigned))
+    wider = ("--phase-margin", f"{margin:g}", "-o", redesigned)
+    return Headline(says, rests, pasted("schedule", "design", models, *_designed_with(known), *wider))
+
+
+def _designed_with(schedule: Schedule) -> list[str]:
+    """Return the options of a design that differ from the defaults, without those of rows and phase margin."""
+    wish, step = schedule.wish, schedule.wish.step_of(schedule.axis)
+    stated = {
+        "--controller": None if wish.kind == "pd" else wish.kind,
+        "--step": None if step == STEP_ANGLE_RAD[schedule.axis] else f"{degrees(step):.3g}deg",
+        "--settling": None if wish.settling is None else f"{wish.settling:g}s" if wish.settling > QUICKEST else "quickest",
+        "--bandwidth": None if wish.bandwidth is None else f"{wish.bandwidth:g}rad/s",
+        "--overshoot": None if wish.overshoot is None else f"{100.0 * wish.overshoot:g}%",
+        "--fin-use": None if wish.fin_use is None else f"{100.0 * wish.fin_use:g}%",
+        "--fin-max": None if is_trial(Path()) else f"{max(schedule.column('fin_limit_rad')):.6g}",
+    }
+    return [word for option, value in stated.items() if value is not None for word in (option, value)]
 
 
 def headline_of_export(result: Exported, schedule: Path) -> Headline:

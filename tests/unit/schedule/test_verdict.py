@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from math import radians
 
 import pytest
 
+from fieldsid.errors import UsageError
 from fieldsid.plant.parameter_source import load_parameter_source
 from fieldsid.schedule.make import design_schedule
-from fieldsid.schedule.verdict import Gate, against_constant, verdict_of
+from fieldsid.schedule.verdict import Gate, against_constant, rests_on, verdict_of
 from fieldsid.schedule.verify import plants_behind, promised_step, verify_schedule
 from fieldsid.schedule.wish import Wish
 
@@ -80,3 +82,29 @@ def test_a_gate_that_fails_by_little_shows_that_it_does():
     gate = Gate("phase_margin_deg", 45.0, 44.98, 1.4, at_least=True)
     assert not gate.passed
     assert gate.says == "phase_margin_deg 44.98 at 1.40 m/s, wanted at least 45"
+
+
+WEAK = "1.0,1.2,0.5,-0.4,0.03\n1.4,1.7,0.5,-0.8,0.03\n1.8,2.2,0.5,-1.3,0.03\n"
+"""A pitch with a stiffness against which the fin is weak at the slowest speed."""
+
+
+def test_a_step_that_the_fin_cannot_hold_to_both_sides_is_refused_with_one_that_it_can(tmp_path):
+    source = source_of(tmp_path, f"speed_m_s,c22,c23,d2,Cb\n{WEAK}")
+    with pytest.raises(UsageError, match="cannot hold a step of 10 deg at 1 m/s to both sides") as refused:
+        design_schedule(source, 0.2, wish=Wish("pd"))
+    assert refused.value.found == "limit 0.2 rad; 0.2932 rad against stiffness and trim"
+    (step,) = re.findall(r"`--step ([\d.]+)deg`", refused.value.hint)
+    schedule = design_schedule(source, 0.2, wish=Wish("pd", step=radians(float(step))))
+    assert all(row.draws_held == pytest.approx(1.0) for row in schedule.rows)
+    assert abs(schedule.rows[0].gains.kp) > 0.1
+
+
+def test_a_large_step_that_the_fin_cannot_hold_is_not_said_and_is_no_fault(tmp_path):
+    source = source_of(tmp_path, f"speed_m_s,c22,c23,d2,Cb\n{WEAK}")
+    schedule = design_schedule(source, 0.2, speeds=[1.0, 1.1, 1.25, 1.4, 1.6, 1.8], wish=Wish("pd", step=radians(4.0)))
+    checked = verify_schedule(schedule, source, draws=8)
+    assert [c.steps[2].said for c in checked.scheduled if c.knot] == [False, False, False, False, True, True]
+    assert verdict_of(checked, schedule, ())[0] == "holds"
+    assert re.search(
+        r"a 20 deg step takes more than the fin at 1\.00 \.\. 1\.[45]\d* m/s: not said", rests_on(checked, schedule, source)
+    )
