@@ -56,7 +56,7 @@ def measured_anew(values: FloatArray) -> BoolArray:
     than a row apart, though they are larger than the last digit. Of a sensor that stops, with its vehicle or by a fault, most
     changes follow on each other, and of one with few digits most are by the last digit: those keep all rows.
     """
-    columns = values.reshape(len(values), -1)
+    columns = values if values.ndim > 1 else values[:, None]
     rows = np.asarray(np.isfinite(columns).all(axis=1))
     steps = np.abs(np.diff(columns[rows], axis=0)).max(axis=1, initial=0.0)
     changed = np.flatnonzero(steps)
