@@ -39,7 +39,7 @@ def figure(schedule: Schedule, verification: Verification) -> Figure:
     for at, (size, ax) in enumerate(zip(steps_of(schedule), steps, strict=True)):
         draw_steps([(f.speed, f.scheduled[at], f.constant[at]) for f in verification.flown], size, until, ax)
     steps[0].set_title(
-        f"steps with the {schedule.kind} schedule; thin: one constant gain, kp = {verification.constant_row.gains.kp:.3g}",
+        f"{schedule.kind}, steps to the later side; thin: one constant gain, kp = {verification.constant_row.gains.kp:.3g}",
         loc="left", fontsize=10,
     )  # fmt: skip
     draw_fin(schedule, [(f.speed, f.scheduled[1], f.scheduled[2]) for f in verification.flown], until, fin)
