@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 import shutil
+from pathlib import Path
 
 import pytest
 from cli import trial
 from walk import Walk
 
-from fieldsid.demo.vehicle import flown, hidden_vehicle, training_maneuver
+from fieldsid.demo.steps import PLAN
+from fieldsid.demo.trial import make_trial
+from fieldsid.demo.vehicle import SPEED, flown, hidden_vehicle, training_maneuver
 from fieldsid.logs import load_run, save_run
 from fieldsid.models.axis import Axis
+from fieldsid.planning.output.plan_file import load_plan
 
 LAG = ("servo_lag", {"lag": 0.35})
 DEGREES = 57.29577951308232
@@ -83,6 +89,29 @@ def test_the_logs_of_the_tour(trial_with, tmp_path):
     runs = [flown(model, training_maneuver(model), speed, seed) for seed, speed in enumerate((1.0, 1.2, 1.4, 1.8), 1848)]
     walk = trial_with(*(foreign(save_run(r, tmp_path / f"learn_{i}.parquet")) for i, r in enumerate(runs)))
     walk.until_done()
+
+
+@pytest.mark.slow
+def test_the_morning_of_the_readme_says_what_it_said_on_the_logs_of_the_tour(run_cli, trial_with, tmp_path):
+    assert run_cli("plan", *PLAN.line.format(plan=tmp_path / "plan", speeds=SPEED, axis="yaw").split()[1:]).code == 0
+    (leg,) = load_plan(tmp_path / "plan/plan.yaml").legs
+    logs = make_trial(hidden_vehicle("servo_lag"), tmp_path / "flown", leg)
+    trial_with(*logs.train, *logs.check)
+    stated = re.sub("max_rad: .*", "max_rad: 0.26", Path("vehicle.yaml").read_text())
+    Path("vehicle.yaml").write_text(re.sub("fin_rate_rad_s: .*", "fin_rate_rad_s: 1.5", stated))
+    assert run_cli("inspect", "logs/learn_1.4.csv", "--write-mapping", "mapping.yaml", "--force").code == 0
+    assert run_cli("import").code == 0
+    morning = (Path(__file__).resolve().parents[2] / "README.md").read_text().split("## A morning")[1].split("```")[1]
+    lines = [re.split(r"\s{2,}", line) for line in morning.strip().splitlines()]
+    first = next(i for i, line in enumerate(lines) if line[0].startswith("sysid identify"))
+    quoted = 0
+    for line, *says in lines[first:]:
+        done = run_cli(*shlex.split(line)[1:])
+        assert done.code == 0, done.err
+        if says and re.search("[0-9]|kept:", says[0]) and not says[0].startswith("port"):
+            assert says[0] in " ".join(done.out.split())
+            quoted += 1
+    assert quoted == 4
 
 
 @pytest.mark.slow
