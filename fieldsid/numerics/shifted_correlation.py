@@ -49,19 +49,16 @@ def slope_of(a: FloatArray, b: FloatArray) -> tuple[float, float]:
 def lag_of(a: FloatArray, b: FloatArray, reach: int) -> tuple[float, float]:
     """Return the delay of a relative to b in (fractional) samples, up to reach, and the gain of correlation at that delay.
 
-    a, b: (n,) without gaps, n > reach.
+    a, b: (n,) without gaps, n > reach. Zeros where the correlation has no peak within reach.
     """
-    if reach < 1:
-        return 0.0, 0.0
     size = np.abs(shifted_correlations(a, b, reach))
     best = int(np.argmax(size))
-    gain = float(size[best] - size[reach])
-    shift = 0.0
-    if 0 < best < len(size) - 1:
-        left, middle, right = size[best - 1 : best + 2]
-        curvature = left - 2 * middle + right
-        shift = float(0.5 * (left - right) / curvature) if curvature != 0.0 else 0.0
-    return best - reach + shift, gain
+    if not 0 < best < len(size) - 1:
+        return 0.0, 0.0
+    left, middle, right = size[best - 1 : best + 2]
+    curvature = left - 2 * middle + right
+    shift = float(0.5 * (left - right) / curvature) if curvature != 0.0 else 0.0
+    return best - reach + shift, float(size[best] - size[reach])
 
 
 def _centred(values: FloatArray) -> FloatArray:

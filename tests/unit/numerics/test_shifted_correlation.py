@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fieldsid.numerics.shifted_correlation import BLOCK_SAMPLES, shifted_correlations
+from fieldsid.numerics.shifted_correlation import BLOCK_SAMPLES, lag_of, shifted_correlations
 
 
 def written_out(a, b, k):
@@ -26,3 +26,12 @@ def test_each_shift_is_the_correlation_of_what_both_have(count, reach):
 
 def test_a_constant_has_no_correlation():
     assert shifted_correlations(np.ones(100), np.arange(100.0), 3).tolist() == [0.0] * 7
+
+
+def test_a_delay_is_where_the_correlation_has_its_peak_and_none_where_it_still_rises():
+    values = np.convolve(np.random.default_rng(5).standard_normal(500), np.hanning(15), "same")
+    late, gain = lag_of(np.roll(values, 4), values, 20)
+    assert late == pytest.approx(4.0, abs=0.05)
+    assert gain > 0.1
+    assert lag_of(np.roll(values, 4), values, 3) == (0.0, 0.0)
+    assert lag_of(values, values, 0) == (0.0, 0.0)
