@@ -183,7 +183,7 @@ def test_gains_that_fail_between_their_rows_lead_to_closer_ones_that_hold(run_cl
     assert designed.code == 0, designed.err
     next_ = run_cli("schedule", "verify", "gains.yaml", "--json").json["headline"]["next"].split()
     assert next_[1:3] == ["schedule", "design"]
-    assert next_[4:10] == ["--step", "5deg", "--fin-max", "0.25", "--speeds", "1.00,1.20,1.40,1.80"]
+    assert next_[4:12] == [*asked, "--speeds", "1.00,1.20,1.40,1.80"]
     assert run_cli(*next_[1:]).code == 0
     assert run_cli("schedule", "verify", next_[-1], "--json").json["verdict"] == "holds"
 

@@ -119,7 +119,7 @@ def _designed_with(schedule: Schedule) -> list[str]:
     """Return the options of a design that differ from the defaults, without those of rows and phase margin."""
     wish, step = schedule.wish, schedule.wish.step_of(schedule.axis)
     stated = {
-        "--controller": None if wish.kind == "pd" else wish.kind,
+        "--controller": wish.kind,  # the default depends on the models
         "--step": None if step == STEP_ANGLE_RAD[schedule.axis] else f"{degrees(step):.3g}deg",
         "--settling": None if wish.settling is None else f"{wish.settling:g}s" if wish.settling > QUICKEST else "quickest",
         "--bandwidth": None if wish.bandwidth is None else f"{wish.bandwidth:g}rad/s",
