@@ -29,17 +29,14 @@ def believed_rows(
     """
     of_models = blended_radius(source, np.array(speeds, dtype=np.float64), rudder, surge)
     return [
-        _believed_row(
-            source, belief, belief.turn(float(speed), rudder, sign), float(of_models[side][i]), float(speed), side, rudder
-        )
-        for side, sign in SIDES.items()
+        _believed_row(source, belief, float(of_models[side][i]), float(speed), side, rudder)
+        for side in SIDES
         for i, speed in enumerate(speeds)
     ]
 
 
-def _believed_row(
-    source: ParameterSource, belief: Belief, turn: BelievedTurn, of_model: float, speed: float, side: str, rudder: float
-) -> TurnRow:
+def _believed_row(source: ParameterSource, belief: Belief, of_model: float, speed: float, side: str, rudder: float) -> TurnRow:
+    turn = belief.turn(speed, rudder, SIDES[side], of_model)
     if not np.isfinite(turn.radius):
         raise ModelError(
             f"no draw that the runs allow has a settled turn to {side} at {speed:.3g} m/s",

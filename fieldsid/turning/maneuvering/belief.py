@@ -6,6 +6,7 @@ ensemble and on the field vehicle (`FORM_LOG_SD`, `UNSEEN_LOG_SD`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -73,8 +74,12 @@ class Belief:
         """The runs of the fit."""
         return self.fitted.runs
 
-    def turn(self, entry: float, rudder: float, side: float) -> BelievedTurn:
-        """Return the turn to starboard (side +1) or port (-1) from a straight run at `entry` m/s at `rudder` rad."""
+    def turn(self, entry: float, rudder: float, side: float, of_models: float = math.nan) -> BelievedTurn:
+        """Return the turn to starboard (side +1) or port (-1) from a straight run at `entry` m/s at `rudder` rad.
+
+        `of_models` is the radius (m) by the identified models, NaN where they have none. Where the fit lies far from the prior
+        the equations may not describe the vehicle, and the logarithm of the ratio of both radii is added to the model error.
+        """
         fin = _steady_fin(self.models, entry, rudder, side)
         path, rate = settled_turns(self.posterior, entry, fin)
         radius = path / np.abs(rate)
@@ -85,6 +90,8 @@ class Belief:
         fin_covered = min(max(float(np.max(np.abs(r.fin))) for r in self.runs) / max(abs(fin), 1e-9), 1.0)
         effective = effective_draws(np.where(ok, log_radius, _median(log_radius)).reshape(self.posterior.chains.shape[:2]))
         model_error = FORM_LOG_SD + UNSEEN_LOG_SD * (1.0 - covered) + STALL_LOG_SD * (1.0 - fin_covered)
+        if not self.fitted.is_usual and np.isfinite(of_models):
+            model_error += abs(math.log(middle / of_models))
         sampling_error = float(np.std(log_radius[ok])) / np.sqrt(max(effective, 1.0)) if ok.any() else 0.0
         low, high = _band(log_radius[ok], float(np.hypot(model_error, sampling_error)))
         medians = _median(np.abs(rate[ok])), _median(path[ok])

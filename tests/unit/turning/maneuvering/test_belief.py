@@ -103,6 +103,20 @@ def test_few_effective_draws_and_a_fit_like_no_vehicle_are_not_identified(monkey
     assert "no vehicle" in " ".join(far.because)
 
 
+def test_the_band_of_a_fit_far_from_the_prior_holds_the_radius_of_the_models(monkeypatch, of_pulses):
+    """Of a hull without drift a circle that was not flown was said to be 4.26 to 5.03 m; it and its models had 3.85."""
+    hull, belief = of_pulses
+
+    def band(of_models):
+        return belief.turn(hull.speeds[0], hull.rudder_limit, 1.0, of_models).interval95
+
+    usual, far = band(float("nan")), 2.0 * band(float("nan"))[1]
+    assert band(far) == usual
+    monkeypatch.setattr("fieldsid.turning.maneuvering.fit.FARTHEST_COST", 0.0)
+    assert band(far)[1] > far
+    assert band(float("nan")) == usual
+
+
 def test_draws_worth_less_widen_the_band(monkeypatch, of_pulses):
     hull, belief = of_pulses
 
