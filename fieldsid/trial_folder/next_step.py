@@ -121,7 +121,8 @@ def _compare_trials(state: FolderState) -> tuple[str, str] | None:
         if not inner.models and line:
             return f"{side}: {why}", f"cd {shlex.quote(side)} && {line}"
     if len(state.sides) == 2 and not any(e.name == "compare" and set(state.sides) <= set(e.command) for e in state.entries):
-        return f"{' and '.join(state.sides)} have models", _line("compare", *state.sides)
+        why, line = f"{' and '.join(state.sides)} have models", _line("compare", *state.sides)
+        return (why, line) if is_trial(state.folder) else (f"{why}; no journal here says whether `{line}` was run", "")
     return _design_and_verify(state) or DONE_ALL
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import shutil
@@ -79,7 +80,10 @@ def test_before_and_after_are_two_trials_and_the_folder_they_lie_in_compares_the
         monkeypatch.chdir(tmp_path)
         walk.paste(walk.paste("sysid status"))
     monkeypatch.chdir(tmp_path)
-    assert walk.paste("sysid status") == "sysid compare before after"
+    assert walk.paste("sysid status") == "", "without a journal here it cannot tell whether they were compared already"
+    step = json.loads(run_cli("status", "--json").out)["next"]
+    assert "`sysid compare before after`" in step["why"]
+    assert run_cli("compare", "before", "after").code == 0
     assert not (tmp_path / "gains.yaml").exists()
 
 
