@@ -26,7 +26,7 @@ from fieldsid.models.effect import effect_named, with_variant
 from fieldsid.models.model import Noise
 from fieldsid.models.record import ROLES, Record
 from fieldsid.noise.fisher_scoring import score_of_innovations
-from fieldsid.noise.kalman.univariate import three_states, with_sensors, with_sensors_in_lanes
+from fieldsid.noise.kalman.univariate import kalman_filter
 from fieldsid.noise.maximum_likelihood import estimate_noise
 from fieldsid.noise.moment_response import base_responses
 from fieldsid.noise.sandwich_covariance import score_covariance, score_covariance_kernel
@@ -65,14 +65,14 @@ def _linear() -> None:
     levenberg_marquardt(problem, x, WHITE, max_iterations=1)
 
 
-def _estimate(noise_kind: str) -> None:
+def _estimate() -> None:
     record = a_record()
-    estimate_noise([record], [(1.0, 0.0)], [record.both], noise_kind, DISTURBED)
+    estimate_noise([record], [(1.0, 0.0)], [record.both], "disturbance", DISTURBED)
 
 
-def _whiten(noise: Noise) -> None:
+def _whiten() -> None:
     record = a_record()
-    whiten(record, noise, 1.0, 0.0, record.both[None])
+    whiten(record, replace(DISTURBED, own_moment=0.01), 1.0, 0.0, record.both[None])
 
 
 def _lag() -> None:
@@ -112,12 +112,10 @@ class WarmupJob:
 
 WARMUP_JOBS = (
     WarmupJob(_linear, (linear_sensitivities, linear_motion, accumulate_normal_equations)),
-    WarmupJob(lambda: _whiten(replace(DISTURBED, own_moment=0.01)), (three_states, base_responses)),
+    WarmupJob(_whiten, (kalman_filter, base_responses)),
     WarmupJob(_nonlinear, (nonlinear_sensitivities, nonlinear_motion)),
     WarmupJob(_lag, (first_order_lag, held_first_order_lag)),
-    WarmupJob(lambda: _estimate("disturbance"), (score_of_innovations,)),
-    WarmupJob(lambda: _whiten(replace(DISTURBED, coloured_rate=0.01)), (with_sensors,)),
-    WarmupJob(lambda: _estimate("both"), (with_sensors_in_lanes,)),
+    WarmupJob(_estimate, (score_of_innovations,)),
     WarmupJob(_sandwich, (score_covariance_kernel,)),
 )
 """The jobs that compile all kernels of a fit, in the order in which a fit needs them."""

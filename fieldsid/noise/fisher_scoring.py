@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.models.record import Record
-from fieldsid.noise.innovations import filter_of
-from fieldsid.noise.kalman.univariate import LANES, with_sensors_in_lanes
+from fieldsid.noise.kalman.univariate import kalman_filter
 from fieldsid.noise.noise_kinds import IS_STANDARD_DEVIATION
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
@@ -21,46 +20,20 @@ STEP_FACTOR, PER_STEP = float(np.exp(LOG_STEP)), 1.0 / LOG_STEP
 
 @dataclass(frozen=True, slots=True)
 class Innovations:
-    """The standardised innovations of a residual under a noise, their standard deviations, (2 n,) each, and the log likelihood.
-
-    `moved` holds both, (P, 2, n) each, with the logarithm of each noise parameter increased by LOG_STEP; None where it has not
-    been computed yet.
-    """
+    """The standardised innovations of a residual under a noise, their standard deviations, (2 n,) each; the log likelihood."""
 
     standardised: FloatArray
     innovation_std: FloatArray
     likelihood: float
-    moved: tuple[FloatArray, FloatArray] | None = None
 
 
-def innovations_of(
-    record: Record, a: float, k: float, noise: FloatArray, place: npt.NDArray[np.int64], residual: FloatArray
-) -> Innovations:
-    """Return the innovations of a residual (2, n) under a noise vector (7,) that acts on a base of damping a and stiffness k.
-
-    Where a disturbance and coloured sensor noise are both present, `moved` is computed in the same pass, for the parameters at
-    `place` (P,).
-    """
-    if place.size < noise.size:
-        standardised, innovation_std = np.empty((2, 1, *residual.shape))
-        series = np.ascontiguousarray(residual[None])
-        logs = filter_of(noise)(record.nominal_steps, record.ok, a, k, noise[None], series, standardised, innovation_std)
-        return _innovations(standardised[0], innovation_std[0], logs)
-    standardised, innovation_std = np.empty((2, LANES, *residual.shape))
-    noises = np.tile(noise, (LANES, 1))
-    noises[np.arange(1, place.size), place[1:]] *= STEP_FACTOR
+def innovations_of(record: Record, a: float, k: float, noise: FloatArray, residual: FloatArray) -> Innovations:
+    """Return the innovations of a residual (2, n) under a noise vector (7,) that acts on a base of damping a and stiffness k."""
+    standardised, innovation_std = np.empty((2, *residual.shape))
     series = np.ascontiguousarray(residual[None])
-    logs = with_sensors_in_lanes(record.nominal_steps, record.ok, a, k, noises, series, standardised, innovation_std)
-    # copies: `information` overwrites the first rows of `moved`
-    moved = standardised[: place.size], innovation_std[: place.size]
-    return _innovations(standardised[0].copy(), innovation_std[0].copy(), logs, moved)
-
-
-def _innovations(
-    standardised: FloatArray, innovation_std: FloatArray, logs: float, moved: tuple[FloatArray, FloatArray] | None = None
-) -> Innovations:
+    logs = kalman_filter(record.nominal_steps, record.ok, a, k, noise, series, standardised[None], innovation_std)
     e = standardised.ravel()
-    return Innovations(e, innovation_std.ravel(), -0.5 * (logs + float(e @ e)), moved)
+    return Innovations(e, innovation_std.ravel(), -0.5 * (logs + float(e @ e)))
 
 
 def information(
@@ -73,10 +46,10 @@ def information(
     standard deviations s:
         dl/dx = -sum(ds + e de),  F = sum(2 ds ds' + (de + e ds) (de' + e ds'))
     Where all standard deviations grow by one factor, the gains of the filter do not change: summed over the standard deviations,
-    the ds of a sample are 1 and the de are -e, which gives those of the first. The arrays `here.moved` are overwritten.
+    the ds of a sample are 1 and the de are -e, which gives those of the first.
     Source: Harvey 1989, Forecasting, structural time series models and the Kalman filter, section 3.4.5.
     """
-    standardised, innovation_std = here.moved or _with_increased_parameters(record, a, k, noise, place, residual)
+    standardised, innovation_std = _with_increased_parameters(record, a, k, noise, place, residual)
     d_innovations, d_log_std = standardised.reshape(place.size, -1), innovation_std.reshape(place.size, -1)
     score = score_of_innovations(
         record.ok.ravel(), here.standardised, 1.0 / here.innovation_std, IS_STANDARD_DEVIATION[place], d_innovations, d_log_std
@@ -88,13 +61,13 @@ def _with_increased_parameters(
     record: Record, a: float, k: float, noise: FloatArray, place: npt.NDArray[np.int64], residual: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return innovations and their standard deviations (P, 2, n) with each noise parameter but the first increased."""
-    series, kalman = np.ascontiguousarray(residual[None]), filter_of(noise)
-    standardised, innovation_std = np.empty((2, place.size, 1, *residual.shape))
+    series = np.ascontiguousarray(residual[None])
+    standardised, innovation_std = np.empty((2, place.size, *residual.shape))
     for row, p in enumerate(place.tolist()[1:], 1):
-        moved = noise[None].copy()
-        moved[0, p] *= STEP_FACTOR
-        kalman(record.nominal_steps, record.ok, a, k, moved, series, standardised[row], innovation_std[row])
-    return standardised[:, 0], innovation_std[:, 0]
+        moved = noise.copy()
+        moved[p] *= STEP_FACTOR
+        kalman_filter(record.nominal_steps, record.ok, a, k, moved, series, standardised[row][None], innovation_std[row])
+    return standardised, innovation_std
 
 
 @jit

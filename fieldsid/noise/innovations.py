@@ -7,16 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.noise.kalman.univariate import Filter, three_states, with_sensors
+from fieldsid.noise.kalman.univariate import kalman_filter
 from fieldsid.noise.noise_kinds import NOISE_KINDS, NoiseKind
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 KINDS = tuple((kind, kind.absent) for kind in NOISE_KINDS.values())
-
-
-def filter_of(noise: FloatArray) -> Filter:
-    """Return the filter of a noise vector (7,): with five states where it has a disturbance and coloured sensor noise."""
-    return with_sensors if noise[2] > 0.0 and noise[4] + noise[5] > 0.0 else three_states
 
 
 def kind_of(noise: FloatArray) -> NoiseKind:
@@ -32,4 +27,4 @@ def innovations(
 
     Samples that were not measured give zero. Returns the sum of the log variances.
     """
-    return filter_of(noise)(steps, ok, a, k, noise[None], series, out, np.empty((1, 2, steps.shape[0] + 1)))
+    return kalman_filter(steps, ok, a, k, noise, series, out, np.empty((2, steps.shape[0] + 1)))

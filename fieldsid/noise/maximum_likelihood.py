@@ -156,7 +156,7 @@ class _LogNoiseLikelihood:
         """
         count, noise = x.size, self.vector(x)
         runs = [(r, *base_dynamics(a, k), e) for r, (a, k), e in zip(self.records, self.dynamics, self.residuals, strict=True)]
-        here = [innovations_of(r, a, k, noise, self.place, e) for r, a, k, e in runs]
+        here = [innovations_of(r, a, k, noise, e) for r, a, k, e in runs]
         learned = sum(h.likelihood for h in here) if self.likelihood is None else self.likelihood(noise)
         total = learned + self.has_prior * _log_prior_at(x, self.place)
         if not (np.isfinite(total) and total >= least):

@@ -7,10 +7,10 @@ import numpy as np
 from fieldsid.dynamics.linear_kernel import linear_sensitivities
 from fieldsid.maneuvers import Autopilot, Limits, Schedule, all_maneuvers, fly
 from fieldsid.models.hull import CONSTANTS, DRIVES
-from fieldsid.noise.kalman.univariate import three_states
+from fieldsid.noise.kalman.univariate import kalman_filter
 from fieldsid.planning.flight.rule_flight import OperatingPointPlant, closed_loop
 
-SHARED_KERNELS = (linear_sensitivities, three_states)
+SHARED_KERNELS = (linear_sensitivities, kalman_filter)
 """The kernels of a fit that planning calls."""
 
 

@@ -10,7 +10,7 @@ from scipy.stats import norm
 
 from fieldsid.models.model import Noise
 from fieldsid.noise.innovations import innovations
-from fieldsid.noise.kalman.univariate import with_sensors
+from fieldsid.noise.kalman.univariate import kalman_filter
 from fieldsid.noise.noise_kinds import NOISE_FIELDS, NOISE_KINDS, NOISE_PARAMETERS
 
 NOISE = Noise(0.004, 0.006, 0.01, 1.3, 0.003, 0.005, 0.8)
@@ -34,7 +34,7 @@ def test_a_kind_is_filtered_as_the_noise_of_all_processes_without_the_others(nam
     logs = innovations(steps, ok, 0.7, 0.0, noise, series, own)
     # a sensor without any noise would have an infinite weight
     there = np.array([max(v, 1e-9) for v in noise])
-    assert logs == pytest.approx(with_sensors(steps, ok, 0.7, 0.0, there[None], series, full, np.empty((1, 2, 80))), rel=1e-6)
+    assert logs == pytest.approx(kalman_filter(steps, ok, 0.7, 0.0, there, series, full, np.empty((2, 80))), rel=1e-6)
     np.testing.assert_allclose(own, full, rtol=1e-5, atol=1e-7)
 
 

@@ -12,9 +12,8 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.noise.fisher_scoring import information, innovations_of
-from fieldsid.noise.innovations import filter_of
 from fieldsid.noise.kalman.transition import transition
-from fieldsid.noise.kalman.univariate import with_sensors_in_lanes
+from fieldsid.noise.kalman.univariate import kalman_filter
 from fieldsid.noise.maximum_likelihood import log_likelihood
 from fieldsid.noise.sandwich_covariance import score_covariance
 from fieldsid.noise.whiten import noise_vector, whiten
@@ -106,11 +105,11 @@ def test_innovations_have_the_products_and_determinant_of_the_dense_covariance(f
 @pytest.mark.parametrize("family", NOISES)
 def test_the_spreads_add_up_to_the_determinant_and_are_one_where_nothing_was_measured(family, log):
     noise = noise_vector(NOISES[family])
-    out, spreads = np.empty((2, 1, 2, len(log)))
-    logs = filter_of(noise)(log.nominal_steps, log.ok, A, K, noise[None], np.ones((1, 2, len(log))), out, spreads)
-    assert (spreads[0][~log.ok] == 1.0).all()
-    assert (out[0][~log.ok] == 0.0).all()
-    assert logs == pytest.approx(2.0 * float(np.log(spreads).sum()), rel=1e-12)
+    out, spread = np.empty((2, 2, len(log)))
+    logs = kalman_filter(log.nominal_steps, log.ok, A, K, noise, np.ones((1, 2, len(log))), out[None], spread)
+    assert (spread[~log.ok] == 1.0).all()
+    assert (out[~log.ok] == 0.0).all()
+    assert logs == pytest.approx(2.0 * float(np.log(spread).sum()), rel=1e-12)
 
 
 @pytest.mark.parametrize("family", NOISES)
@@ -118,9 +117,9 @@ def test_a_compiled_filter_gives_the_numbers_of_its_python_source(family):
     log, noise = settled_record(gaps=True), noise_vector(NOISES[family])
     series = np.random.default_rng(8).standard_normal((2, 2, len(log)))
     found = []
-    for kalman in (filter_of(noise), plain_of(filter_of(noise))):
-        out, spreads = np.empty_like(series), np.empty((1, 2, len(log)))
-        found.append((kalman(log.nominal_steps, log.ok, A, K, noise[None], series, out, spreads), out, spreads))
+    for kalman in (kalman_filter, plain_of(kalman_filter)):
+        out, spread = np.empty_like(series), np.empty((2, len(log)))
+        found.append((kalman(log.nominal_steps, log.ok, A, K, noise, series, out, spread), out, spread))
     for fast, slow in zip(*found, strict=True):
         np.testing.assert_allclose(fast, slow, rtol=1e-12, atol=1e-14)
 
@@ -140,21 +139,8 @@ def moved(noise: np.ndarray, place: int, by: float) -> np.ndarray:
 
 
 def informed(log: Record, noise: np.ndarray, place: np.ndarray, residual: np.ndarray):
-    here = innovations_of(log, A, K, noise, place, residual)
+    here = innovations_of(log, A, K, noise, residual)
     return here.likelihood, *information(log, A, K, noise, place, residual, here)
-
-
-@pytest.mark.parametrize("log", [record(gaps=True), settled_record()], ids=["gaps", "settled"])
-def test_noises_abreast_come_to_what_each_comes_to_alone(log):
-    residual = np.where(seen(log), 0.01 * np.random.default_rng(6).standard_normal(2 * len(log)), 0.0).reshape(2, -1)
-    noises = np.array([moved(noise_vector(NOISES["both"]), place, 0.5) for place in range(8)])
-    errors, spreads = np.empty((2, 8, 2, len(log)))
-    with_sensors_in_lanes(log.nominal_steps, log.ok, A, K, noises, residual[None], errors, spreads)
-    for lane, noise in enumerate(noises):
-        alone, wide = np.empty((2, 1, 2, len(log)))
-        filter_of(noise)(log.nominal_steps, log.ok, A, K, noise[None], residual[None], alone, wide)
-        np.testing.assert_allclose(errors[lane], alone[0], atol=1e-6)
-        np.testing.assert_allclose(spreads[lane], wide[0], rtol=1e-6)
 
 
 PLACES = {"disturbance": np.array([0, 1, 2, 3]), "coloured": np.array([0, 1, 4, 5, 6]), "both": np.arange(7)}
