@@ -115,13 +115,13 @@ def close_loop(
     depth_step), limited to pitch_limit; else it is `reference` rad. From the sample at which a plant diverges on its angle is
     inf.
     """
-    now, core = np.empty(table.shape[1]), np.empty(plants.core.shape[1])
+    now = np.empty(table.shape[1])
     for case in range(plants.core.shape[0]):
         stiffness, offset, drag = plants.stiffness[case], plants.offset[case], plants.drag[case]
         late, most = int(plants.delay_steps[case]), plants.largest_move[case]
         kinds, a, b = kinds_of(plants.core[case]), plants.damping[case], plants.authority[case]
         gains_at(table, speed, now)
-        core[:] = plants.core[case]
+        core = plants.core[case].copy()  # not filled: an assignment of arrays compiles for 2 s, as its error has words
         p = x = z = 0.0
         u = speed
         y, integral, start = steady_state(stiffness, b, offset, now)
