@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import nan
 from types import MappingProxyType
 from typing import Annotated
 
@@ -22,8 +23,8 @@ class StepCheck(Brief):
     Of the steps to both sides it is the later one, with the worst of both in the other numbers: a trim takes from the fin's reach
     to one side, and a saturated fin overshoots less.
 
-    `..._most` is the worst over 95 % of the draws. Overshoot and settling of a draw are relative to its steady state, without an
-    integral; `off` (rad) is the error at the end, of the trim or of an integral that is not done, worst over 95 % of the draws.
+    `..._most` is the worst over 95 % of the draws. Without an integral overshoot and settling of a draw are relative to where the
+    estimate comes to rest; `off` (rad) is the error at the end, of the trim or of an integral that is not done, worst over 95 % of the draws.
     `settling_median` and `settling95` (s) are the median and the 95 % band of the draws: settling jumps by half a period where an
     overshoot just leaves the corridor. `swing` is the peak-to-peak oscillation in the last quarter of the flight as a share of
     the step, worst over 95 % of the draws; `flown` (s) is the simulated time. Overshoot and settling are NaN where the data do
@@ -92,13 +93,13 @@ class Check(Displayed):
 
     @property
     def overshoot(self) -> Annotated[Number, Key(name="overshoot_percent", times=100.0)]:
-        """Overshoot of the standard step by the estimate, as a share."""
-        return self.steps[1].overshoot
+        """The most overshoot of the steps by the estimate, as a share."""
+        return max((s.overshoot for s in self.steps if s.said), default=nan)
 
     @property
     def overshoot_most(self) -> Annotated[Number, Key(name="overshoot_most_percent", times=100.0)]:
-        """The most overshoot of the standard step by 95 % of the draws, as a share."""
-        return self.steps[1].overshoot_most
+        """The most overshoot of the steps by 95 % of the draws, as a share."""
+        return max((s.overshoot_most for s in self.steps if s.said), default=nan)
 
     @property
     def settling(self) -> Annotated[Number, Key(name="settling_s")]:

@@ -288,10 +288,6 @@ def _step(flown: Steps, size: float, gains: Gains) -> StepCheck:
         np.where(off < size, settling(flown.time, about, size, band), np.inf)
         for band in (SETTLING_BAND, SETTLING_BAND + FLIGHT_ERROR_SHARE, SETTLING_BAND - FLIGHT_ERROR_SHARE)
     )
-    over[0], settled[0] = (
-        overshoot(flown.angle, size)[0],
-        settling(flown.time, flown.angle, size)[0],
-    )  # the estimate's trim is known
     most = [worst_of(part, most=True) for part in (over, settled, oscillation, off)]
     low, middle, high = (
         float(np.quantile(of, share, method="closest_observation"))

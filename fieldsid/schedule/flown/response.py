@@ -148,18 +148,19 @@ def tightest(steps: Steps) -> float:
 
 
 def about_rest(values: FloatArray, size: float, gains: Gains) -> FloatArray:
-    """Return steps (t, n) of `size` shifted by their steady errors, so that an error of the trim does not count as motion.
+    """Return steps (t, ..., d) of `size` shifted to where the estimate, the first draw, comes to rest.
 
-    Under an integral they are returned as they are: the trim leaves no error, and what is left is the integral's own tail.
+    So an error of the trim does not count as motion, and the rest of the estimate, which is known, does. Under an integral they
+    are returned as they are: the trim leaves no error, and what is left is the integral's own tail.
     """
     if gains.ki != 0.0:
-        return values.copy()
-    final = size - steady_error(values, size)
-    return np.asarray(values + np.where(np.isfinite(final), size - final, 0.0))
+        return values
+    off = np.nan_to_num(steady_error(values, size), nan=0.0, posinf=0.0, neginf=0.0)
+    return np.asarray(values + off - off[..., :1])
 
 
 def steady_error(values: FloatArray, wanted: float) -> FloatArray:
-    """Return `wanted` less the mean of the last twentieth of values (t, n), (n,)."""
+    """Return `wanted` less the mean of the last twentieth of values (t, ...), (...)."""
     tail = max(1, values.shape[0] // 20)
     return np.asarray(wanted - values[-tail:].mean(axis=0))
 

@@ -210,7 +210,6 @@ class Place:
         own[4] = max(float(overshoot(angle[..., 0], demand.step).max()) - demand.own_overshoot, 0.0)
         drawn[1] = _of_draws(overshoot(about, demand.step).max(axis=0) - demand.draws_overshoot)
         drawn[2] = _of_draws(swing(angle, demand.step).max(axis=0) - LIMIT_CYCLE_SHARE)
-        about[..., 0] = angle[..., 0]  # its trim is known: its steady error counts
         settled = smooth_settling(time, about, demand.step).max(axis=0)
         return Outcome(tuple(own), tuple(drawn), max(float(settled[0]), worst_of(settled, most=True)), fin, kp)
 

@@ -10,7 +10,7 @@ import pytest
 from fieldsid.errors import UsageError
 from fieldsid.plant.parameter_source import load_parameter_source
 from fieldsid.schedule.make import design_schedule
-from fieldsid.schedule.verdict import Gate, against_constant, rests_on, verdict_of
+from fieldsid.schedule.verdict import Gate, against_constant, gates_of, rests_on, verdict_of
 from fieldsid.schedule.verify import plants_behind, promised_step, verify_schedule
 from fieldsid.schedule.wish import Wish
 
@@ -32,6 +32,23 @@ def test_the_verdict_the_comparison_and_the_table_have_one_time_to_settle(tmp_pa
     (said,) = re.findall(r"settles within ([\d.]+) s at every speed", verdict_of(checked, schedule, ())[1])
     (compared,) = re.findall(r"settles in ([\d.]+) s with the schedule", against_constant(checked))
     assert said == compared == slowest
+
+
+def test_between_rows_the_draws_come_to_rest_where_the_estimate_does(tmp_path):
+    head = "speed_m_s,c22,c23,d2,Cb,c22_std_error,c23_std_error,d2_std_error,Cb_std_error"
+    rows = "1.0,0.9,0.5,-0.4,0.03,0.002,0.002,0.002,0.0005\n1.8,1.5,0.5,-1.3,0.03,0.002,0.002,0.002,0.0005\n"
+    source = source_of(tmp_path, f"{head}\n{rows}")
+    schedule = design_schedule(source, 0.3, wish=Wish("pd"))
+    checked = verify_schedule(schedule, source, draws=20)
+    between = next(c for c in checked.scheduled if not c.knot)
+    small, usual, _ = between.steps
+    assert small.off > 0.1 * small.size, "the trim of the rows is off between them"
+    for step in (small, usual):
+        assert step.overshoot_most > 0.9 * step.overshoot > 0.05
+        assert step.settling_most >= step.settling
+    (gate,) = gates_of(checked, {"overshoot_percent": 100.0 * usual.overshoot_most + 1.0})
+    assert not gate.passed
+    assert gate.found == 100.0 * small.overshoot_most, "the most of any step"
 
 
 def test_a_small_step_that_stays_off_is_no_schedule_that_holds(tmp_path):
