@@ -166,9 +166,10 @@ def _of_draws(family: LinearPlant) -> str:
 def _refusal(family: LinearPlant, wish: Wish, fin_limit: float) -> ModelError:
     one = family.one()
     whom = "" if family.count == 1 or wish.kind not in PROPORTIONAL else " for half of the draws of the models' errors"
+    damping = f"damping {wish.damped:.3g}" + ("" if wish.overshoot is None else f", overshoot {100.0 * wish.overshoot:g} %")
     found = f"damping {one.slow_damping[0]:.3g} 1/s, fin lag {one.lag[0]:.3g} s, delay {one.delay[0]:.3g} s"
     return ModelError(
-        f"no {wish.kind} gain keeps damping {wish.damped:g} and {wish.phase_margin_deg:g} deg at {family.speed:.3g} m/s{whom}",
+        f"no {wish.kind} gain keeps {damping} and {wish.phase_margin_deg:g} deg at {family.speed:.3g} m/s{whom}",
         found=f"{found}{_of_draws(family)}",
         hint=_remedy(family, wish, fin_limit),
     )
