@@ -16,7 +16,7 @@ from fieldsid.models.record import knows_speed
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.records.keys import Key, Number
 from fieldsid.schedule.check import StepCheck
-from fieldsid.schedule.flown.response import SETTLING_BAND, overshoot, settling, steady_error
+from fieldsid.schedule.flown.response import FLIGHT_ERROR_SHARE, SETTLING_BAND, overshoot, settling, steady_error
 from fieldsid.schedule.plants import Plants
 from fieldsid.schedule.record import Schedule
 from fieldsid.schedule.verify import STEPS_RAD, promised_step
@@ -54,7 +54,7 @@ class KeptStep(Brief):
         """The numbers that are worse than in 95 % of the draws; settling does not count for a step that ended before that."""
         f, p, slack = self.flown, self.promised, MIN_STD_ERRORS * self.noise
         worse = {
-            "overshoot": f.overshoot > p.overshoot_most + slack / abs(self.size),
+            "overshoot": f.overshoot > p.overshoot_most + FLIGHT_ERROR_SHARE + slack / abs(self.size),
             "settling": f.settling > p.settling_most and self.seconds > p.settling_most,
             "steady error": abs(f.steady_error) > p.off + slack,
         }
@@ -117,7 +117,7 @@ def _compared_step(schedule: Schedule, of: Plants, run: Run, start: int, end: in
         settling=float(settling(time, moved, abs(size), band)[0]),
         steady_error=float(steady_error(moved, abs(size))[0]),
     )
-    promised = promised_step(schedule, of, speed, size, float(time[-1]))
+    promised = promised_step(schedule, of, speed, float(smooth[0]), size, float(time[-1]))
     return KeptStep(run.name, float(run.time[start]), float(time[-1]), speed, size, flown, noise, promised)
 
 

@@ -24,11 +24,11 @@ class StepCheck(Brief):
     to one side, and a saturated fin overshoots less.
 
     `..._most` is the worst over 95 % of the draws. Without an integral overshoot and settling of a draw are relative to where the
-    estimate comes to rest; `off` (rad) is the error at the end, of the trim or of an integral that is not done, worst over 95 % of the draws.
-    `settling_median` and `settling95` (s) are the median and the 95 % band of the draws: settling jumps by half a period where an
-    overshoot just leaves the corridor. `swing` is the peak-to-peak oscillation in the last quarter of the flight as a share of
-    the step, worst over 95 % of the draws; `flown` (s) is the simulated time. Overshoot and settling are NaN where the data do
-    not support them (`_without_unsupported`).
+    estimate comes to rest; `off` (rad) is the error at the end, of the trim or of an integral that is not done, worst over 95 %
+    of the draws. `settling_median` and `settling95` (s) are the median and the 95 % band of the draws: settling jumps by half a
+    period where an overshoot just leaves the corridor. `swing` is the peak-to-peak oscillation in the last quarter of the flight
+    as a share of the step, worst over 95 % of the draws; `flown` (s) is the simulated time. Overshoot and settling are NaN where
+    the data do not support them (`_without_unsupported`).
     """
 
     size: Annotated[float, Key("Its size.", "step_rad")]

@@ -184,17 +184,21 @@ def plants_behind(schedule: Schedule, source: ParameterSource, runs: Sequence[Ru
     return plants_of(source, limits, runs, schedule.provenance.get("length_m"))
 
 
-def promised_step(schedule: Schedule, of: Plants, speed: float, size: float, held: float) -> StepCheck:
-    """Return the check of one step (rad, negative to the negative side) at one speed (m/s), as in a verification.
+def promised_step(schedule: Schedule, of: Plants, speed: float, start: float, size: float, held: float) -> StepCheck:
+    """Return the check of one step from an angle (rad, negative to the negative side) at one speed (m/s), as in a verification.
 
-    Its error at the end is that after `held` s, when an integral may have some left.
+    Its error at the end is that after `held` s, when an integral may have some left. A step from a pitch is one from zero with a
+    fin that is off by what holds that pitch, and with a feed-forward that knows it.
     """
     limit = schedule.at(speed).fin_limit
-    plant = of.family_at(speed, limit, VERIFY_DRAWS, SEED)
-    flown = _flown_to_rest(plant, schedule.rows, size, pace_of(plant, limit, schedule.wish.step_of(schedule.axis)))
+    level = of.family_at(speed, limit, VERIFY_DRAWS, SEED)
+    plant = replace(level, offset=level.offset - level.stiffness / level.slow_authority * start)
+    rows = [replace(r, feed_forward=r.feed_forward + r.reference_gain * start) for r in schedule.rows]
+    flown = _flown_to_rest(plant, rows, size, pace_of(plant, limit, schedule.wish.step_of(schedule.axis)))
     off = np.abs(steady_error(flown.angle[flown.time <= held], abs(size)))
     step = replace(_step(flown, abs(size), schedule.rows[0].gains), off=worst_of(off, most=True))
-    return _without_unsupported(step, flown, plant, of.tightest_flown, limit)
+    fin = abs(float(plant.offset[0]) - plant.reference_gain * size)
+    return _without_unsupported(step, flown, plant, of.tightest_flown, can_hold=fin < limit)
 
 
 def steps_of(schedule: Schedule) -> tuple[float, float, float]:
@@ -236,7 +240,9 @@ def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) ->
     least_phase, least_gain, least_delay = found.worst()
     sizes = steps_of(schedule)
     (small, usual, large), flights, others = zip(*(_to_both_sides(plant, rows, size, pace) for size in sizes), strict=True)
-    large = _without_unsupported(large, max(flights[2], others[2], key=tightest), plant, flight.curvature, row.fin_limit)
+    fin = abs(float(plant.offset[0])) + abs(plant.reference_gain) * large.size
+    tight = max(flights[2], others[2], key=tightest)
+    large = _without_unsupported(large, tight, plant, flight.curvature, can_hold=fin < row.fin_limit)
     compensated = [replace(r, feed_forward=r.feed_forward - FIN_OFFSET_RAD) for r in rows]
     one = plant.one()
     bent, unknown = (fly(one, r, Flight(pace.flight, pace.step, offset=FIN_OFFSET_RAD)) for r in (compensated, rows))
@@ -297,18 +303,17 @@ def _step(flown: Steps, size: float, gains: Gains) -> StepCheck:
     return StepCheck(size, float(over[0]), most[0], float(settled[0]), most[1], middle, (low, high), most[2], most[3], seconds)
 
 
-def _without_unsupported(step: StepCheck, flown: Steps, plant: LinearPlant, curvature: float, fin_limit: float) -> StepCheck:
+def _without_unsupported(step: StepCheck, flown: Steps, plant: LinearPlant, curvature: float, *, can_hold: bool) -> StepCheck:
     """Return the check of a step, with NaN for overshoot and settling where no gains decide them.
 
-    That is the case for a pitch that the fin (limit in rad) cannot hold against trim and stiffness, and for an unstable hull in a
+    That is the case for a pitch that the fin cannot hold against trim and stiffness, and for an unstable hull in a
     turn with a larger curvature than the runs' (`curvature`, 1/m): a stable hull leaves such a turn without control, an unstable
     one only by the moment that the fin has there. For such a hull (seed 9, hull 6 of `tests/truth/gain_table.py`) identified from
     pulses 32 s were predicted, 29 to 36 s by the draws, and 55 s measured; no draw had the turn, of a radius 17 to 22 % below the
     median.
     """
     unstable = float(np.mean(plant.growth > 0.0)) > 1.0 - HELD_SHARE
-    held = abs(float(plant.offset[0])) + abs(plant.reference_gain) * step.size < fin_limit
-    if held and not (unstable and curvature < MIN_COVERED_SHARE * tightest(flown)):
+    if can_hold and not (unstable and curvature < MIN_COVERED_SHARE * tightest(flown)):
         return step
     nan = float("nan")
     return replace(

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from cli import trial
 
-from fieldsid.change.promise import kept_steps
+from fieldsid.change.promise import FlownStep, kept_steps
 from fieldsid.errors import DataError
 from fieldsid.logs import save_run
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import save_model
-from fieldsid.plant.parameter_source import source_of_models
+from fieldsid.plant.parameter_source import load_parameter_source, source_of_models
 from fieldsid.schedule.flown.response import Flight, fly
 from fieldsid.schedule.linear_plant import FinLimits
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.plants import models_plants
+from fieldsid.schedule.wish import Wish
 
 SPEED, LIMIT, STEP, LEAD, RATE = 1.4, 0.35, 0.35, 5.0, 20.0
 
@@ -58,6 +61,45 @@ def test_a_slow_servo_breaks_what_was_promised(schedule):
     (step,) = kept_steps(schedule, plants, flown(schedule, trial.vehicle(Axis.YAW), limits=FinLimits(lag=1.5)))
     assert {"overshoot", "settling"} <= set(step.broken)
     assert not step.as_promised
+
+
+def pitched(rows, goals, seconds, damping, stiffness, authority):
+    """Fly goals of pitch, each for `seconds`, with a linear vehicle and one row of gains in steps of 1/50 s."""
+    (row,), step = rows, 0.02
+    pitch, rate, integral, motion = 0.0, 0.0, 0.0, []
+    for i in range(round(len(goals) * seconds / step)):
+        goal = goals[int(i * step // seconds)]
+        motion.append((i * step, pitch, goal, row.speed))
+        wanted = row.gains.kp * (goal - pitch) + row.gains.ki * integral - row.gains.kd * rate + row.reference_gain * goal
+        fin = np.clip(wanted, -row.fin_limit, row.fin_limit)
+        integral += step * (goal - pitch) * (fin == wanted)
+        for _ in range(4):
+            rate += 0.25 * step * (authority * fin - damping * rate - stiffness * pitch)
+            pitch += 0.25 * step * rate
+    time, pitches, held, speed = np.array(motion).T
+    return Run("sea", time, {"pitch_rad": pitches, "pitch_goal_rad": held, "surge_m_s": speed})
+
+
+def test_a_step_of_pitch_is_promised_from_the_pitch_that_it_starts_at(tmp_path):
+    (tmp_path / "table.csv").write_text("speed_m_s,c22,c23,d2,Cb\n1.4,1.2,0.5,-0.8,0.0\n")
+    source = load_parameter_source([tmp_path / "table.csv"])
+    made = design_schedule(source, LIMIT, wish=Wish("pid"))
+    run = pitched(made.rows, (0.0, 0.17, -0.14, 0.0), 40.0, 1.2, 0.5, -0.8)
+    _, across, back = kept_steps(made, models_plants(source, FinLimits(), ()), run)
+    assert (across.broken, back.broken) == ((), ())
+    assert across.flown.overshoot == pytest.approx(across.promised.overshoot, abs=0.01)
+
+
+def test_an_overshoot_within_what_a_flight_is_off_its_model_is_as_promised(schedule):
+    plants = models_plants(source_of(trial.vehicle(Axis.YAW)), FinLimits(), ())
+    (step,) = kept_steps(schedule, plants, flown(schedule, trial.vehicle(Axis.YAW)))
+
+    def with_overshoot(beyond):
+        most = step.promised.overshoot_most + beyond
+        return replace(step, noise=0.0, flown=FlownStep(most, step.promised.settling, 0.0)).broken
+
+    assert with_overshoot(0.008) == ()
+    assert with_overshoot(0.015) == ("overshoot",)
 
 
 def test_a_run_without_a_goal_says_what_to_map(schedule):

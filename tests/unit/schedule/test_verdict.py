@@ -74,7 +74,7 @@ def test_a_fin_off_to_one_side_is_designed_and_verified_as_one_off_to_the_other(
         schedule = design_schedule(source, LIMIT, wish=Wish(kind))
         checks.append(verify_schedule(schedule, source, draws=1).scheduled[0])
         of = plants_behind(schedule, source, ())
-        promised.append([promised_step(schedule, of, 1.0, side * 1.5708, 60.0).settling for side in (1.0, -1.0)])
+        promised.append([promised_step(schedule, of, 1.0, 0.0, side * 1.5708, 60.0).settling for side in (1.0, -1.0)])
     one, other = ([number for s in check.steps for number in (s.overshoot, s.settling, s.off)] for check in checks)
     assert one == pytest.approx(other)
     assert promised[0] == pytest.approx(promised[1][::-1])
@@ -89,7 +89,8 @@ def test_the_tail_of_an_integral_is_no_error_of_the_trim(tmp_path):
     checked = verify_schedule(schedule, source, draws=20)
     for step in checked.scheduled[0].steps:
         assert step.settling_median == pytest.approx(step.settling, rel=0.05)
-    soon, late = (promised_step(schedule, plants_behind(schedule, source, ()), 0.5, 0.35, held).off for held in (20.0, 100.0))
+    of = plants_behind(schedule, source, ())
+    soon, late = (promised_step(schedule, of, 0.5, 0.0, 0.35, held).off for held in (20.0, 100.0))
     assert soon > 5.0 * late, "of a step held for 20 s no more is asked"
     assert checked.spread
     assert "trim is known" not in checked.summary()
