@@ -322,6 +322,7 @@ def _without_unsupported(step: StepCheck, flown: Steps, plant: LinearPlant, curv
 
 
 def _depth(one: LinearPlant, rows: Sequence[Row], pace: Pace) -> tuple[float, float]:
-    steps = fly(one, rows, Flight(pace.leg, pace.step, depth=DEPTH_STEP_M, pitch_limit=PITCH_LIMIT_RAD))
-    settled = settling(steps.time, steps.depth, DEPTH_STEP_M)
-    return float(overshoot(steps.depth, DEPTH_STEP_M)[0]), float(settled[0])
+    """Return overshoot and settling time (s) of a step of depth, of down and up the worse: a trim takes fin from one side."""
+    flights = [fly(one, rows, Flight(pace.leg, pace.step, depth=s * DEPTH_STEP_M, pitch_limit=PITCH_LIMIT_RAD)) for s in SIDES]
+    moved = np.column_stack([s * flown.depth for s, flown in zip(SIDES, flights, strict=True)])
+    return float(overshoot(moved, DEPTH_STEP_M).max()), float(settling(flights[0].time, moved, DEPTH_STEP_M).max())

@@ -51,6 +51,15 @@ def test_between_rows_the_draws_come_to_rest_where_the_estimate_does(tmp_path):
     assert gate.found == 100.0 * small.overshoot_most, "the most of any step"
 
 
+def test_a_step_of_depth_is_said_of_the_side_with_less_fin(tmp_path):
+    said = []
+    for trim in (0.04, -0.04):
+        source = source_of(tmp_path, f"speed_m_s,c22,c23,d2,Cb\n1.0,0.9,0.5,-0.4,{trim}\n")
+        schedule = design_schedule(source, 0.33, wish=Wish("pd"), depth=True)
+        said += [(c.depth_overshoot, c.depth_settling) for c in verify_schedule(schedule, source, draws=2).scheduled]
+    assert said[0] == pytest.approx(said[1], rel=1e-6), "nose heavy down as tail heavy up"
+
+
 def test_a_small_step_that_stays_off_is_no_schedule_that_holds(tmp_path):
     rows = "1.0,1.2,0.05,-0.5,0.00\n1.45,1.7,0.05,-1.0,0.003\n1.9,2.2,0.05,-1.8,0.00\n"
     source = source_of(tmp_path, f"speed_m_s,c22,c23,d2,Cb\n{rows}")
