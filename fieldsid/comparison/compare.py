@@ -20,7 +20,7 @@ from fieldsid.logs.run import Run
 from fieldsid.logs.several.sifting import Refused, attempt, sifted
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import record_of
-from fieldsid.noise.white_floor import white_noise_floor
+from fieldsid.noise.white_floor import told_floor, white_noise_floor
 from fieldsid.records.keys import INLINE, Key
 from fieldsid.rounding import MANY, Angles, number
 
@@ -129,7 +129,7 @@ def compare_one(model: Model, run: Run) -> Comparison:
     shown = predict(model, record)
     base = base_at(model, record.speed)
     trim = -base.trim / base.authority if base.authority != 0.0 else 0.0
-    floor = white_noise_floor([record])
+    floor = told_floor(white_noise_floor([record]), [record])
     return Comparison(
         shown, goodness_of_fit([shown]), floor, _channels(shown, floor, trim), companions(shown, base.damping), model
     )

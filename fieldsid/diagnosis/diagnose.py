@@ -48,6 +48,7 @@ from fieldsid.models.definition import NONE
 from fieldsid.models.effect import effect_held
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record, left_out
+from fieldsid.noise.white_floor import told_floor
 
 SEARCH_ENDED = Note(
     "search_ended", "the search ended with what it had found by then: more might explain what is left; `--thorough` goes on"
@@ -173,7 +174,7 @@ def _diagnosis(
         short=sentence.short,
         base=base.errors,
         final=named.errors,
-        noise_floor=floor,
+        noise_floor=told_floor(floor, work.records),
         candidates=_candidates(end, floor, 1.0 if work.is_noiseless else error_left(work, found, floor)),
         model=model,
         base_model=base_model,

@@ -30,6 +30,7 @@ from fieldsid.logs.several.sifting import Refused
 from fieldsid.models.effect import Effect, effect_held
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record, left_out
+from fieldsid.noise.white_floor import told_floor
 from fieldsid.records.keys import Key
 
 FITTED_TO_ALL = Note(
@@ -189,7 +190,7 @@ def _extension(
         added=tuple(e.name for e in new),
         before=before.errors,
         after=after.errors,
-        noise_floor=reported_noise_floor(work.floor, noise),
+        noise_floor=told_floor(reported_noise_floor(work.floor, noise), learned),
         unseen=bool(judged),
         learned_on=tuple(r.name for r in learned),
         judged_on=tuple(r.name for r in (judged or learned)),

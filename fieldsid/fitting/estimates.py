@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Annotated
 
+from fieldsid.dynamics.at_bound import bounds_of
 from fieldsid.fitting.fin_offset import offset_of
 from fieldsid.models.model import Model
 from fieldsid.records.keys import Key, Number
@@ -19,17 +21,21 @@ class Estimate:
     value: Annotated[float, Key("The estimate, in the unit below.")]
     std_error: Annotated[Number, Key("Its standard error, corrected for coloured residuals.")]
     unit: Annotated[str, Key("Its unit.")]
+    bounds: tuple[float, float] = (-inf, inf)
 
     @property
     def interval95(self) -> Annotated[tuple[float, float], Key()]:
-        """The 95 % interval under a normal error: value -+ 1.96 standard errors."""
-        half = TWO_SIDED_95 * self.std_error
-        return self.value - half, self.value + half
+        """The 95 % interval under a normal error: value -+ 1.96 standard errors, within the bounds of a coefficient."""
+        half, (low, high) = TWO_SIDED_95 * self.std_error, self.bounds
+        return self.value - min(half, self.value - low), self.value + min(half, high - self.value)
 
 
 def estimates(model: Model) -> tuple[Estimate, ...]:
     """Return the estimates of a model at the reference speed of its law: parameters, those of the law, and the fin offset."""
-    parameters = [Estimate(n, v, model.std_error(n), model.units.get(n, "")) for n, v in model.values.items()]
+    bounds, free = bounds_of(model), (-inf, inf)
+    parameters = [
+        Estimate(n, v, model.std_error(n), model.units.get(n, ""), bounds.get(n, free)) for n, v in model.values.items()
+    ]
     law = [
         Estimate(n, _number(known["value"]), _number(known["std_error"]), "1/s^2" if "@" in n else "1")
         for n, known in dict(model.info.get("law_parameters", {})).items()

@@ -31,7 +31,7 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Effect, definitions_of, effect_named
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
-from fieldsid.noise.white_floor import lowered_noise_floor, white_noise_floor
+from fieldsid.noise.white_floor import lowered_noise_floor, told_floor, white_noise_floor
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import members, near, pick
 
@@ -175,8 +175,9 @@ def fitted(problem: Problem, solution: Solution) -> Fit:
     sigma = np.sqrt(np.maximum(np.diag(solution.covariance), 1e-300))
     correlation = solution.covariance / np.outer(sigma, sigma)
     order = [names.index(n) for n in model.free]
-    model = replace(model, info={**model.info, "left": _residual_summary(predictions, floor)})
-    return Fit(model, predictions, floor, correlation[np.ix_(order, order)], notes, solution.history)
+    told = told_floor(floor, problem.records)
+    model = replace(model, info={**model.info, "left": _residual_summary(predictions, told)})
+    return Fit(model, predictions, told, correlation[np.ix_(order, order)], notes, solution.history)
 
 
 def _residual_summary(predictions: Sequence[Prediction], floor: Noise) -> dict[str, Any]:

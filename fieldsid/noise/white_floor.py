@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import nan
 
 import numpy as np
 
@@ -37,6 +38,12 @@ def lowered_noise_floor(floor: Noise, records: Sequence[Record], residuals: Sequ
             for was, now, least in ((floor.angle, angle, MIN_ANGLE_NOISE_RAD), (floor.rate, rate, MIN_RATE_NOISE_RAD_S))
         )
     )
+
+
+def told_floor(floor: Noise, records: Sequence[Record]) -> Noise:
+    """Return a noise floor as results tell it: NaN for a channel that no record measures."""
+    angle, rate = (value if any(r.ok[i].any() for r in records) else nan for i, value in enumerate((floor.angle, floor.rate)))
+    return Noise(angle, rate)
 
 
 def _pooled(values: list[float]) -> float:

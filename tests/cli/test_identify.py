@@ -8,7 +8,11 @@ import os
 import pytest
 from cli import trial
 
+import fieldsid as fs
 from fieldsid.comparison.sufficient import over_noise
+from fieldsid.fitting.estimates import Estimate
+from fieldsid.logs import save_run
+from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import load_model
 
@@ -181,3 +185,20 @@ def test_of_many_runs_those_that_the_model_follows_least_are_drawn(run_cli, tmp_
     over = {r["run"]: over_noise(r, body["noise_floor"]) for r in body["runs"]}
     least = sorted(over, key=lambda run: -over[run])[:most]
     assert {f"joint_yaw_{run}.png" for run in least} < drawn
+
+
+def test_a_sensor_that_no_run_has_has_no_noise_floor(run_cli, tmp_path):
+    (whole,) = fs.load(trial.flown(tmp_path))
+    signals = {name: whole[name] for name in ("yaw_rad", "rudder_rad", "surge_m_s")}
+    run = save_run(Run("angle", whole.time, signals), tmp_path / "angle.parquet")
+    (fit,) = run_cli("identify", run, "--axis", "yaw", "-o", tmp_path, "--no-figures", "--json").json["fits"]
+    (compared,) = run_cli("compare", fit["model"], run, "--json").json["runs"]
+    for found in (fit, compared):
+        assert found["rate_rms_rad_s"] is None
+        assert found["noise_floor"]["rate_rad_s"] is None
+        assert found["noise_floor"]["angle_rad"] > 0.0
+
+
+def test_the_interval_of_a_lag_ends_where_a_lag_may():
+    assert Estimate("lag", 0.006, 0.004, "s", (0.0, 2.0)).interval95 == (0.0, pytest.approx(0.006 + 1.96 * 0.004, rel=1e-3))
+    assert Estimate("a22", 0.006, 0.004, "1/s").interval95[0] < 0.0
