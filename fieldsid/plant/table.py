@@ -107,6 +107,13 @@ def _check_numbers(table: pd.DataFrame, path: Path, axis: Axis) -> None:
                 hint="mend that cell",
             )
         table[column] = numbers.astype(float)
+        below = table.index[numbers < 0.0]
+        if column.endswith("_std_error") and len(below):
+            raise DataError(
+                f"`{path}` line {below[0] + 2}: a standard error is not below zero",
+                found=f"{column} = {numbers[below[0]]:g}",
+                hint="mend that cell, or leave it empty where the error is not known",
+            )
     speed = table[SPEED]
     if not bool((speed > 0).all()):
         where = int(np.argmax(~(speed > 0).to_numpy()))

@@ -81,3 +81,19 @@ def test_a_fit_file_is_not_fitted_again(run_cli, tmp_path):
     answer = run_cli("fit", law)
     assert answer.code == 2
     assert "fit file already" in answer.err
+
+
+def test_an_authority_at_one_of_the_speeds_only_is_one_speed_only(run_cli, tmp_path):
+    table = tmp_path / "table.csv"
+    table.write_text("speed_m_s,a22,b2\n1.0,1.1,\n1.4,1.5,-0.9\n1.8,2.0,\n")
+    answer = run_cli("fit", table)
+    assert answer.code == 2
+    assert "at 1.4 m/s a22 = 1.5, b2 = -0.9" in answer.err
+
+
+def test_a_standard_error_below_zero_is_refused(run_cli, tmp_path):
+    table = tmp_path / "table.csv"
+    table.write_text("speed_m_s,a22,b2,b2_std_error\n1.0,1.1,-0.7,0.01\n1.4,1.5,-0.9,-0.01\n")
+    answer = run_cli("fit", table)
+    assert answer.code == 2
+    assert "line 3: a standard error is not below zero" in answer.err

@@ -77,11 +77,11 @@ def fit_laws(axis: Axis, points: Sequence[Point], *, weighted: bool = True) -> L
     """Fit the law of every parameter of an axis that is known at two speeds or more.
 
     `weighted`: the points are weighted by their standard errors where all of them have one; otherwise all weights are equal.
-    Raises DataError when there is one speed only, or when the sign of the authority differs between points.
+    Raises DataError when the authority is known at one speed only, or when the sign of the authority differs between points.
     """
     points = tuple(sorted(points, key=lambda p: nine_digits(p.speed)))
     sign = check_authority(axis, points)
-    _refuse_single_speed(axis, points)
+    _refuse_single_speed(axis, [p for p in points if NAMES[axis].authority in p.values])
     laws, notes = {}, []
     for name in NAMES[axis].base:
         known = [p for p in points if name in p.values]
