@@ -8,6 +8,7 @@ below the surface is positive.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -16,12 +17,19 @@ import numpy as np
 
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.channels import POSITION, ChannelMap
+from fieldsid.logs.convert.units import DEGREE
 from fieldsid.logs.doctor.angle_and_rate import PAIRS
 from fieldsid.logs.doctor.fin_findings import WIDEST
 from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.draft import place_of
 from fieldsid.logs.mapping.numbers.true_heading import GEOGRAPHIC
-from fieldsid.logs.mapping.numbers.unit_inference import assumed_units, heading_in_doubt, set_by_size, unit_of_wraps
+from fieldsid.logs.mapping.numbers.unit_inference import (
+    MOST_TURNS,
+    assumed_units,
+    heading_in_doubt,
+    set_by_size,
+    unit_of_wraps,
+)
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.run import FINS, SIGNALS, Note, Run
 
@@ -141,7 +149,8 @@ def _counts_turns(note: Note, signals: Mapping[str, Any], run: Run) -> bool:
     """Return whether a finding shows that a heading beyond 2 pi is in rad and counts turns.
 
     Either its course turns by as much in rad, or its rate agrees with it in rad. The second counts only where the unit of the
-    rate is known or the other angles of the log are in rad, since one logger wrote them all.
+    rate is known or the other angles of the log are in rad, since one logger wrote them all; and only where there would be few
+    turns: degrees beside a rate in degrees per minute disagree nearly as rad beside degrees per second do.
     """
     if "unit" not in signals.get("yaw_rad", {}):
         return False
@@ -149,8 +158,9 @@ def _counts_turns(note: Note, signals: Mapping[str, Any], run: Run) -> bool:
         return note.data.get("unit") == "rad"
     others = [s for s in OTHER_ANGLES if s in signals and "unit" not in signals[s] and run.has(s)]
     largest = max((float(np.nanpercentile(np.abs(run[s]), 99)) for s in others), default=np.inf)
-    is_rate = note.code == "unit" and note.data["signal"] == "yaw_rate_rad_s"
-    return is_rate and ("unit" in signals.get("yaw_rate_rad_s", {}) or largest < WIDEST)
+    is_rate = note.code == "unit" and note.data["signal"] == "yaw_rate_rad_s" and "signals" in note.data
+    turns = float(np.nanpercentile(np.abs(run["yaw_rad"]), 99)) / (DEGREE * math.tau)
+    return is_rate and turns <= MOST_TURNS and ("unit" in signals.get("yaw_rate_rad_s", {}) or largest < WIDEST)
 
 
 def _evidence(signals: list[str], what: str, note: Note) -> Note:

@@ -68,3 +68,16 @@ def test_the_counts_of_a_servo_are_known_in_joined_tables_as_in_one(tmp_path):
     write_table(tmp_path / "act.csv", {"time": TRUTH["time_s"] + 0.01, "rudder": pulses})
     found = inspect_log(tmp_path).proposal.body["signals"]["rudder_rad"]
     assert found == {"topic": "act", "field": "rudder", "unit": "counts", "centre": 1500}
+
+
+def test_a_heading_from_0_to_360_stays_in_degrees_beside_a_rate_of_turn_per_minute(tmp_path):
+    time = np.arange(0.0, 200.0, 0.1)
+    heading = np.pi + 1.1 * np.sin(0.4 * time)  # never wraps, and turns by more than 229 degrees a minute
+    rate = np.gradient(heading, time)
+    named = {"time": time, "Heading": np.degrees(heading), "Rate of Turn": 60.0 * np.degrees(rate), "rudder": 0.2 * np.sin(time)}
+    found = inspect_log(write_table(tmp_path / "log.csv", named))
+    signals = found.proposal.body["signals"]
+    assert (signals["yaw_rad"]["unit"], signals["yaw_rate_rad_s"]["unit"]) == ("deg", "deg/min")
+    run = load_run(tmp_path / "log.csv", mapping_of(found.proposal.body))
+    np.testing.assert_allclose(run["yaw_rate_rad_s"], rate, atol=1e-3)
+    assert "unit" not in {n.code for n in run.notes}
