@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, Source
 from fieldsid.logs.mapping.canonical_names import words_of
-from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion_of
+from fieldsid.logs.mapping.guesses import NOTHING, Guess, of_column, of_topic, quaternion_of
 from fieldsid.logs.mapping.numbers.recognise import PLACE, recognised
 from fieldsid.logs.mapping.numbers.true_heading import true_north
 from fieldsid.logs.mapping.numbers.unit_inference import set_by_size
-from fieldsid.logs.mapping.vocabulary import LATITUDE, LONGITUDE
-from fieldsid.logs.mapping.word_meaning import meaning_of
+from fieldsid.logs.mapping.vocabulary import AS_MEASURED, LATITUDE, LONGITUDE
+from fieldsid.logs.mapping.word_meaning import is_command, meaning_of
 from fieldsid.logs.reader import TABLE, Inventory, Samples
 from fieldsid.logs.run import SIGNALS, Note
 
@@ -154,9 +154,16 @@ def _best(guesses: Iterable[Guess]) -> tuple[dict[str, Guess], list[Note]]:
     by_signal: dict[str, list[Guess]] = {}
     for guess in guesses:
         by_signal.setdefault(guess.signal, []).append(guess)
+    for fin, measured in AS_MEASURED.items():
+        # beside a fin whose name says that it is the command, the others are where the fin is
+        of_fin = by_signal.get(fin, [])
+        commanded = [g for g in of_fin if is_command(place_of(g.item), fin)]
+        if any(g.sure > NOTHING for g in commanded) and len(commanded) < len(of_fin):
+            by_signal[fin] = commanded
+            by_signal.setdefault(measured, []).extend(replace(g, signal=measured) for g in of_fin if g not in commanded)
     best, notes = {}, []
     for signal, several in by_signal.items():
-        ordered = sorted(several, key=lambda g: (-g.sure, -g.count))
+        ordered = sorted(several, key=lambda g: (-g.sure, -g.count, len(words_of(str(g.item.get("column", ""))))))
         first = best[signal] = ordered[0]
         # where a format defines two fields as the same signal, neither is an alternative
         near = [g for g in ordered[1 : 1 + OTHERS_SHOWN] if g.sure > 0.5 * first.sure and not (g.defined and first.defined)]

@@ -141,6 +141,9 @@ GROUNDED = frozenset({"yaw_rad", "surge_m_s", LATITUDE, LONGITUDE})
 """Signals that differ from the vehicle's heading, speed or position where their name says over ground."""
 GLIDER: Mapping[str, str] = MappingProxyType({"m": "measured", "c": "commanded"})
 """The meaning of the first letter of a glider's sensor, as in `m_fin` and `c_fin`."""
+CONTROL: Mapping[str, str] = MappingProxyType({"e": "error", "r": "reference", "u": "command"})
+"""The meaning of a letter before a name in a log of control: `e_speed` is an error, `r_speed` a reference; a `u_rudder` commands
+the rudder, and a `u_yaw` is the output of a controller in yaw."""
 GREEK = word_set("phi theta psi")
 MOST_WORDS_WITH_GREEK = 2
 """Number of other words up to which a Greek letter in a name is a symbol; with more it is an abbreviation: `PHI_HOST_PORT_DB`."""
@@ -161,6 +164,8 @@ VECTORS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 """The signals of x, y and z of vectors in standard messages; those of a `vector` only where its topic has Euler angles."""
 EULER = word_set("rpy euler attitude orientation angles")
 
+SYMBOLS = frozenset((rule.signal, phrase) for rule in RULES if rule.alone for phrase in rule.phrases.split(", "))
+"""The symbol of each signal, with the signal: the `u` of `u_surge` repeats its name."""
 PHRASES = tuple((rule, tuple(phrase.split())) for rule in RULES for phrase in rule.phrases.split(", "))
 """Each rule with each of its phrases, split into words."""
 KNOWN = (

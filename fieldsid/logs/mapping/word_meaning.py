@@ -9,16 +9,20 @@ from fieldsid.logs.doctor.angle_and_rate import PAIRS
 from fieldsid.logs.mapping.canonical_names import canonical, stated_unit, unit_among_words, words_of
 from fieldsid.logs.mapping.vocabulary import (
     COMMANDED,
+    CONTROL,
     EULER,
     OF_ANOTHER,
     PHRASES,
+    SYMBOLS,
     Span,
     as_command_or_measurement,
     is_abbreviation,
     part_of,
     weight,
 )
+from fieldsid.logs.run import FINS, MOTORS
 
+_PREFIXED = re.compile(r"\s*[A-Za-z][_ .]\w{2}")
 RATES = dict(PAIRS)
 """The rate that the name of an angle means together with the unit of a rate, as in `yaw_deg_s`."""
 CANONICAL, STANDARD = 9, 8
@@ -49,4 +53,21 @@ def meaning_of(name: str, span: Span | None = None, unit_text: str | None = None
         signal in RATES and unit_text is not None and stated_unit(unit_text, RATES[signal]) is not None
     )
     is_rate = signal in RATES and unit_among_words(name, ("angle",)) is None and has_unit_of_rate
-    return as_command_or_measurement(RATES[signal] if is_rate else signal, best[0], set(words))
+    meant = RATES[signal] if is_rate else signal
+    before = _of_control(name, meant)
+    is_actuator = meant in (*FINS, *MOTORS)
+    if before == "error" or (before == "command" and not is_actuator):
+        return None
+    is_side = before == "reference" and is_actuator  # the `r_rudder` beside an `l_rudder`
+    return as_command_or_measurement(meant, best[0], {*words, *([] if before is None or is_side else [before])})
+
+
+def _of_control(name: str, signal: str) -> str | None:
+    """Return the meaning of a letter of control before the name of a signal; None without one, and where it is its symbol."""
+    letter = words_of(name)[0] if _PREFIXED.match(name) else ""
+    return CONTROL.get(letter) if (signal, letter) not in SYMBOLS else None
+
+
+def is_command(name: str, fin: str) -> bool:
+    """Return whether the name of a fin says that it is the command."""
+    return bool(COMMANDED & {*words_of(name), _of_control(name, fin)})
