@@ -20,7 +20,7 @@ from fieldsid.logs.mapping.canonical_names import Canonical, canonical, stated_u
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import RawLog, ReadOptions, Samples, Series
-from fieldsid.logs.run import Note
+from fieldsid.logs.run import FINS, Note
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
@@ -155,6 +155,7 @@ def series_of(path: Path, columns: Columns, mapping: ChannelMap, notes: tuple[No
         unit = None if signal in COMBINED else columns.unit(picked[0], signal)
         bad += _other_unit_below(columns, picked[0], signal, source.unit or unit) if mapping.origin is None else []
         series[signal] = Series(time, values, label, unit, label.strip().lower() == "z")
+    bad += _other_fins(columns, mapping) if mapping.origin is None else []
     ignored = _ignored(columns, mapping)
     return RawLog(stem_of(path), series, (*notes, *time_notes, *bad, *ignored))
 
@@ -166,6 +167,23 @@ def _other_unit_below(columns: Columns, index: int, signal: str, unit: str | Non
         return []
     message = f"{signal} is taken in {unit}, and the row of units says {below}: set its unit, `unit: {below}` where that is right"
     return [Note("unit", message, {"signal": signal, "unit": below})]
+
+
+def _other_fins(columns: Columns, mapping: ChannelMap) -> list[Note]:
+    """Return a note for each fin that a column which is not used also means by its name."""
+    used, others = used_by(mapping, columns.names, columns.width), dict[str, list[str]]()
+    for name in (name for i, name in enumerate(columns.names) if i not in used):
+        meaning = meaning_of(name)
+        if meaning is not None and meaning[0] in FINS and meaning[0] in mapping.sources:
+            others.setdefault(meaning[0], []).append(f"`{name}`")
+    return [
+        Note(
+            "alternatives",
+            f"{fin} is taken from `{mapping.sources[fin].column}`; it may also be {few_of(names)}: map the command",
+            {"signal": fin, "others": names},
+        )
+        for fin, names in others.items()
+    ]
 
 
 def _check_source(path: Path, signal: str, source: Source) -> None:

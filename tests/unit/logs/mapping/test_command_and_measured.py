@@ -46,3 +46,11 @@ def test_the_name_without_another_word_is_the_signal(tmp_path, first):
 def test_a_letter_of_control_before_a_name_says_what_it_is(name, signal):
     meaning = meaning_of(name)
     assert (meaning and meaning[0]) == signal
+
+
+@pytest.mark.parametrize(("other", "is_said"), [("rudder_deg", True), ("rudder_des_deg", True), ("rudder_limit_deg", False)])
+def test_a_table_that_is_read_as_it_is_says_that_another_column_may_be_its_fin(tmp_path, other, is_said):
+    run = load_run(write_table(tmp_path / "log.csv", {**CANONICAL, "rudder_rad": TRUTH["rudder_rad"], other: HELD}))
+    said = [n.message for n in run.notes if n.code == "alternatives"]
+    assert bool(said) == is_said
+    assert not said or f"`{other}`" in said[0]
