@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fieldsid.logs.channels import ANGLES, ATTITUDE
+from fieldsid.logs.convert.conditioning import MAX_PLAUSIBLE_VALUE
 from fieldsid.logs.convert.units import dimension_of
 from fieldsid.logs.mapping.canonical_names import unit_in_name, unit_of_field, words_of
 from fieldsid.logs.mapping.vocabulary import COMMANDED, COMPASS, LATITUDE, LONGITUDE, TIME, part_of, word_set
@@ -66,7 +67,8 @@ def _of_number(
     first = [float(v) for v in info.first if isinstance(v, (int, float))]
     span = info.span or ((min(first), max(first)) if first else None)
     signal, sure = meaning_of(name, span, channel.unit) or (TIME, 0)
-    if signal == TIME or not channel.count or (of_message and signal in (LATITUDE, LONGITUDE)):
+    is_stamp = span is not None and min(map(abs, span)) > MAX_PLAUSIBLE_VALUE
+    if signal == TIME or is_stamp or not channel.count or (of_message and signal in (LATITUDE, LONGITUDE)):
         return
     unit_text = channel.unit
     unit = unit_of_field(channel.name, info.path, signal, unit_text) if of_message else unit_in_name(name, signal, unit_text)
