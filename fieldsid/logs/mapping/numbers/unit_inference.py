@@ -16,7 +16,7 @@ import numpy as np
 
 from fieldsid.logs.channels import POSITION
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FULL_RAD, Servo, servo_of
-from fieldsid.logs.convert.units import DEGREE, UNITS, pick_unit
+from fieldsid.logs.convert.units import CLEARLY, DEGREE, UNITS, pick_unit
 from fieldsid.logs.doctor.angle_and_rate import PAIRS, agrees_with_rate
 from fieldsid.logs.doctor.pair_findings import goes_along_course, goes_with_depth, goes_with_way
 from fieldsid.logs.doctor.signal_findings import LARGEST
@@ -93,10 +93,21 @@ def set_by_size(signals: Mapping[str, Any], values: Mapping[str, FloatArray], st
         del seen[signal]
     units = {s: unit for s, v in seen.items() if (unit := _unit_by_size(s, v)) is not None}
     of_heading = {known.get("yaw_rad") for known in (units, stated)} | {signals.get("yaw_rad", {}).get("unit")}
-    in_heading_unit = ("pitch_rad", "roll_rad", *sorted(GOALS)) if "deg" in of_heading else ()
-    for signal, unit in {**{s: "deg" for s in in_heading_unit if s in seen and "field" not in signals[s]}, **units}.items():
+    in_heading_unit = dict.fromkeys(("pitch_rad", "roll_rad", *sorted(GOALS)), "deg") if "deg" in of_heading else {}
+    if "yaw_goal_rad" in seen and "yaw_rad" in values and _is_goal_in_rad(values["yaw_goal_rad"], values["yaw_rad"] * DEGREE):
+        in_heading_unit |= {"yaw_goal_rad": "rad"} if in_heading_unit else {}
+    own = {s: unit for s, unit in in_heading_unit.items() if s in seen and "field" not in signals[s]}
+    for signal, unit in {**own, **units}.items():
         signals[signal]["unit"] = unit
     return frozenset(units)
+
+
+def _is_goal_in_rad(goal: FloatArray, heading: FloatArray) -> bool:
+    """Return whether a heading in rad (n,) follows a setpoint (n,) that is read in rad, or this one wraps as one in rad does."""
+    if unit_of_wraps(goal) is not None or goal.shape != heading.shape:
+        return unit_of_wraps(goal) == "rad"
+    off_by_rad, off_by_deg = (1.0 - float(np.nanmean(np.cos(heading - goal * factor))) for factor in (1.0, DEGREE))
+    return off_by_rad < off_by_deg / CLEARLY
 
 
 def _unit_by_size(signal: str, values: FloatArray) -> str | None:

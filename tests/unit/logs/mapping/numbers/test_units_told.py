@@ -81,3 +81,24 @@ def test_a_heading_from_0_to_360_stays_in_degrees_beside_a_rate_of_turn_per_minu
     run = load_run(tmp_path / "log.csv", mapping_of(found.proposal.body))
     np.testing.assert_allclose(run["yaw_rate_rad_s"], rate, atol=1e-3)
     assert "unit" not in {n.code for n in run.notes}
+
+
+@pytest.mark.parametrize("goal", ["steps", "wrapping"])
+def test_a_setpoint_in_rad_beside_a_heading_in_degrees_is_in_rad(tmp_path, goal):
+    time = np.arange(0.0, 100.0, 0.1)
+    wanted = np.where(time < 50.0, 1.0, 2.5) if goal == "steps" else (0.2 * time + np.pi) % (2.0 * np.pi) - np.pi
+    heading = wanted + 0.05 * np.sin(time)
+    named = {"time": time, "heading": np.degrees(heading) % 360.0, "yaw_setpoint": wanted, "rudder": 0.2 * np.sin(time)}
+    signals = inspect_log(write_table(tmp_path / "log.csv", named)).proposal.body["signals"]
+    assert (signals["yaw_rad"]["unit"], signals["yaw_goal_rad"]["unit"]) == ("deg", "rad")
+    named["yaw_setpoint"] = np.degrees(wanted) % 360.0
+    signals = inspect_log(write_table(tmp_path / "log.csv", named)).proposal.body["signals"]
+    assert signals["yaw_goal_rad"]["unit"] == "deg"
+
+
+def test_a_stamp_is_no_speed_whatever_its_name(tmp_path):
+    named = {"time": TRUTH["time_s"], "last_speed_update": 1.7e9 + np.floor(TRUTH["time_s"]), "current_speed": TRUTH["surge_m_s"],
+             "heading_deg": np.degrees(TRUTH["yaw_rad"]), "rudder_deg": np.degrees(TRUTH["rudder_rad"])}  # fmt: skip
+    assert (
+        inspect_log(write_table(tmp_path / "log.csv", named)).proposal.body["signals"]["surge_m_s"]["column"] == "current_speed"
+    )
