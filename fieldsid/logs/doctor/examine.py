@@ -36,7 +36,7 @@ def examine(run: Run, fin_max_rad: Mapping[str, float] | None = None, stated: St
             *findings,
             *angle_findings(run, stated, faulty),
             *pair_findings(run, stated),
-            *fin_findings(run),
+            *fin_findings(run, stated),
         )
 
 

@@ -11,7 +11,9 @@ from fieldsid.errors import DataError
 from fieldsid.logs.channels import AXES
 from fieldsid.logs.convert.conditioning import blocks_of
 from fieldsid.logs.convert.servo_counts import servo_of
+from fieldsid.logs.convert.units import DEGREE
 from fieldsid.logs.doctor.holes import MOVED
+from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.doctor.together import SURE, together
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
@@ -30,12 +32,12 @@ ROLLED = math.acos(0.9)
 """Roll phi in rad at which the yaw rate of the body differs by a tenth from that of the heading: r = psi' cos(phi)."""
 
 
-def fin_findings(run: Run) -> list[Note]:
+def fin_findings(run: Run, stated: Stated) -> list[Note]:
     """Return the findings on the fins and on the roll of a run."""
     found = []
-    for (_, rate), (fin, _) in AXES:
+    for (angle, rate), (fin, _) in AXES:
         if run.has(fin):
-            found += [*_range_finding(run, fin), *_early_response(run, fin, rate)]
+            found += [*_range_finding(run, fin), *_early_response(run, fin, rate), *_as_in_radians(run, angle, fin, stated)]
     return [*found, *(_roll_finding(run) if run.has("roll_rad") else [])]
 
 
@@ -48,6 +50,20 @@ def _range_finding(run: Run, fin: str) -> list[Note]:
         "its whole range, set `unit: 1`, with its largest angle in rad as `scale`"
     )
     return [Note("fin_range", message, {"signal": fin, "value": largest, "limit": WIDEST})]
+
+
+def _as_in_radians(run: Run, angle: str, fin: str, stated: Stated) -> list[Note]:
+    """Return the finding that an angle and its fin are stated in degrees, and neither goes further than numbers in rad do."""
+    if not run.has(angle) or any(stated.units.get(s) != "deg" for s in (angle, fin)):
+        return []
+    largest, deflected = (float(np.nanmax(np.abs(run[s]))) / DEGREE for s in (angle, fin))
+    if largest > (math.tau if angle == "yaw_rad" else 0.5 * math.pi) or not 0.0 < deflected <= WIDEST:
+        return []
+    message = (
+        f"{fin} and {angle} are taken in deg, and reach {deflected:.3g} and {largest:.3g} deg only, as numbers in rad do: set "
+        "`unit: rad` at both where they are, and `unit: rad/s` at the rate"
+    )
+    return [Note("unit", message, {"signal": fin, "value": deflected, "limit": WIDEST})]
 
 
 def refuse_no_angle(run: Run, fin: str) -> None:

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from fieldsid.errors import DataError
+from fieldsid.logs import load_run
+from fieldsid.logs.inspection import inspect_log, write_proposal
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
@@ -35,3 +37,15 @@ def test_an_angle_and_a_spike_in_it_are_not():
     fin = 0.6 * MOVES
     fin[7] = 40.0
     assert len(record_of(run_with(fin), Axis.YAW)) == TIME.size
+
+
+@pytest.mark.parametrize(("swing", "fin", "is_said"), [(2.0, 0.25, True), (2.0, 5.0, False), (40.0, 0.25, False)])
+def test_a_row_of_degrees_over_numbers_in_rad_is_said(tmp_path, swing, fin, is_said):
+    time = np.arange(0.0, 60.0, 0.1)
+    rows = zip(time, swing * np.sin(0.3 * time), 0.3 * swing * np.cos(0.3 * time), fin * np.sign(np.cos(0.3 * time)), strict=True)
+    table = ["time,heading,yaw_rate,rudder", "SEC,DEG,DEG/S,DEG", *(",".join(f"{v:.5f}" for v in row) for row in rows)]
+    (tmp_path / "log.csv").write_text("\n".join(table) + "\n")
+    run = load_run(tmp_path / "log.csv", write_proposal(inspect_log(tmp_path / "log.csv"), tmp_path / "m.yaml"))
+    said = [n.message for n in run.notes if n.code == "unit"]
+    assert bool(said) == is_said
+    assert not said or "`unit: rad`" in said[0]
