@@ -155,7 +155,7 @@ def series_of(path: Path, columns: Columns, mapping: ChannelMap, notes: tuple[No
         unit = None if signal in COMBINED else columns.unit(picked[0], signal)
         bad += _other_unit_below(columns, picked[0], signal, source.unit or unit) if mapping.origin is None else []
         series[signal] = Series(time, values, label, unit, label.strip().lower() == "z")
-    bad += _other_fins(columns, mapping) if mapping.origin is None else []
+    bad += _other_fins(columns, mapping) if mapping == own_map_of(columns.names) else []
     ignored = _ignored(columns, mapping)
     return RawLog(stem_of(path), series, (*notes, *time_notes, *bad, *ignored))
 
