@@ -28,6 +28,10 @@ a step, so that the response to the previous step is over."""
 EARLY = 0.15
 """Largest share of the response to a step that may precede it, as the remainder of earlier motion."""
 FEWEST = 5
+ONE_SIDED = 0.02
+"""Largest deflection to the other side of a fin that goes to one side only, as a share of its largest one."""
+FEWEST_EACH_SIDE, OTHER_SIDE = 2, 0.3
+"""Fewest turns to each side, and their smallest ratio, at which a fin on one side turns a vehicle to both."""
 ROLLED = math.acos(0.9)
 """Roll phi in rad at which the yaw rate of the body differs by a tenth from that of the heading: r = psi' cos(phi)."""
 
@@ -38,6 +42,7 @@ def fin_findings(run: Run, stated: Stated) -> list[Note]:
     for (angle, rate), (fin, _) in AXES:
         if run.has(fin):
             found += [*_range_finding(run, fin), *_early_response(run, fin, rate), *_as_in_radians(run, angle, fin, stated)]
+            found += _without_side(run, angle, fin)
     return [*found, *(_roll_finding(run) if run.has("roll_rad") else [])]
 
 
@@ -64,6 +69,31 @@ def _as_in_radians(run: Run, angle: str, fin: str, stated: Stated) -> list[Note]
         "`unit: rad` at both where they are, and `unit: rad/s` at the rate"
     )
     return [Note("unit", message, {"signal": fin, "value": deflected, "limit": WIDEST})]
+
+
+def _without_side(run: Run, angle: str, fin: str) -> list[Note]:
+    """Return the finding that a fin goes to one side only, and the vehicle turns to either one while it is there.
+
+    The turns over the stretches with more than half of the largest deflection are compared. With a sign they have one side.
+    """
+    both = together(run, fin, angle)
+    if both is None:
+        return []
+    _, moves, turned = both
+    largest = float(np.max(np.abs(moves)))
+    if min(-float(np.min(moves)), float(np.max(moves))) > ONE_SIDED * largest or largest == 0.0:
+        return []
+    ends = np.diff(np.abs(moves) > 0.5 * largest, prepend=False, append=False).nonzero()[0].reshape(-1, 2)
+    turns = np.array([turned[end - 1] - turned[start] for start, end in ends])
+    of_side = [turns[side * turns > 0.0] for side in (-1.0, 1.0)]
+    less, more = sorted(float(np.abs(t).sum()) for t in of_side)
+    if min(t.size for t in of_side) < FEWEST_EACH_SIDE or less < OTHER_SIDE * more:
+        return []
+    message = (
+        f"{fin} goes to one side only, and {angle} turns to either one over its {turns.size} deflections: it is a size without "
+        "its side, which another column may hold; give it its sign before the import"
+    )
+    return [Note("no_side", message, {"signal": fin, "value": less / more, "limit": OTHER_SIDE, "count": int(turns.size)})]
 
 
 def refuse_no_angle(run: Run, fin: str) -> None:

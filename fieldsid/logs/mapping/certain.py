@@ -21,6 +21,7 @@ DOUBT_REASONS: Mapping[str, str] = MappingProxyType(
     {"alternatives": "it may be another one", "left_out": "it cannot be read", "frame_open": "port and starboard are open",
      "course_against": "the course goes against it", "course_slope": "the course turns otherwise", "unit": "its unit is open",
      "course_offset": "the course is off it", "fin_range": "no fin goes so far", "fin_late": "the motion comes before it",
+     "no_side": "its side is open",
      "rate_scale": "angle and rate differ", "constant": "it never moves", "speed_unit": "its unit is open",
      "depth_unit": "its unit is open", "dive_sign": "its sign is open", "speed_sign": "its sign is open",
      "over_ground": "it may be a course over ground"}
