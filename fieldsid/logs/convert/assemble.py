@@ -129,7 +129,7 @@ def _split_by_sensor(raw: RawLog) -> RawLog:
         s: replace(raw.series[s], time=raw.series[s].time[rows], values=raw.series[s].values[rows]) for s, rows in filled.items()
     }
     numbers = {s: int(_numbers(raw.series[s]).sum()) for s in filled}
-    repeats = tuple(note_on_repeats(s, rows, numbers[s]) for s, rows in filled.items() if rows.sum() < numbers[s])
+    repeats = tuple(note_on_repeats(s, rows, raw.series[s].values) for s, rows in filled.items() if rows.sum() < numbers[s])
     return replace(raw, series=series, notes=(*raw.notes, *repeats), one_clock=False)
 
 

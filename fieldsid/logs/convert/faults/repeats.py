@@ -1,7 +1,8 @@
-"""Find the repeats of a sensor that is slower than the rows of its table; a repeated number is no new measurement.
+"""Find how a table fills the rows of a slower sensor, by repeats or straight lines; what it fills in is no new measurement.
 
 If the repeats were fitted as measurements, the signal would be late by half a step of the sensor, and the noise of each
-measurement would be counted several times.
+measurement would be counted several times. Numbers on a line between two measurements have less noise than the sensor, and the
+noise floor, against which a model is judged, would be too low.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from fieldsid.logs.convert.faults.spikes import last_digit
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
@@ -16,6 +18,12 @@ FEWEST = 10
 """Smallest number of changes from which the sensor's interval is estimated."""
 DIGITS = 1.5
 """Smallest ratio of the median change to the smallest one at which a sensor that measures anew seldom repeats a number."""
+
+STRAIGHT, BENT, UNEVEN = 2.5, 10.0, 1.5
+"""Largest bend of a straight line and smallest median bend between two lines, in last digits; and the largest ratio of the 95th
+percentile of the rows per line to their median."""
+SIGNIFICANT = 1e-5
+"""Largest last digit of a number that is written with six digits, as a share of it."""
 
 
 def without_repeats(name: str, values: FloatArray) -> tuple[FloatArray, list[Note]]:
@@ -25,7 +33,7 @@ def without_repeats(name: str, values: FloatArray) -> tuple[FloatArray, list[Not
     every = _rows_per_measurement(changed)
     if every == 1:
         own = measured_anew(values)
-        return (values, []) if own[seen].all() else (np.where(own, values, np.nan), [note_on_repeats(name, own, seen.size)])
+        return (values, []) if own[seen].all() else (np.where(own, values, np.nan), [note_on_repeats(name, own, values)])
     measured = np.full(values.shape, np.nan)
     fresh = seen[(changed[0] + 1) % every :: every]
     measured[fresh] = values[fresh]
@@ -54,23 +62,52 @@ def measured_anew(values: FloatArray) -> BoolArray:
 
     A table that is written at each message repeats the other sensors, now once and now several times. Most changes are then more
     than a row apart, though they are larger than the last digit. Of a sensor that stops, with its vehicle or by a fault, most
-    changes follow on each other, and of one with few digits most are by the last digit: those keep all rows.
+    changes follow on each other, and of one with few digits most are by the last digit: those keep all rows. So do the bends of a
+    line through the numbers, where a table is filled by straight lines.
     """
     columns = values if values.ndim > 1 else values[:, None]
     rows = np.asarray(np.isfinite(columns).all(axis=1))
     steps = np.abs(np.diff(columns[rows], axis=0)).max(axis=1, initial=0.0)
     changed = np.flatnonzero(steps)
-    if changed.size < FEWEST or _rows_per_measurement(changed) > 1 or float(np.median(np.diff(changed))) < 2.0:
+    if changed.size < FEWEST or _rows_per_measurement(changed) > 1:
         return rows
-    if float(np.median(steps[changed])) > DIGITS * float(steps[changed].min()):
+    if float(np.median(np.diff(changed))) < 2.0:
+        rows[rows] = _bends(columns[rows])
+    elif float(np.median(steps[changed])) > DIGITS * float(steps[changed].min()):
         rows[rows] = np.append(True, steps > 0.0)
     return rows
 
 
-def note_on_repeats(name: str, own: BoolArray, seen: int) -> Note:
-    """Return the note that of the `seen` samples of a signal only its `own` (n,) were measured."""
+def _bends(columns: FloatArray) -> BoolArray:
+    """Return a mask of the rows of numbers (n, k) between straight lines, with both ends; all rows where there are no such lines.
+
+    The lines between the messages of a sensor are about equally long, and unlike those of numbers with few digits they bend by
+    many digits.
+    """
+    digit = np.maximum(last_digit(columns[:, 0]), SIGNIFICANT * np.abs(columns).max(axis=1))[1:-1]
+    bend = np.abs(np.diff(columns, 2, axis=0)).max(axis=1) / np.where(digit > 0.0, digit, np.inf)
+    at, every = np.flatnonzero(bend > STRAIGHT), np.ones(len(columns), dtype=np.bool_)
+    apart = np.diff(at)
+    if at.size < FEWEST or float(np.median(apart)) < 2.0 or float(np.median(bend[at])) < BENT:
+        return every
+    if float(np.percentile(apart, 95)) > UNEVEN * float(np.median(apart)):
+        return every
+    every[1:-1] = bend > STRAIGHT
+    return every
+
+
+def note_on_repeats(name: str, own: BoolArray, values: FloatArray) -> Note:
+    """Return the note that of the samples of a signal (n,), or of several (n, k), only its `own` (n,) were measured."""
+    columns = values if values.ndim > 1 else values[:, None]
+    seen = np.isfinite(columns).all(axis=1)
+    is_held = bool((np.diff(columns[seen], axis=0)[~own[seen][1:]] == 0.0).all())
+    how, what = (
+        ("repeated until the next, as in a table that is written at each message", "the repeats")
+        if is_held
+        else ("interpolated between, as in a table that is filled by straight lines", "the samples between")
+    )
     message = (
-        f"{name} was measured at {100 * own.sum() / seen:.0f} % of its samples only ({own.sum()}), and repeated until the next, "
-        "as in a table that is written at each message; the repeats are missing now"
+        f"{name} was measured at {100 * own.sum() / seen.sum():.0f} % of its samples only ({own.sum()}), and {how}; {what} are "
+        "missing now"
     )
     return Note("repeated", message, {"signal": name, "count": int(own.sum())})

@@ -48,3 +48,25 @@ def test_of_a_number_that_is_repeated_now_and_then_the_first_sample_stays():
     assert set(np.flatnonzero(np.isfinite(own))) >= set(fresh[np.append(True, np.diff(held[fresh]) != 0.0)])
     assert np.isfinite(own).sum() == note.data["count"] <= fresh.size
     assert note.code == "repeated"
+
+
+@pytest.mark.parametrize("digits", [5, 12])
+@pytest.mark.parametrize("rows", [3, 5])
+def test_numbers_on_straight_lines_between_measurements_are_missing(rows, digits):
+    knots = np.unique(np.append(np.arange(600 // rows) * rows + RANDOM.integers(0, 2, 600 // rows), (0, 599)))
+    filled = np.round(np.interp(np.arange(600), knots, MOVING[knots]), digits)
+    own, (note,) = without_repeats("yaw_rad", filled)
+    kept = np.flatnonzero(np.isfinite(own))
+    assert set(kept) <= set(knots)
+    assert kept.size > 0.95 * knots.size
+    assert note.code == "repeated"
+    assert "interpolated between" in note.message
+
+
+RAMPS = np.interp(np.arange(600), np.cumsum(RANDOM.integers(3, 60, 40)), RANDOM.standard_normal(40))
+SMOOTH = np.sin(0.02 * np.arange(600))
+
+
+@pytest.mark.parametrize("values", [RAMPS, SMOOTH, np.round(SMOOTH, 3), np.round(SMOOTH, 6)], ids=["ramps", "smooth", "3", "6"])
+def test_ramps_and_smooth_numbers_are_no_lines_between_measurements(values):
+    assert without_repeats("yaw_rad", values)[1] == []
