@@ -25,6 +25,8 @@ SEPARATORS = ("\t", ";", ",", "|", "whitespace")
 _RULE = re.compile(r"^[\s|+:=-]*[-=]{2,}[\s|+:=-]*$")
 """A line of dashes or equal signs below the names."""
 
+_WITH_UNIT = re.compile(r"[^\s\[(]\S*(?:\s+(?:\[[^\]]*\]|\([^)]*\)))?")
+
 
 def header_of(
     lines: list[str], at: int, first: int, separator: str, width: int, *, stated: bool | None
@@ -82,6 +84,9 @@ def _names(line: str, separator: str, width: int) -> tuple[str, ...]:
     if len(names) != width and separator == "whitespace":
         # names of several words are separated by at least two blanks
         names = [n.strip() for n in re.split(r"\s{2,}|\t", bare.strip())]
+    if len(names) != width and separator == "whitespace":
+        # a unit in brackets belongs to the word before it, in columns of a fixed width that a long name may fill
+        names = _WITH_UNIT.findall(bare)
     if len(names) != width:
         names = _split_by_other(bare, separator, width)
     if len(names) != width or any(is_number_or_date(n) for n in names) or not any(names):

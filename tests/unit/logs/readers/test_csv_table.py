@@ -277,3 +277,17 @@ def test_a_row_of_units_that_says_another_unit_than_the_name_is_told(tmp_path):
     assert note.message.startswith("yaw_rad is taken in rad, and the row of units says deg")
     path.write_text(path.read_text().replace("s,deg,rad", "s,rad,rad"))
     assert "unit" not in {n.code for n in load_run(path).notes}
+
+
+def test_names_of_a_fixed_width_have_their_units_in_brackets_also_where_one_fills_its_column(tmp_path):
+    head = f"{'time [s]':>14}{'psi [rad]':>14}{'r [rad/s]':>14}{'delta_t':>14}{'delta_r [rad]':>14}"
+    rows = [f"{0.1 * i:.4f} {0.01 * i:.4f} 0.1000 0.5000 {0.1 * (-1) ** (i // 9):.4f}" for i in range(100)]
+    (tmp_path / "log.txt").write_text("\n".join([head, *rows]) + "\n")
+    lines = (tmp_path / "log.txt").read_text()
+    assert list(form_of(lines, TableForm(), tmp_path / "log.txt").names) == [
+        "time [s]",
+        "psi [rad]",
+        "r [rad/s]",
+        "delta_t",
+        "delta_r [rad]",
+    ]
