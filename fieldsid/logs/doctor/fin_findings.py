@@ -42,8 +42,7 @@ def fin_findings(run: Run, stated: Stated) -> list[Note]:
     for (angle, rate), (fin, _) in AXES:
         if run.has(fin):
             found += [*_range_finding(run, fin), *_early_response(run, fin, rate), *_as_in_radians(run, angle, fin, stated)]
-            found += _without_side(run, angle, fin)
-    return [*found, *(_roll_finding(run) if run.has("roll_rad") else [])]
+    return [*found, *_without_side(run, "yaw_rad", "rudder_rad"), *(_roll_finding(run) if run.has("roll_rad") else [])]
 
 
 def _range_finding(run: Run, fin: str) -> list[Note]:
@@ -74,7 +73,8 @@ def _as_in_radians(run: Run, angle: str, fin: str, stated: Stated) -> list[Note]
 def _without_side(run: Run, angle: str, fin: str) -> list[Note]:
     """Return the finding that a fin goes to one side only, and the vehicle turns to either one while it is there.
 
-    The turns over the stretches with more than half of the largest deflection are compared. With a sign they have one side.
+    The turns over the stretches with more than half of the largest deflection are compared. With a sign they have one side; in
+    pitch they need not, as the stiffness turns the vehicle back.
     """
     both = together(run, fin, angle)
     if both is None:
