@@ -17,6 +17,7 @@ from fieldsid.models.effect import Effect
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.plant.remedies import fin_limit_hint, limiting_damping_hint, refuse_fin_limit
+from fieldsid.rounding import TWO_SIDED_95
 from fieldsid.turning.believed_rows import believed_rows, doubts_of_draws
 from fieldsid.turning.flown_circles import against_rudder, against_rudder_note, circles_of, compared_with, with_measurement
 from fieldsid.turning.maneuvering.belief import SEED, Belief, believe, not_fitted
@@ -157,7 +158,20 @@ def _refuse_turns(source: ParameterSource, speeds: Sequence[float], rudder: floa
     refuse_unstable(damping[least_damped], f"at {least_damped:.3g} m/s", limiting_damping_hint(source, least_damped))
     worst = max(speeds, key=lambda speed: abs(_offset(source, speed)))
     offset = _offset(source, worst)
+    if abs(offset) >= rudder:
+        _refuse_untold(source, worst)
     refuse_short_fin(rudder, offset, f"at {worst:.3g} m/s", fin_limit_hint("--fin-max", abs(offset), source))
+
+
+def _refuse_untold(source: ParameterSource, speed: float) -> None:
+    """Raise ModelError where the authority b2 at a speed may be zero (95 %): the offset C0/b2 is then any."""
+    b, error = source.base_at(speed)[NAMES[Axis.YAW].authority], source.base_std_at(speed).get(NAMES[Axis.YAW].authority, 0.0)
+    if abs(b) < TWO_SIDED_95 * error:
+        raise ModelError(
+            f"b2 cannot be told from zero at {speed:.3g} m/s: no radius follows from it, nor the offset of the fin",
+            found=f"b2 = {b:.3g} +/- {error:.2g} 1/s^2",
+            hint="fly larger or longer pulses of the rudder, and identify again",
+        )
 
 
 def _offset(source: ParameterSource, speed: float) -> float:

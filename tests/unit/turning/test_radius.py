@@ -187,6 +187,14 @@ def test_a_rudder_below_the_offset_is_refused(tmp_path):
         turn_radius(load_parameter_source([path]), [1.37], 0.26)
 
 
+def test_an_offset_by_an_authority_that_may_be_zero_is_no_offset(tmp_path):
+    """It was said that the vehicle turns to one side only, and to trim the fin, for an offset of 0.7 +/- 26 rad."""
+    path = tmp_path / "case.csv"
+    path.write_text("speed_m_s,a22,b2,C0,a22_std_error,b2_std_error,C0_std_error\n1.37,2.15,-0.02,0.01,0.2,0.03,0.01\n")
+    with pytest.raises(ModelError, match=r"b2 cannot be told from zero at 1\.37 m/s"):
+        turn_radius(load_parameter_source([path]), [1.37], 0.26)
+
+
 def test_a_sway_mode_slower_than_any_held_turn_is_named_and_does_not_make_the_turn_endless(tmp_path):
     slow = {"cross_damping": 0.04, "cross_rate": -0.15}
     effects = ("sway_coupling", "quadratic_damping")
