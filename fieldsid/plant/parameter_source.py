@@ -20,7 +20,7 @@ from fieldsid.models.record import knows_speed
 from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.laws.axis_laws import KIND as FIT_KIND
-from fieldsid.plant.laws.axis_laws import Laws, carried_models, fit_laws, load_laws, with_own_law
+from fieldsid.plant.laws.axis_laws import Laws, carried_models, fit_laws, load_laws, refuse_single_speed, with_own_law
 from fieldsid.plant.laws.parameter_law import ParameterLaw
 from fieldsid.plant.points import (
     EQUAL_SPEED_SHARE,
@@ -87,8 +87,12 @@ class ParameterSource(Brief):
         return (Note("model_left_out", f"{', '.join(self.left_out)}: {words}", {"models": list(self.left_out)}),)
 
     def fitted(self, *, weighted: bool = True) -> Laws:
-        """Return the laws of the points, with the note on models that are left out; raises DataError as `fit_laws` does."""
+        """Return the laws of the points, with the note on models that are left out.
+
+        Raises DataError as `fit_laws` does, and where the authority is known at one speed only.
+        """
         laws = fit_laws(self.axis, self.points, weighted=weighted)
+        refuse_single_speed(self.axis, [p for p in self.points if NAMES[self.axis].authority in p.values])
         return replace(laws, notes=(*laws.notes, *self.notes))
 
     def supports(self, speed: float) -> bool:

@@ -77,11 +77,10 @@ def fit_laws(axis: Axis, points: Sequence[Point], *, weighted: bool = True) -> L
     """Fit the law of every parameter of an axis that is known at two speeds or more.
 
     `weighted`: the points are weighted by their standard errors where all of them have one; otherwise all weights are equal.
-    Raises DataError when the authority is known at one speed only, or when the sign of the authority differs between points.
+    Raises DataError when the sign of the authority differs between points.
     """
     points = tuple(sorted(points, key=lambda p: nine_digits(p.speed)))
     sign = check_authority(axis, points)
-    _refuse_single_speed(axis, [p for p in points if NAMES[axis].authority in p.values])
     laws, notes = {}, []
     for name in NAMES[axis].base:
         known = [p for p in points if name in p.values]
@@ -213,7 +212,8 @@ def _errors(name: str, points: Sequence[Point]) -> FloatArray | None:
     return np.array(errors) if bool(np.all(np.isfinite(errors))) and errors else None
 
 
-def _refuse_single_speed(axis: Axis, points: Sequence[Point]) -> None:
+def refuse_single_speed(axis: Axis, points: Sequence[Point]) -> None:
+    """Raise DataError where points have one speed, through which no law against u^2 can be drawn."""
     speeds = np.array([p.speed for p in points])
     if distinct_speeds(speeds) > 1:
         return

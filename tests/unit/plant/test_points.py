@@ -16,7 +16,7 @@ from fieldsid.errors import ArtifactError, DataError, FieldsidError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.speed_law import SpeedLaw
-from fieldsid.plant.laws.axis_laws import fit_laws, load_laws, save_laws
+from fieldsid.plant.laws.axis_laws import load_laws, save_laws
 from fieldsid.plant.parameter_source import draw_values, load_parameter_source, logs_of, source_of_models
 from fieldsid.plant.points import distinct_speeds, intended_speeds
 from fieldsid.plant.table import read_table
@@ -93,7 +93,7 @@ def test_one_speed_only_gives_no_law_but_shows_the_point(tmp_path):
     source = load_parameter_source([written(tmp_path, "speed_m_s,a22,b2\n1.50,1.0,-0.8\n1.51,1.0,-0.82\n")])
     assert source.laws is None
     with pytest.raises(DataError) as caught:
-        fit_laws(source.axis, source.points)
+        source.fitted()
     assert "one speed only" in caught.value.what
     assert "b2 = -0.8" in caught.value.found
 
