@@ -140,6 +140,10 @@ class LinearPlant:
         """Return the fin (rad) per rad of reference that cancels the estimate's stiffness."""
         return float(self.stiffness[0]) / float(self.slow_authority[0])
 
+    def steady_fin(self, angle: float) -> float:
+        """Return the fin (rad) with which the estimate holds an angle (rad) against its stiffness and trim."""
+        return self.reference_gain * angle - float(self.offset[0])
+
 
 def products(left: FloatArray, right: FloatArray) -> FloatArray:
     """Return the products of polynomials, row by row: (d, m) and (d, n) give (d, m + n - 1)."""

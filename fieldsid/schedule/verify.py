@@ -197,8 +197,7 @@ def promised_step(schedule: Schedule, of: Plants, speed: float, start: float, si
     flown = _flown_to_rest(plant, rows, size, pace_of(plant, limit, schedule.wish.step_of(schedule.axis)))
     off = np.abs(steady_error(flown.angle[flown.time <= held], abs(size)))
     step = replace(_step(flown, abs(size), schedule.rows[0].gains), off=worst_of(off, most=True))
-    fin = abs(float(plant.offset[0]) - plant.reference_gain * size)
-    return _without_unsupported(step, flown, plant, of.tightest_flown, can_hold=fin < limit)
+    return _without_unsupported(step, flown, plant, of.tightest_flown, can_hold=abs(plant.steady_fin(size)) < limit)
 
 
 def steps_of(schedule: Schedule) -> tuple[float, float, float]:
@@ -240,7 +239,7 @@ def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) ->
     least_phase, least_gain, least_delay = found.worst()
     sizes = steps_of(schedule)
     (small, usual, large), flights, others = zip(*(_to_both_sides(plant, rows, size, pace) for size in sizes), strict=True)
-    fin = abs(float(plant.offset[0])) + abs(plant.reference_gain) * large.size
+    fin = max(abs(plant.steady_fin(side * large.size)) for side in SIDES)
     tight = max(flights[2], others[2], key=tightest)
     large = _without_unsupported(large, tight, plant, flight.curvature, can_hold=fin < row.fin_limit)
     compensated = [replace(r, feed_forward=r.feed_forward - FIN_OFFSET_RAD) for r in rows]

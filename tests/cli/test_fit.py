@@ -83,17 +83,16 @@ def test_a_fit_file_is_not_fitted_again(run_cli, tmp_path):
     assert "fit file already" in answer.err
 
 
-def test_an_authority_at_one_of_the_speeds_only_is_one_speed_only(run_cli, tmp_path):
-    table = tmp_path / "table.csv"
-    table.write_text("speed_m_s,a22,b2\n1.0,1.1,\n1.4,1.5,-0.9\n1.8,2.0,\n")
-    answer = run_cli("fit", table)
+@pytest.mark.parametrize(
+    ("rows", "says"),
+    [
+        ("speed_m_s,a22,b2\n1.0,1.1,\n1.4,1.5,-0.9\n1.8,2.0,\n", "at 1.4 m/s a22 = 1.5, b2 = -0.9"),
+        ("speed_m_s,a22,b2,b2_std_error\n1.0,1.1,-0.7,0.01\n1.4,1.5,-0.9,-0.01\n", "line 3: a standard error is not below zero"),
+    ],
+    ids=["an authority at one speed only", "a standard error below zero"],
+)
+def test_a_table_without_a_law_is_refused(run_cli, tmp_path, rows, says):
+    (tmp_path / "table.csv").write_text(rows)
+    answer = run_cli("fit", tmp_path / "table.csv")
     assert answer.code == 2
-    assert "at 1.4 m/s a22 = 1.5, b2 = -0.9" in answer.err
-
-
-def test_a_standard_error_below_zero_is_refused(run_cli, tmp_path):
-    table = tmp_path / "table.csv"
-    table.write_text("speed_m_s,a22,b2,b2_std_error\n1.0,1.1,-0.7,0.01\n1.4,1.5,-0.9,-0.01\n")
-    answer = run_cli("fit", table)
-    assert answer.code == 2
-    assert "line 3: a standard error is not below zero" in answer.err
+    assert says in answer.err

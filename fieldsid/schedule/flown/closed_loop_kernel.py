@@ -121,7 +121,7 @@ def close_loop(
         late, most = int(plants.delay_steps[case]), plants.largest_move[case]
         kinds, a, b = kinds_of(plants.core[case]), plants.damping[case], plants.authority[case]
         gains_at(table, speed, now)
-        core = plants.core[case].copy()  # not filled: an assignment of arrays compiles for 2 s, as its error has words
+        core = plants.core[case].copy()  # for `core[:] =` numba would compile the text of its shape error, for 2 s
         p = x = z = 0.0
         u = speed
         y, integral, start = steady_state(stiffness, b, offset, now)
