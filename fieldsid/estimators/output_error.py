@@ -187,7 +187,7 @@ def solve(problem: Problem, _options: Options) -> Solution:
     found, weights = found_minimum(problem)
     noise_kind, noise, notes = chosen_noise(problem, found.x, weights)
     full = errors(problem, found, weights, noise, noise_kind)
-    return Solution(found.x, shared_covariance(problem, full, found.free), noise, ESTIMATOR.name, notes)
+    return Solution(found.x, shared_covariance(problem, found.x, full, found.free), noise, ESTIMATOR.name, notes)
 
 
 ESTIMATOR = Estimator(

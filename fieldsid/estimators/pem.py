@@ -60,7 +60,7 @@ def solve_from(problem: Problem, x: FloatArray, weights: Noise) -> Solution:
         lines = linearise_runs(part, found.x)
         noise, _ = reml_noise(problem, lines, restricted_likelihood(lines, len(problem.layout.parameters)), noise_kind, noise)
     notes = (Note("noise_model", f"noise model: {noise_kind}", {"family": noise_kind}),)
-    known = shared_covariance(problem, errors(problem, found, noise, noise_kind), found.free)
+    known = shared_covariance(problem, found.x, errors(problem, found, noise, noise_kind), found.free)
     return Solution(found.x, known, noise, ESTIMATOR.name, notes, weights=noise)
 
 

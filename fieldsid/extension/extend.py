@@ -18,6 +18,7 @@ from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.diagnosis.report.final_model import final_model
+from fieldsid.diagnosis.search.noiseless_search import noiseless_line
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import MAX_ERROR_RATIO
 from fieldsid.display import Brief, Plotted
@@ -137,7 +138,7 @@ def extend_in_steps(
     work = Search(learned, judged, parent.axis, parts, parent.effects, report, thorough=True, given=parent)
     line = _refitted_line(work, new)
     steps = _extensions_of_line(work, line, new, notes)
-    if not judged or whole_of(steps).pays or not is_accepted(line[0], line[-1]):
+    if not judged or work.is_noiseless or whole_of(steps).pays or not is_accepted(line[0], line[-1]):
         return steps
     work = Search((*learned, *judged), (), parent.axis, parts, parent.effects, report, thorough=True, given=parent)
     return _extensions_of_line(work, _refitted_line(work, new), new, (*notes, FITTED_TO_ALL))
@@ -159,6 +160,8 @@ def _refitted_line(work: Search, new: Sequence[Effect]) -> list[ScoredModel]:
     """
     work.base()
     line = [work.root | {e.name for e in new[:size]} for size in range(len(new) + 1)]
+    if work.is_noiseless:
+        return noiseless_line(work, line)
     front = {work.root}
     for ends in line[1:]:
         children = {frozenset(c.names): c for key in front for c in work.grow(work.tried[key], forced=True)}

@@ -166,13 +166,14 @@ def _identify_or_extend(state: FolderState) -> tuple[str, str] | None:
         if not (words := run_words(state)):
             return None
         return "no diagnosis yet", _line("diagnose", *_unless_default(state, *words), "--axis", axis)
-    if (unsettled := _follow_up(state, diagnosis)) is not None:
+    since = "" if diagnosis is None else diagnosis.time
+    extended = any(e.time >= since for e in state.done("extend"))
+    if not extended and (unsettled := _follow_up(state, diagnosis)) is not None:
         return unsettled
     best = state.models[0]
     named = () if (made := _diagnosis_of(state, best)) is None else made.effects
     lacking = [e for e in named if e not in best.effects]
-    since = "" if diagnosis is None else diagnosis.time
-    if lacking and not any(e.time >= since for e in state.done("extend")):
+    if lacking and not extended:
         fitted, judged = diagnosed_runs(state, best)
         typed = _unless_default(state, best.path, *fitted, *_repeat_option("--validate", judged))
         return f"the diagnosis names {', '.join(lacking)}", _line("extend", *typed, *_repeat_option("--add", lacking))

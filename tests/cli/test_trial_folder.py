@@ -228,6 +228,14 @@ def test_a_diagnosis_that_named_nothing_for_sure_is_followed_up(run_cli, folder,
     assert run_cli("status", "--json").json["next"]["command"] == next_
 
 
+def test_a_diagnosis_that_was_acted_upon_is_not_asked_for_again(run_cli, folder):
+    assert run_cli("identify", "--axis", "yaw", "--joint", "--no-figures").code == 0
+    searched, extended_since = ("diagnose", "--axis", "yaw"), ("extend", "--add", "servo_lag")
+    for minute, (command, verdict) in enumerate([(searched, "unexplained: 2.3 x"), (extended_since, "not kept")]):
+        append(folder, Entry(f"2026-01-01T00:0{minute}:00+00:00", ("sysid", *command), 0, 1.0, verdict, (), ()))
+    assert run_cli("status", "--json").json["next"]["command"] == "sysid schedule design -o gains.yaml"
+
+
 def test_a_changed_run_makes_its_model_stale_and_the_gains_made_of_that(run_cli, folder):
     assert run_cli("identify", "--axis", "yaw", "--joint", "--no-figures").code == 0
     assert run_cli("schedule", "design", "-o", "gains.yaml").code == 0

@@ -39,12 +39,12 @@ def _with_covariance(h: ScoredModel, fitted: FittedProblem, noise: Noise) -> Mod
     weights = white_weights(problem, x)
     found = levenberg_marquardt(problem, x, weights, max_iterations=0)
     full = coloured_covariance(problem, found, weights, noise)
-    return model_of(problem, Solution(found.x, shared_covariance(problem, full, found.free), noise, "output_error"))
+    return model_of(problem, Solution(found.x, shared_covariance(problem, found.x, full, found.free), noise, "output_error"))
 
 
 def _by_likelihood(fitted: FittedProblem, noise: Noise) -> Model:
     """Return the model of the maximum-likelihood fit with its covariance."""
     slots = tuple(range(len(fitted.x)))
     _, normal, _, _ = normal_equations(fitted.problem, fitted.x, noise, slots)
-    solution = Solution(fitted.x, shared_covariance(fitted.problem, covariance(normal), slots), noise, "pem")
+    solution = Solution(fitted.x, shared_covariance(fitted.problem, fitted.x, covariance(normal), slots), noise, "pem")
     return model_of(fitted.problem, solution)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.likelihood_fit import fit_output_error
+from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, fit_output_error
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.moves.grounds import Grounds
 from fieldsid.fitting.initial.effect_screen import carry_parameters
@@ -20,6 +20,14 @@ def refitted_from(given: Model, h: ScoredModel, grounds: Grounds) -> ScoredModel
     The given values are a better start for effects whose cost is not smooth; and an optimum that a search reached by adding
     effects may not be found again from the base.
     """
+    start = output_error_of(given, h)
+    if start is None:
+        return h
+    return grounds.better(h, grounds.fit(start.problem, start.x, h.likelihood_fit.noise)).evaluate_errors()
+
+
+def output_error_of(given: Model, h: ScoredModel) -> FittedProblem | None:
+    """Return the output-error fit that starts at a given model's values, in its forms; None where it holds no start."""
     fitted = h.likelihood_fit.fitted
     groups = fitted.problem.layout.groups
     authority = NAMES[given.axis].authority
@@ -27,10 +35,9 @@ def refitted_from(given: Model, h: ScoredModel, grounds: Grounds) -> ScoredModel
     of_groups = {group_name(authority, groups, i): given.law.authority(u, given.values[authority]) for i, u in speeds}
     values = {**given.values, **given.at_speed(groups.speeds[groups.reference]), **of_groups}
     if not given.effects or not all(np.isfinite(v) for v in values.values()):
-        return h
+        return None
     problem = fitted.problem.with_effects([as_fitted(e.textbook or e, given.values) for e in h.effects])
     x = carry_parameters(problem.layout, fitted.vector)
     for i, name in enumerate(problem.layout.names):
         x[i] = values.get(name, x[i])
-    start = fit_output_error(problem, x, fitted.weights)
-    return grounds.better(h, grounds.fit(problem, start.x, h.likelihood_fit.noise)).evaluate_errors()
+    return fit_output_error(problem, x, fitted.weights)

@@ -15,7 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, fit_maximum_likelihood, fit_output_error
+from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, fit_output_error
 from fieldsid.diagnosis.evidence.scored_model import (
     ScoredModel,
     bare_model,
@@ -25,7 +25,9 @@ from fieldsid.diagnosis.evidence.scored_model import (
     validation_fits,
     validation_runs,
 )
+from fieldsid.diagnosis.moves.archive import Names
 from fieldsid.diagnosis.records import Pair
+from fieldsid.diagnosis.search.given_model import output_error_of
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import MAX_FREE_RUN_ERROR_RATIO, MIN_BASE_ERROR_SHARE
 from fieldsid.fitting.initial.effect_screen import ScreenResult, backtrack, carry_parameters, linearise_at, screen_effect
@@ -71,8 +73,7 @@ def noiseless_search(search: Search, explains: Callable[[ScoredModel], bool]) ->
     lower the log evidence are removed at the end, as long as the rest still `explains` enough; the rest is then extended by
     effects that gain log evidence. That set, and those without one of its effects, are stored in the archive of the search.
     """
-    base, explored = search.base(), Explored()
-    start = FreeRunFit(base.reported_fit, _as_modelled(base), 1.0, _charge(search, base.reported_fit))
+    start, explored = _start(search), Explored()
     grown = _grow(search, start, explored)
     if grown is start:
         return None
@@ -82,6 +83,33 @@ def noiseless_search(search: Search, explains: Callable[[ScoredModel], bool]) ->
         found = _grow_likelier(search, found, explored)
         found = _thin(search, found, _without_each(search, explored.fits[frozenset(found.names)], explored), explored, explains)
     return found
+
+
+def noiseless_line(search: Search, line: Sequence[Names]) -> list[ScoredModel]:
+    """Return the models of a line of sets, from the base to that with all its effects, by output error as in the search.
+
+    The sets are reached as in the search, from the best two of each size, and from the line's own.
+    """
+    start, explored = _start(search), Explored()
+    fits, front = [start], [start]
+    for ends in line[1:]:
+        for current in front:
+            for new in _forward_candidates(search, current.output_error_fit):
+                _keep(explored.fits, new)
+        grown = sorted((f for n, f in explored.fits.items() if len(n) == len(ends)), key=lambda f: f.error_ratio)
+        fits.append(explored.fits[ends])
+        front = [*grown[:BEAM_WIDTH], *(fits[-1:] if fits[-1] not in grown[:BEAM_WIDTH] else [])]
+    return search.parallel.map(partial(_scored, search), [f.output_error_fit for f in fits])
+
+
+def _start(search: Search) -> FreeRunFit:
+    """Return the base's output-error fit, from its own values or the given model's, and store it in the archive."""
+    base = search.base()
+    given = None if search.given is None else output_error_of(search.given, base)
+    fits = (base.reported_fit, base.likelihood_fit.fitted.by_output_error(), *([] if given is None else [given]))
+    best = min((replace(base, output_error_fit=f) for f in fits), key=lambda h: h.train_under(0.0).mean)
+    search.tried[search.root] = best.evaluate_errors()
+    return FreeRunFit(best.reported_fit, _as_modelled(best), 1.0, _charge(search, best.reported_fit))
 
 
 def _grow(search: Search, start: FreeRunFit, explored: Explored) -> FreeRunFit:
@@ -174,10 +202,11 @@ def _drop_effect(search: Search, fitted: FittedProblem, removed: Effect) -> Free
 
 
 def _scored(search: Search, fitted: FittedProblem) -> ScoredModel:
-    ml_fit = fit_maximum_likelihood(
-        fitted.problem, fitted.x, search.base().likelihood_fit.noise, search.resolution_floor, search.noise_kind
-    )
-    return replace(score_model(ml_fit, search.validation), output_error_fit=fitted)
+    """Return a model with its maximum-likelihood fit, the better of one from its free run and one from the base's likelihood."""
+    of_base, problem = search.base().likelihood_fit, fitted.problem
+    starts = (fitted.x, carry_parameters(problem.layout, of_base.fitted.vector))
+    fits = (search.grounds.fit(problem, x, of_base.noise) for x in starts)
+    return replace(score_model(max(fits, key=lambda f: f.log_likelihood), search.validation), output_error_fit=fitted)
 
 
 def _evaluate(search: Search, fitted: FittedProblem) -> FreeRunFit:

@@ -10,6 +10,7 @@ import numpy as np
 from fieldsid.display import Brief
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.logs.run import Note
+from fieldsid.models.effect import is_on_bound
 from fieldsid.models.model import Noise
 from fieldsid.numerics.arrays import FloatArray
 
@@ -73,11 +74,20 @@ class Estimator:
         return self.solve(problem, options) if self.after is None else self.after(problem, output_error)
 
 
-def shared_covariance(problem: Problem, full: FloatArray, free: tuple[int, ...]) -> FloatArray:
-    """Return the block (S, S) of a covariance (F, F) over free parameters that belongs to the shared parameters."""
-    count = problem.layout.shared
+def shared_covariance(problem: Problem, x: FloatArray, full: FloatArray, free: tuple[int, ...]) -> FloatArray:
+    """Return the block (S, S) of a covariance (F, F) over free parameters that belongs to the shared parameters of x (N,).
+
+    A parameter on a bound, of which the runs say less than its bounds do, counts as held there: its variance is zero.
+    """
+    count, parameters = problem.layout.shared, problem.layout.parameters
     out = np.zeros((count, count))
     keep = [i for i, slot in enumerate(free) if slot < count]
     where = [free[i] for i in keep]
     out[np.ix_(where, where)] = full[np.ix_(keep, keep)]
+    # a model even in a parameter has no derivative at zero, and its inverse information says a variance of 1e70 there
+    for slot in where:
+        parameter = parameters[slot]
+        low, high = parameter.low, parameter.high
+        if is_on_bound(float(x[slot]), low, high) and out[slot, slot] > (high - low) ** 2:
+            out[slot], out[:, slot] = 0.0, 0.0
     return out

@@ -10,7 +10,13 @@ from truth.noise import Clock
 from truth.physics import Physics
 
 from fieldsid.diagnosis.evidence.likelihood_fit import fit_output_error
-from fieldsid.diagnosis.search.noiseless_search import Explored, _backward_eliminate, _evaluate, noiseless_search
+from fieldsid.diagnosis.search.noiseless_search import (
+    Explored,
+    _backward_eliminate,
+    _evaluate,
+    noiseless_line,
+    noiseless_search,
+)
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import MAX_FREE_RUN_ERROR_RATIO
 from fieldsid.diagnosis.verdict import added_effects
@@ -48,6 +54,19 @@ def test_both_hidden_effects_are_found_and_what_each_lacks_is_known(work):
     first, second = added_effects(work, found)
     alone = {n: work.tried[frozenset({n})].selection_errors.mean for n in (first, second)}
     assert alone[first] < alone[second]
+
+
+def test_the_models_of_a_line_are_those_of_the_search(work):
+    found = noiseless_search(work, lambda _h: True)
+    line = noiseless_line(work, [frozenset(), frozenset({"servo_lag"}), frozenset(found.names)])
+    assert [set(h.names) for h in line] == [set(), {"servo_lag"}, set(found.names)]
+    assert line[0].train.mean > line[1].train.mean > line[2].train.mean
+    assert line[2].selection_errors.mean == pytest.approx(found.selection_errors.mean, rel=0.05)
+
+
+def test_a_model_with_one_effect_more_is_not_less_likely(work):
+    bare, whole = noiseless_line(work, [frozenset(), frozenset({"gyro_bias"})])
+    assert whole.likelihood_fit.log_likelihood > bare.likelihood_fit.log_likelihood - 0.5
 
 
 def test_an_effect_that_the_others_have_made_idle_is_left_out(work):
