@@ -18,7 +18,7 @@ from fieldsid.planning.discriminate.t_optimality import MAX_REFIT_ITERATIONS, Ri
 from fieldsid.planning.flight.excitation import Excitation, Window, fits, flown
 from fieldsid.planning.flight.operating_point import autopilot_of, operating_point
 from fieldsid.planning.flight.rule_flight import Response
-from fieldsid.planning.safety.envelope import Envelope, excursions_of, used
+from fieldsid.planning.safety.envelope import Envelope, excursions_of, outside
 from fieldsid.records.keys import Key, Number
 
 Pairs = Mapping[str, float]
@@ -108,7 +108,7 @@ class _RivalFlights:
                 rival.scene.axis, flight.angle[:, None], flight.rate[:, None], speed=self.speed, step=1.0 / self.window.rate_hz,
                 run_up=self.run_up, roll_gain=1.0,
             )  # fmt: skip
-            if not np.isfinite(flight.angle).all() or used(far, self.envelope)[0] > 1.0:
+            if not np.isfinite(flight.angle).all() or outside(far, self.envelope)[0]:
                 return None
         return flights
 

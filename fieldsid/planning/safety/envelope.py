@@ -14,7 +14,7 @@ from fieldsid.errors import UsageError
 from fieldsid.logs.convert.units import GRAVITY
 from fieldsid.maneuvers import AMPLITUDE_HIGH, Limits
 from fieldsid.models.axis import Axis
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.arrays import BoolArray, FloatArray
 from fieldsid.records.keys import Key, Number
 
 LARGEST_FIN = AMPLITUDE_HIGH
@@ -25,6 +25,8 @@ LEAST_FIN = 0.01
 """Smallest fin limit, rad: the size of trims and of the play in a linkage."""
 ACCEPTED_SHARE = 0.05
 """Default share of the draws of the prior that may leave the envelope."""
+ROUNDING = 1e-9
+"""Share of a limit by which sums of many samples may exceed it."""
 NOT_LIMITED = "NOT LIMITED"
 _NO_LIMIT = ", or leave it out where there is no limit"
 OPTIONS: Mapping[str, tuple[str, str, float, str]] = {
@@ -134,9 +136,11 @@ class Excursion:
 def track_of(axis: Axis, angle: FloatArray, speed: float, step: float) -> tuple[FloatArray, FloatArray]:
     """Return the distances along and across the leg (n, m) in m for angles (n, m) `step` s apart; across is depth for pitch.
 
-    The speed is assumed constant in the turn.
+    Both are zero at the first angle. The speed is assumed constant in the turn.
     """
-    along, side = (np.cumsum(speed * step * part, axis=0) for part in (np.cos(angle), np.sin(angle)))
+    along, side = np.zeros(angle.shape), np.zeros(angle.shape)
+    for way, part in ((along, np.cos(angle)), (side, np.sin(angle))):
+        np.cumsum(0.5 * speed * step * (part[1:] + part[:-1]), axis=0, out=way[1:])
     return along, side if axis is Axis.YAW else -side
 
 
@@ -167,6 +171,11 @@ def used(excursions: Mapping[str, FloatArray], envelope: Envelope) -> FloatArray
         behind = excursions["behind"]
         shares.append(np.where(behind > 0.0, 1.0 + behind / envelope.area_length, 0.0))
     return np.asarray(np.max([np.zeros_like(excursions["along"]), *shares], axis=0))
+
+
+def outside(excursions: Mapping[str, FloatArray], envelope: Envelope) -> BoolArray:
+    """Return a mask (m,) of the flights that leave the envelope; one that just reaches a limit does not."""
+    return np.asarray(used(excursions, envelope) > 1.0 + ROUNDING)
 
 
 def check_speeds(speeds: tuple[float, ...], low: float | None, high: float | None) -> None:

@@ -14,7 +14,7 @@ from fieldsid.planning.belief.prior_model import disturbances, draws_of
 from fieldsid.planning.flight.excitation import Excitation, Window, fin_command
 from fieldsid.planning.flight.operating_point import OperatingPoint, operating_point
 from fieldsid.planning.flight.rule_flight import OperatingPointPlant, fly_fins, fly_operating_points, plant_of
-from fieldsid.planning.safety.envelope import Envelope, excursions_of, track_of, used
+from fieldsid.planning.safety.envelope import Envelope, excursions_of, outside, track_of
 
 ROLL_SPREAD = 0.4
 TRIM_SPREAD = 0.005
@@ -50,7 +50,7 @@ class Flights:
 
     def outside(self, envelope: Envelope) -> BoolArray:
         """Return a mask (m,) of the draws that leave the envelope."""
-        return np.asarray(used(self.excursions, envelope) > 1.0)
+        return outside(self.excursions, envelope)
 
 
 def draw_ensemble(model: Model, speed: float, window: Window, count: int, seed: int) -> Ensemble:

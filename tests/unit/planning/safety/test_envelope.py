@@ -9,8 +9,10 @@ import pytest
 from plan_legs import leg
 
 from fieldsid.models.axis import Axis
+from fieldsid.planning.belief.prior_model import named_prior
 from fieldsid.planning.design.leg import aborts_of
-from fieldsid.planning.safety.envelope import NOT_LIMITED, Envelope, excursions_of, limits_said, used
+from fieldsid.planning.design.plan import Request, setting_at
+from fieldsid.planning.safety.envelope import NOT_LIMITED, Envelope, excursions_of, limits_said, outside, used
 
 TIME = 0.05 * np.arange(801)
 
@@ -34,6 +36,18 @@ def test_the_area_begins_at_the_start_of_the_run_up():
     behind = flown(np.pi, 30.0)
     assert behind["behind"] == pytest.approx(10.0, abs=0.1)
     assert used(behind, area) > 1.0
+
+
+@pytest.mark.parametrize("speed", [0.7, 1.2, 1.4, 2.0])
+@pytest.mark.parametrize("length", [40.0, 50.0, 61.3])
+def test_a_straight_flight_of_the_window_that_an_area_leaves_stays_inside(speed, length):
+    area = Envelope(0.2, area_length=length, area_width=60.0)
+    window = setting_at(named_prior("torpedo", Axis.YAW), Request(Axis.YAW, (speed,), area, {}), speed).window
+    straight = np.zeros((window.time.size, 1))
+    flight = excursions_of(Axis.YAW, straight, straight, speed=speed, step=0.05, run_up=10.0 * speed, roll_gain=1.0)
+    assert flight["along"] == pytest.approx(speed * (10.0 + window.length), rel=1e-9)
+    assert not outside(flight, area)
+    assert outside(flight, Envelope(0.2, area_length=length - 0.1, area_width=60.0)) == (window.length < 33.0)
 
 
 def test_every_limit_that_is_set_ends_the_maneuver_whatever_axis_it_moves():
