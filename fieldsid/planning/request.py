@@ -29,6 +29,8 @@ FIN_MAX = 0.26
 """Default fin limit (rad): beyond it the fins of the paper's vehicle stall."""
 HEADING_MAX, PITCH_MAX = float(np.radians(60.0)), float(np.radians(30.0))
 PRIOR, NONE = "torpedo", "none"
+AS_TYPED = 1e-4
+"""Share by which a limit may exceed the vehicle's own, as one that is typed with a few digits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +103,7 @@ def planned(options: PlanRequest, step: Callable[[], None] = lambda: None, ready
     model = _signed(prior_model(options), vehicle)
     request = _request(options, model, vehicle, options.axis or model.axis)
     known = [*NAMES[request.axis].base, *(c.name for e in effects_of(model) for c in e.shared)]
-    request = replace(request, want=parse_accuracy_goals(options.want, known) if options.want else {})
+    request = replace(request, want=parse_accuracy_goals(options.want, known) if options.want is not None else {})
     ready()
     plan = make_plan(model, request, step)
     return Made(plan, model)
@@ -160,19 +162,14 @@ def envelope_of(axis: Axis, limiting: EnvelopeLimits, vehicle: Vehicle | None) -
     """
     area = parse_area(limiting.area)
     band = parse_band(limiting.depth_band)
-    own = None if vehicle is None else vehicle.fin_max_rad(axis.value)
     fin = None if limiting.fin is None else angles.parse_angle(limiting.fin, "--fin-max", angles.FIN, LARGEST_FIN)
-    if fin is not None and own is not None and fin > own:
-        raise UsageError(
-            f"a fin of {fin:g} rad is more than the vehicle has",
-            found=f"{own:g} rad in vehicle.yaml",
-            hint=f"give `--fin-max {own:g}rad`",
-        )
-    rate = vehicle.fin_rate_rad_s if vehicle else None
+    rate = None
     if limiting.fin_rate is not None:
         rate = angles.parse_angle(limiting.fin_rate, "--fin-rate", angles.FIN_RATE, angles.FASTEST_FIN)
+    fin = _within_own(fin, None if vehicle is None else vehicle.fin_max_rad(axis.value), "--fin-max", "rad")
+    rate = _within_own(rate, None if vehicle is None else vehicle.fin_rate_rad_s, "--fin-rate", "rad/s")
     return Envelope(
-        fin=fin if fin is not None else own if own is not None else FIN_MAX,
+        fin=FIN_MAX if fin is None else fin,
         fin_rate=np.inf if rate is None else rate,
         heading=_limit(
             limiting.heading,
@@ -192,6 +189,19 @@ def envelope_of(axis: Axis, limiting: EnvelopeLimits, vehicle: Vehicle | None) -
     )
 
 
+def _within_own(asked: float | None, own: float | None, option: str, unit: str) -> float | None:
+    """Return the limit asked for, else the vehicle's own; raises UsageError where more is asked for than the vehicle has."""
+    if asked is None or own is None:
+        return own if asked is None else asked
+    if asked > own * (1.0 + AS_TYPED):
+        raise UsageError(
+            f"`{option}` {asked:.4g} {unit} is more than the vehicle has",
+            found=f"{own:.4g} {unit} in vehicle.yaml",
+            hint=f"leave `{option}` out, which takes the vehicle's own",
+        )
+    return min(asked, own)
+
+
 def _limit(
     text: str | None, option: str, most: tuple[float, float], default: float | None = None, beyond: str = ""
 ) -> float | None:
@@ -205,7 +215,7 @@ def _limit(
 
 
 def _separating(options: PlanRequest, vehicle: Vehicle | None, step: Callable[[], None], ready: Callable[[], None]) -> Made:
-    if options.want:
+    if options.want is not None:
         raise UsageError(
             "`--want` asks for accuracy, not for what tells effects apart",
             found=f"--want {options.want}",

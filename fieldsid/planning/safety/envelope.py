@@ -205,12 +205,12 @@ def check_room(envelope: Envelope, speeds: tuple[float, ...], run_up_s: float, s
         need = speed * (run_up_s + shortest_s)
         if need <= envelope.area_length:
             continue
-        possible = envelope.area_length / (run_up_s + shortest_s)
+        possible = np.floor(100.0 * envelope.area_length / (run_up_s + shortest_s)) / 100.0
         raise UsageError(
             f"the area is {envelope.area_length:g} m long; {speed:g} m/s needs {need:.0f} m "
             f"({speed * run_up_s:.0f} m of run-up, {speed * shortest_s:.0f} m of maneuver)",
             found=f"--area {envelope.area_length:g}x{envelope.area_width or 0:g}",
-            hint=f"fly at most {possible:.2g} m/s there, or give `--area {np.ceil(need):.0f}x{envelope.area_width or 50:g}`",
+            hint=f"fly at most {possible:g} m/s there, or give `--area {np.ceil(need):.0f}x{envelope.area_width or 50:g}`",
         )
 
 

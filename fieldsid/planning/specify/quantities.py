@@ -42,11 +42,17 @@ def parse_speeds(text: str) -> tuple[float, ...]:
         if len(parts) != 3 or parts[2] <= 0 or parts[1] < parts[0]:
             raise UsageError(f"{text!r} is not a range of speeds", found=f"--speeds {text}", hint=hint)
         count = int(np.floor((parts[1] - parts[0]) / parts[2] + 1e-9)) + 1
-        if count > MOST_SPEEDS:
-            raise UsageError(f"{count} speeds are too many", found=f"--speeds {text}", hint=f"give at most {MOST_SPEEDS}")
+        _refuse_many(count, text)
         return tuple(round(parts[0] + i * parts[2], 9) for i in range(count))
     speeds = [read_number(p, "--speeds", text, "for example `--speeds 1.0,1.4,1.8`") for p in text.split(",") if p.strip()]
-    return tuple(dict.fromkeys(speeds[:MOST_SPEEDS]))
+    distinct = tuple(dict.fromkeys(speeds))
+    _refuse_many(len(distinct), text)
+    return distinct
+
+
+def _refuse_many(count: int, text: str) -> None:
+    if count > MOST_SPEEDS:
+        raise UsageError(f"{count} speeds are too many", found=f"--speeds {text}", hint=f"give at most {MOST_SPEEDS}")
 
 
 def read_number(text: str, option: str, whole: str, hint: str) -> float:
@@ -78,7 +84,11 @@ def parse_accuracy_goals(text: str, known: Sequence[str]) -> dict[str, float]:
             raise UsageError(
                 f"there is no parameter named {name!r} in the prior", found=", ".join(known), hint=near(name, list(known))
             )
+        if name in out:
+            raise UsageError(f"{name!r} is wished for twice", found=f"--want {text}", hint=f"write it once: `--want {item}`")
         out[name] = _share(value, name, text)
+    if not out:
+        raise UsageError("no wish is given", found=f"--want {text}", hint=f"write it like `--want {known[0]}=5%`")
     return out
 
 

@@ -18,9 +18,11 @@ from fieldsid.planning.belief.prior_model import checked_prior, corner, draws_of
 from fieldsid.planning.design.objective import make_objective
 from fieldsid.planning.design.optimise import LEFT_OUT, SHORTEST_HOLD_S, _start_of, merge_short_holds
 from fieldsid.planning.flight.excitation import Window, fits
+from fieldsid.planning.request import EnvelopeLimits, envelope_of
 from fieldsid.planning.safety.envelope import Envelope, check_room, check_speeds
 from fieldsid.planning.specify.quantities import accuracy_goals_text, parse_accuracy_goals, parse_area, parse_band, parse_speeds
 from fieldsid.templates import template_path
+from fieldsid.vehicle import Vehicle
 
 KNOWN = ("a22", "b2", "C0")
 
@@ -63,6 +65,11 @@ def refused(read, text):
     return None
 
 
+def test_speeds_beyond_the_most_are_refused_and_none_left_out():
+    assert len(parse_speeds(",".join(map(str, range(1, 51))) + ",1,2")) == 50
+    assert "51 speeds" in refused(parse_speeds, ",".join(map(str, range(1, 52)))).what
+
+
 def test_a_wish_is_read_in_per_cent_or_as_a_share_and_written_back():
     wish = parse_accuracy_goals("a22=5%, b2=0.03", KNOWN)
     assert wish == {"a22": pytest.approx(0.05), "b2": pytest.approx(0.03)}
@@ -71,8 +78,9 @@ def test_a_wish_is_read_in_per_cent_or_as_a_share_and_written_back():
 
 
 @pytest.mark.parametrize(
-    ("text", "hint"), [("a2=5%", "`a22`"), ("a22", "a22=5%"), ("a22=0%", "%"), ("a22=500%", "%"), ("a22=x", "a22=5%")]
-)
+    ("text", "hint"), [("a2=5%", "`a22`"), ("a22", "a22=5%"), ("a22=0%", "%"), ("a22=500%", "%"), ("a22=x", "a22=5%"),
+     ("", "a22=5%"), (" , ", "a22=5%"), ("a22=5%,b2=3%,a22=3%", "`--want a22=3%`")],
+)  # fmt: skip
 def test_a_wish_that_cannot_be_meant_is_refused(text, hint):
     with pytest.raises(UsageError) as caught:
         parse_accuracy_goals(text, KNOWN)
@@ -105,6 +113,27 @@ def test_an_area_shorter_than_the_run_up_is_refused_with_what_would_fit():
         check_room(Envelope(0.2, area_length=20.0, area_width=30.0), (1.0, 2.0), 10.0, 15.0)
     assert "--area 50x30" in caught.value.hint or "0.8 m/s" in caught.value.hint
     check_room(Envelope(0.2, area_length=51.0), (2.0,), 10.0, 15.0)
+
+
+def test_the_speed_that_an_area_is_said_to_allow_is_not_refused():
+    with pytest.raises(UsageError) as caught:
+        check_room(Envelope(0.2, area_length=49.0, area_width=20.0), (2.0,), 10.0, 15.0)
+    assert caught.value.hint.startswith("fly at most 1.96 m/s there")
+    check_room(Envelope(0.2, area_length=49.0, area_width=20.0), (1.96,), 10.0, 15.0)
+
+
+@pytest.mark.parametrize(("typed", "what"), [({"fin": "21deg"}, "--fin-max"), ({"fin_rate": "30deg"}, "--fin-rate")])
+def test_no_limit_of_the_vehicles_own_is_exceeded(typed, what):
+    vehicle = Vehicle("one", rudder_max_rad=np.radians(20.0), fin_rate_rad_s=0.5)
+    with pytest.raises(UsageError, match=f"`{what}` .* is more than the vehicle has"):
+        envelope_of(Axis.YAW, EnvelopeLimits(**typed), vehicle)
+
+
+def test_a_vehicles_limit_may_be_typed_with_a_few_digits_and_is_kept():
+    vehicle = Vehicle("one", rudder_max_rad=np.radians(20.0), fin_rate_rad_s=0.5)
+    assert envelope_of(Axis.YAW, EnvelopeLimits(fin="0.349066rad", fin_rate="28.648deg"), vehicle) == (
+        envelope_of(Axis.YAW, EnvelopeLimits(), vehicle)
+    )
 
 
 @pytest.mark.parametrize(
