@@ -211,6 +211,7 @@ def test_the_limits_of_circles_are_their_own(run_cli):
         (("--write", "cvs", "-o", "/dev/null/new"), "csv"),
         (("--axis", "pitch", "--radius"), "--axis yaw"),
         (("--separate", "delay"), "delay,servo_lag"),
+        (("--separate", "delay+servo_lag"), "delay,servo_lag"),
         (("--separate", "delay,lag"), "servo_lag"),
         pytest.param(("--radius", "--area", "100x15"), "--area", marks=pytest.mark.slow),
     ],

@@ -106,7 +106,7 @@ def command(
     limiting = EnvelopeLimits(area, depth_band, max_heading, max_track, max_pitch, max_roll, fin_max, fin_rate, risk)
     request = PlanRequest(
         axis, speeds, vehicle, model, prior, want, minutes, limiting, window, run_up, rate, radius,
-        names_of(separate), diagnosis, seed, open_loop, course,
+        tuple(filter(None, map(str.strip, (separate or "").split(",")))), diagnosis, seed, open_loop, course,
     )  # fmt: skip
     with compiling() as warmup, progress("planning", request.legs) as step:
 

@@ -28,13 +28,25 @@ from fieldsid.registry import near
 from fieldsid.templates import template_names, template_path
 
 KIND = "fieldsid/prior"
+UNMEASURED = 1e3
+"""Noise, in rad or rad/s, of a channel that nothing measured: it tells nothing of a flight either."""
+CHANNELS = {"angle": "angle_rad", "rate": "rate_rad_s"}
+"""Channels of a noise floor and their keys in files, null where nothing measured them."""
 
 
 def load_believed(path: Path) -> Model:
-    """Read a prior model: a prior file, or an identified model; raises ArtifactError."""
+    """Read a prior model: a prior file, or an identified model; raises ArtifactError.
+
+    The noise of a channel that the model's runs did not measure is UNMEASURED.
+    """
     with unless_log(path, "a model or a prior"):
         schema = str(read_yaml(path).get("schema", ""))
-    return load_prior(path) if schema.startswith(f"{KIND}/") else load_model(path)
+    if schema.startswith(f"{KIND}/"):
+        return load_prior(path)
+    model = load_model(path)
+    floor = model.info.get("left", {}).get("noise_floor", {})
+    silent = {c: UNMEASURED for c, key in CHANNELS.items() if key in floor and floor[key] is None}
+    return replace(model, noise=replace(model.noise, **silent))
 
 
 def load_prior(path: Path) -> Model:

@@ -16,8 +16,10 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Coefficient, definitions_of, effect_held
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
+from fieldsid.planning.belief.prior_model import CHANNELS, UNMEASURED
 from fieldsid.planning.whole_file import whole_file
 from fieldsid.records.reading import load_record
+from fieldsid.registry import near
 
 KIND = "fieldsid/diagnosis"
 PLAIN = "none"
@@ -46,20 +48,49 @@ def typical(coefficient: Coefficient) -> float:
 def rivals_from(path: Path, names: Sequence[str] = ()) -> tuple[Model, ...]:
     """Return the rivals of a diagnosis file: those named, else its most probable candidates.
 
-    Raises ArtifactError when the file is not a complete diagnosis, UsageError when there are fewer than two rivals.
+    The noise is that of the sensors, and the disturbance moment that the best of the rivals leaves. Raises ArtifactError when the
+    file is not a complete diagnosis or lacks a name, UsageError when there are fewer than two rivals.
     """
     with unless_log(path, "a diagnosis"):
         body = load_record(path, KIND)
     with whole_file(path, "diagnosis", "diagnose again, with `-o`"):
         axis = Axis(body["axis"])
         candidates = sorted(body["candidates"], key=lambda c: -float(c["probability"]))
-        chosen = [c for c in candidates if c["effect"] in names] if names else _most_probable(candidates)
+        chosen = _named(candidates, names) if names else _most_probable(candidates)
         models = tuple(_model_of(axis, c, body) for c in chosen)
+        calmest = min((_disturbance(c, m) for c, m in zip(chosen, models, strict=True)), default=0.0)
+        models = tuple(replace(m, noise=replace(m.noise, disturbance=calmest)) for m in models)
     if len(models) < 2:
         known = ", ".join(f"{c['effect']} with probability {float(c['probability']):.2g}" for c in candidates[:MOST_RIVALS])
         hint = "name two of them with `--separate A,B`"
         raise UsageError("the diagnosis leaves no rivals to tell apart", found=known or "no candidates", hint=hint)
     return models
+
+
+def _named(candidates: Sequence[Mapping[str, Any]], names: Sequence[str]) -> list[Mapping[str, Any]]:
+    """Return the candidates of the names, whose effects may be in any order; raises UsageError for a name without one."""
+    known = {frozenset(_effects(str(c["effect"]))): str(c["effect"]) for c in candidates}
+    asked = {frozenset(_effects(name)): name for name in names}
+    for effects, name in asked.items():
+        if effects not in known:
+            listed = list(known.values())
+            raise UsageError(f"the diagnosis has no candidate `{name}`", found=", ".join(listed), hint=near(name, listed))
+    return [c for c in candidates if frozenset(_effects(str(c["effect"]))) in asked]
+
+
+def _disturbance(candidate: Mapping[str, Any], model: Model) -> float:
+    """Return the disturbance moment (rad/s^2) that leaves the candidate's error beyond the noise of the sensors.
+
+    It is that of the noise's correlation time `t`, which moves a hull of damping a and stiffness k by the rate
+    sigma sqrt(t / (a (1 + a t + k t^2))); where no rate was measured, that is the angle's error times a.
+    """
+    names, noise, error = NAMES[model.axis], model.noise, candidate["train"]
+    a, t = abs(model.values[names.damping]), noise.disturbance_time
+    k = max(model.values[names.stiffness], 0.0) if names.stiffness else 0.0
+    of_rate = noise.rate < UNMEASURED
+    left = (float(error["rate_rms_rad_s"]), noise.rate) if of_rate else (float(error["angle_rms_rad"]), noise.angle)
+    excess = np.sqrt(max(left[0] ** 2 - left[1] ** 2, 0.0)) * (1.0 if of_rate else a)
+    return float(excess * np.sqrt(a * (1.0 + a * t + k * t**2) / t))
 
 
 def _most_probable(candidates: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
@@ -85,7 +116,7 @@ def _model_of(axis: Axis, candidate: Mapping[str, Any], body: Mapping[str, Any])
         free=(),
         covariance=np.zeros((0, 0)),
         law=SpeedLaw(float(law.get("reference_m_s") or body.get("speed_m_s") or np.nan), trim_of_fin=TRIM_OF_FIN[axis]),
-        noise=Noise(float(floor["angle_rad"]), float(floor["rate_rad_s"])),
+        noise=Noise(**{c: UNMEASURED if floor[key] is None else float(floor[key]) for c, key in CHANNELS.items()}),
         method="diagnosis",
     )
 

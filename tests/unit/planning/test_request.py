@@ -12,12 +12,13 @@ from in_time import in_time
 
 from fieldsid.angles import parse_angle
 from fieldsid.errors import ArtifactError, FieldsidError, ModelError, UsageError
-from fieldsid.maneuvers import all_maneuvers
+from fieldsid.maneuvers import all_maneuvers, pick_maneuver
 from fieldsid.models.axis import Axis
-from fieldsid.planning.belief.prior_model import checked_prior, corner, draws_of, load_believed, named_prior
+from fieldsid.models.model import save_model
+from fieldsid.planning.belief.prior_model import UNMEASURED, checked_prior, corner, draws_of, load_believed, named_prior
 from fieldsid.planning.design.objective import make_objective
 from fieldsid.planning.design.optimise import LEFT_OUT, SHORTEST_HOLD_S, _start_of, merge_short_holds
-from fieldsid.planning.flight.excitation import Window, fits
+from fieldsid.planning.flight.excitation import Excitation, Window, fits
 from fieldsid.planning.request import EnvelopeLimits, envelope_of
 from fieldsid.planning.safety.envelope import Envelope, check_room, check_speeds
 from fieldsid.planning.specify.quantities import accuracy_goals_text, parse_accuracy_goals, parse_area, parse_band, parse_speeds
@@ -204,6 +205,21 @@ def test_a_prior_with_a_mistake_is_refused(tmp_path, old, new):
     with pytest.raises(FieldsidError) as caught:
         load_believed(tmp_path / "prior.yaml")
     assert caught.value.hint
+
+
+def test_a_channel_that_a_models_runs_did_not_measure_tells_nothing(tmp_path):
+    prior = named_prior("torpedo", Axis.YAW)
+    silent = replace(
+        prior, noise=replace(prior.noise, rate=1e-7), info={"left": {"noise_floor": {"angle_rad": 0.005, "rate_rad_s": None}}}
+    )
+    believed = load_believed(save_model(silent, tmp_path / "yaw.yaml"))
+    assert (believed.noise.angle, believed.noise.rate) == (prior.noise.angle, UNMEASURED)
+    pulses = Excitation("square_pulses", pick_maneuver("square_pulses").defaults)
+    errors = [
+        make_objective(m, 1.4, Envelope(0.26), Window(), {}, 10.0).expected(pulses).std_errors()["a22"]
+        for m in (believed, silent)
+    ]
+    assert errors[0] > 1.3 * errors[1]
 
 
 def test_an_unknown_prior_is_answered_with_the_near_one():

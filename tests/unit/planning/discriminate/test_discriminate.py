@@ -9,11 +9,11 @@ import pytest
 
 from fieldsid.artifacts import save_record
 from fieldsid.effects import all_effects
-from fieldsid.errors import FieldsidError, UsageError
+from fieldsid.errors import ArtifactError, FieldsidError, UsageError
 from fieldsid.maneuvers import parse_spec
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
-from fieldsid.planning.belief.prior_model import named_prior
+from fieldsid.planning.belief.prior_model import UNMEASURED, named_prior
 from fieldsid.planning.discriminate.discriminate import AT_ONCE, BEYOND_DOUBT, separate
 from fieldsid.planning.discriminate.rivals import rivals_from, rivals_named, typical
 from fieldsid.planning.discriminate.t_optimality import log_odds, rival_of
@@ -117,14 +117,15 @@ def test_an_envelope_no_maneuver_fits_is_refused():
 
 def diagnosis(tmp_path, **changes):
     base = {"a22": 1.1, "b2": -0.9, "C0": 0.0}
+    train = {"angle_rms_rad": 0.005, "rate_rms_rad_s": 0.005}
     body = {
         "axis": "yaw",
         "speed_m_s": 1.4,
         "noise_floor": {"angle_rad": 0.005, "rate_rad_s": 0.005},
         "candidates": [
-            {"effect": "delay", "probability": 0.55, "parameters": base | {"delay": 0.2}},
-            {"effect": "servo_lag", "probability": 0.44, "parameters": base | {"lag": 0.2}},
-            {"effect": "stall", "probability": 0.01, "parameters": base},
+            {"effect": "delay", "probability": 0.55, "parameters": base | {"delay": 0.2}, "train": train},
+            {"effect": "servo_lag", "probability": 0.44, "parameters": base | {"lag": 0.2}, "train": train},
+            {"effect": "stall", "probability": 0.01, "parameters": base, "train": train},
         ],
     }
     return save_record(tmp_path / "diagnosis.yaml", "fieldsid/diagnosis/1", body | changes)
@@ -138,12 +139,51 @@ def test_a_diagnosis_names_its_rivals(tmp_path):
     assert [m.effects for m in rivals_from(tmp_path / "diagnosis.yaml", ("stall", "delay"))] == [("delay",), ("stall",)]
 
 
-def test_what_a_diagnosis_does_not_believe_is_no_rival(tmp_path):
+def test_a_rival_that_is_a_set_is_named_in_any_order_and_none_is_left_out(tmp_path):
+    base = {"parameters": {"a22": 1.1, "b2": -0.9, "C0": 0.0}, "train": {"angle_rms_rad": 0.005, "rate_rms_rad_s": 0.005}}
+    both = [{"effect": "stall+delay", "probability": 0.5} | base, {"effect": "delay", "probability": 0.5} | base]
+    path = diagnosis(tmp_path, candidates=both)
+    assert [m.effects for m in rivals_from(path, ("delay+stall", "delay"))] == [("stall", "delay"), ("delay",)]
+    with pytest.raises(ArtifactError, match="no candidate `dely`") as caught:
+        rivals_from(path, ("delay", "delay+stall", "dely"))
+    assert "`delay`" in caught.value.hint
+
+
+@pytest.mark.parametrize(("a", "k"), [(1.1, 0.0), (2.0, 0.3)])
+def test_what_the_best_rival_leaves_is_taken_for_a_disturbance(tmp_path, a, k):
+    sigma, noise, step = 0.004, 0.002, 0.02
+    rng, angle, rate, moment = (
+        np.random.default_rng(1),
+        np.zeros(50),
+        np.zeros(50),
+        sigma * np.random.default_rng(2).normal(size=50),
+    )
+    rates = []
+    for _ in range(10_000):
+        angle, rate = angle + step * rate, rate + step * (moment - a * rate - k * angle)
+        moment = np.exp(-step) * moment + sigma * np.sqrt(1.0 - np.exp(-2.0 * step)) * rng.normal(size=50)
+        rates.append(rate)
+    rms = float(np.sqrt(np.mean(np.square(rates[500:])) + noise**2))
+    yaw, pitch = {"a22": a, "b2": -0.9, "C0": 0.0}, {"c22": a, "c23": k, "d2": 0.9, "Cb": 0.0}
+    common = {"parameters": pitch if k else yaw, "train": {"angle_rms_rad": 0.1, "rate_rms_rad_s": rms}}
+    worse = common | {"train": {"angle_rms_rad": 0.1, "rate_rms_rad_s": 2.0 * rms}}
+    candidates = [{"effect": "delay", "probability": 0.5} | worse, {"effect": "servo_lag", "probability": 0.5} | common]
+    floor = {"angle_rad": 0.002, "rate_rad_s": noise}
+    rivals = rivals_from(diagnosis(tmp_path, axis="pitch" if k else "yaw", candidates=candidates, noise_floor=floor))
+    assert [m.noise.disturbance for m in rivals] == pytest.approx([sigma, sigma], rel=0.1)
+
+
+def test_a_channel_that_nothing_measured_tells_nothing(tmp_path):
+    train = {"angle_rms_rad": 0.005, "rate_rms_rad_s": None}
     base = {"a22": 1.1, "b2": -0.9, "C0": 0.0}
-    sure = [
-        {"effect": "delay", "probability": 1.0, "parameters": base},
-        {"effect": "stall", "probability": 1e-127, "parameters": base},
-    ]
+    candidates = [{"effect": e, "probability": 0.5, "parameters": base, "train": train} for e in ("delay", "servo_lag")]
+    first, _ = rivals_from(diagnosis(tmp_path, candidates=candidates, noise_floor={"angle_rad": 0.005, "rate_rad_s": None}))
+    assert first.noise == Noise(0.005, UNMEASURED)
+
+
+def test_what_a_diagnosis_does_not_believe_is_no_rival(tmp_path):
+    common = {"parameters": {"a22": 1.1, "b2": -0.9, "C0": 0.0}, "train": {"angle_rms_rad": 0.005, "rate_rms_rad_s": 0.005}}
+    sure = [{"effect": "delay", "probability": 1.0} | common, {"effect": "stall", "probability": 1e-127} | common]
     with pytest.raises(UsageError, match="no rivals") as caught:
         rivals_from(diagnosis(tmp_path, candidates=sure))
     assert caught.value.found == "delay with probability 1, stall with probability 1e-127"
