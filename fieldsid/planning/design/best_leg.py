@@ -123,7 +123,7 @@ def leg_of(
         run_up_s=setting.run_up_s,
         turn_s=turn,
         autopilot=objective.autopilot,
-        expected=expected_errors(objective, setting, candidate),
+        expected=expected_errors(objective, setting, candidate, ensemble),
         excursions=excursions,
         break_probability=risk,
         purpose=purpose,
@@ -144,8 +144,13 @@ def _nominal(objective: Objective, candidate: Excitation) -> FloatArray:
     return np.where(flight.recovering[:, 0], np.nan, flight.fin[:, 0])[: window.time.size]
 
 
-def expected_errors(objective: Objective, setting: Setting, candidate: Excitation) -> dict[str, Expected]:
-    """Return the expected error of every parameter after one pass of a candidate, with its spread over draws of the prior."""
+def expected_errors(
+    objective: Objective, setting: Setting, candidate: Excitation, ensemble: Ensemble
+) -> dict[str, Expected]:  # fmt: skip
+    """Return the expected error of every parameter after one pass of a candidate, with its spread over draws of the prior.
+
+    The paper's pulses, which it is compared with, are kept inside the envelope as it is.
+    """
     speed = objective.scene.speed
     mean = objective.expected(candidate)
     spread = []
@@ -153,7 +158,8 @@ def expected_errors(objective: Objective, setting: Setting, candidate: Excitatio
         scene = operating_point(drawn, speed)
         response = flown(scene, candidate, objective.window, objective.envelope.limits, objective.autopilot)
         spread.append(information_of(scene, response).std_errors())
-    reference = pulses(objective)
+    usual = pulses(objective)
+    reference = None if usual is None else enforce_envelope(objective, setting, ensemble.first(COARSE_DRAWS), usual)
     baseline = {} if reference is None else objective.expected(reference).std_errors()
     scales = scales_of(setting.model, objective.scene.base, objective.envelope.fin)
     values = {**objective.scene.model.values, **objective.scene.model.at_speed(speed)}
