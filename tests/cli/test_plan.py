@@ -128,6 +128,7 @@ def test_a_second_plan_does_not_replace_the_first_without_force(run_cli, written
 
 @pytest.mark.slow
 def test_rivals_are_told_apart_with_odds(run_cli):
+    assert "tells deadband and stall apart at odds of" in run_cli("plan", "--separate", "deadband,stall").out.splitlines()[0]
     body = run_cli("plan", "--separate", "deadband,stall", "--json").json
     assert body["separation"]["decides"] is True
     assert set(body["separation"]["pairs"]) == {"deadband>stall", "stall>deadband"}

@@ -39,8 +39,12 @@ def headline_of_plan(result: Planned, model: Path | None) -> Headline:
     speeds = {leg.speed for leg in legs}
     which = f", the least sure of {len(speeds)} speeds" if len(speeds) > 1 else f", by the least sure of {len(legs)} legs"
     at = f" at {legs[hardest].speed:g} m/s{which}" if len(legs) > 1 else ""
-    what = f"{'minutes' if plan.minutes != 1 else 'minute'} {'buys' if len(legs) == 1 else 'buy'}"
-    says = f"{counted(len(legs), 'leg')} of {plan.minutes:.1f} {what} {bought or 'what tells the effects apart'}{at}"
+    time = f"{plan.minutes:.1f} {'minutes' if plan.minutes != 1 else 'minute'}{' in all' if len(legs) > 1 else ''}"
+    does = f"buy {bought or 'nothing that shows'}{at}"
+    if result.separation is not None:
+        does = f"tell {result.separation.verdict()}"
+    does = does if len(legs) > 1 else does.replace(" ", "s ", 1)
+    says = f"{counted(len(legs), 'leg')} of {time} {does}"
     known_by = str(model) if model is not None else f"the prior {plan.prior}"
     unlimited = [name for name, limit in plan.limits.items() if limit == NOT_LIMITED]
     risk = f"risk of leaving the envelope {100.0 * plan.break_probability:.1f} %"

@@ -14,6 +14,7 @@ from fieldsid.maneuvers import RATE_HZ, pick_maneuver
 from fieldsid.models.model import Model
 from fieldsid.planning.design.best_leg import FINALISTS
 from fieldsid.planning.design.optimise import moves_of
+from fieldsid.planning.design.plan import MOST_PASSES
 from fieldsid.planning.discriminate.t_optimality import MAX_REFIT_ITERATIONS, Rival, log_odds, rival_of
 from fieldsid.planning.flight.excitation import Excitation, Window, fits, flown
 from fieldsid.planning.flight.operating_point import autopilot_of, operating_point
@@ -75,14 +76,25 @@ class Separation:
         """The same as odds."""
         return float(np.exp(min(self.expected_log_odds, MOST_LOG_ODDS)))
 
+    def verdict(self) -> str:
+        """Return the rivals and the least of the expected odds, as what the legs of a plan do."""
+        rivals = " and ".join(dict.fromkeys(name for key in self.pairs for name in key.split(">")))
+        return f"{rivals} apart at odds of {_odds(self.expected_log_odds)}" + ("" if self.decides else f"; {self._needed()}")
+
+    def _needed(self) -> str:
+        """Return how many passes are expected to give odds of 20 to 1."""
+        passes = np.ceil(DECISIVE_LOG_ODDS / max(self.expected_log_odds, 1e-9))
+        enough = f"{passes:.0f} are" if passes <= MOST_PASSES else f"nor are {MOST_PASSES}"
+        return f"one pass is not enough for odds of 20 to 1, {enough}"
+
     def says(self) -> list[str]:
         """Return the expected odds, in sentences."""
-        lines = [f"`{self.candidate.spec}` at {self.speed:g} m/s tells them apart:"]
+        lines = [f"`{self.candidate.spec}` at {self.speed:g} m/s tells them apart{'' if self.decides else ' best'}:"]
         for key, value in self.pairs.items():
             true, _, wrong = key.partition(">")
             lines.append(f"  if it is {true}: odds {_odds(value)} against {wrong}")
         if not self.decides:
-            lines.append("one pass is not enough for odds of 20 to 1: repeat it, or leave it more room")
+            lines.append(f"{self._needed()}; or leave it more room")
         return lines
 
 

@@ -14,7 +14,7 @@ from fieldsid.maneuvers import parse_spec
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.planning.belief.prior_model import UNMEASURED, named_prior
-from fieldsid.planning.discriminate.discriminate import AT_ONCE, BEYOND_DOUBT, separate
+from fieldsid.planning.discriminate.discriminate import AT_ONCE, BEYOND_DOUBT, Separation, separate
 from fieldsid.planning.discriminate.rivals import rivals_from, rivals_named, typical
 from fieldsid.planning.discriminate.t_optimality import log_odds, rival_of
 from fieldsid.planning.flight.excitation import Excitation, Window, flown
@@ -70,6 +70,23 @@ def test_a_quick_search_finds_a_maneuver_inside_the_envelope_for_every_pair(name
     assert found.expected_log_odds > np.log(20)
     assert found.decides
     assert len(found.says()) == 3
+
+
+@pytest.mark.parametrize(
+    ("odds", "verdict"),
+    [
+        (400.0, "current and none apart at odds of 400 to 1"),
+        (1.28, "current and none apart at odds of 1.28 to 1; one pass is not enough for odds of 20 to 1, 13 are"),
+        (1.001, "current and none apart at odds of 1 to 1; one pass is not enough for odds of 20 to 1, nor are 40"),
+    ],
+)
+def test_what_a_maneuver_decides_is_said_with_the_passes_that_it_takes(odds, verdict):
+    log = float(np.log(odds))
+    found = Separation("prbs", parse_spec("prbs")[1], 1.4, log, {"current>none": log}, Window(), {})
+    assert found.verdict() == verdict
+    assert found.says()[0].endswith("tells them apart:" if found.decides else "tells them apart best:")
+    assert verdict.partition("; ")[2] in found.says()[-1]
+    assert len(found.says()) == (2 if found.decides else 3)
 
 
 def test_several_candidates_are_evaluated_at_once_until_one_decides():
