@@ -70,6 +70,7 @@ def test_a_plan_is_printed_with_errors_minutes_metres_and_risk(printed):
         assert word in printed
     assert "next: sysid plan" in printed
     assert "-o " in printed
+    assert "errors as of a log at 20 Hz, the rate of the commands" in printed
 
 
 def rows_of(printed):

@@ -67,7 +67,7 @@ def command(
         float | None, option("--window", "S", "Length of the part that is identified on; 33, to separate 60.", FLOWN)
     ] = None,
     run_up: Annotated[float, option("--run-up", "S", "Straight run before it.", FLOWN)] = 10.0,
-    rate: Annotated[float, option("--rate", "HZ", "The vehicle's command rate.", FLOWN)] = 20.0,
+    rate: Annotated[float, option("--rate", "HZ", "The vehicle's command rate, and its log's.", FLOWN)] = 20.0,
     radius: Annotated[bool, flag("--radius", "Add full-fin circles, so that the turn radius is measured.", GOAL)] = False,
     open_loop: Annotated[
         bool, flag("--open-loop", "Leave out maneuvers that follow the motion, such as the zig-zag.", FLOWN)
@@ -177,6 +177,7 @@ def _page(plan: Plan, says: Iterable[str]) -> Page:
         Block(f"{plan.vehicle}, {plan.axis.value}: what to fly", rows, columns, left=2),
         Block("what it buys", errors, heads, left=2),
         f"{plan.minutes:.1f} minutes, {plan.metres:.0f} m; risk of leaving the envelope at most {plan.break_probability:.1%}",
+        f"errors as of a log at {plan.legs[0].rate_hz:g} Hz, the rate of the commands",
         *_limits(plan),
         *says,
     )
