@@ -202,16 +202,19 @@ def _shifted(model: Model, shifts: Mapping[str, float]) -> Model:
 def scales_of(model: Model, base: Base, fin: float) -> dict[str, float]:
     """Return the scale by which the error of each parameter is divided.
 
-    It is the absolute value, or the standard error of the prior where that is larger; for the trim it is the moment of the full
-    fin (rad/s^2).
+    It is the absolute value, or the standard error of the prior where that is larger, both at the speed of `base`; for the trim
+    it is the moment of the full fin (rad/s^2).
     """
     names = NAMES[model.axis]
     at_speed = {names.damping: base.damping, names.authority: base.authority, names.trim: base.authority * fin}
     out: dict[str, float] = {}
     for name in (*names.base, *(c.name for e in effects_of(model) for c in e.shared)):
-        value = abs(at_speed.get(name, model.values.get(name, 0.0)))
+        believed = model.values.get(name, 0.0)
+        value = at_speed.get(name, believed)
         error = model.std_error(name) if name in model.free and name != names.trim else 0.0
-        out[name] = max(value, error, 1e-9)
+        if name in at_speed and believed:
+            error *= abs(value / believed)
+        out[name] = max(abs(value), error, 1e-9)
     return out
 
 

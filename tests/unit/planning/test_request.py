@@ -15,10 +15,19 @@ from fieldsid.errors import ArtifactError, FieldsidError, ModelError, UsageError
 from fieldsid.maneuvers import all_maneuvers, pick_maneuver
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import save_model
-from fieldsid.planning.belief.prior_model import UNMEASURED, checked_prior, corner, draws_of, load_believed, named_prior
+from fieldsid.planning.belief.prior_model import (
+    UNMEASURED,
+    checked_prior,
+    corner,
+    draws_of,
+    load_believed,
+    named_prior,
+    scales_of,
+)
 from fieldsid.planning.design.objective import make_objective
 from fieldsid.planning.design.optimise import LEFT_OUT, SHORTEST_HOLD_S, _start_of, merge_short_holds
 from fieldsid.planning.flight.excitation import Excitation, Window, fits
+from fieldsid.planning.flight.operating_point import operating_point
 from fieldsid.planning.request import EnvelopeLimits, envelope_of
 from fieldsid.planning.safety.envelope import Envelope, check_room, check_speeds
 from fieldsid.planning.specify.quantities import accuracy_goals_text, parse_accuracy_goals, parse_area, parse_band, parse_speeds
@@ -220,6 +229,16 @@ def test_a_channel_that_a_models_runs_did_not_measure_tells_nothing(tmp_path):
         for m in (believed, silent)
     ]
     assert errors[0] > 1.3 * errors[1]
+
+
+@pytest.mark.parametrize("speed", [0.4, 0.6, 1.4, 2.5])
+def test_an_error_is_a_share_of_what_is_believed_at_the_speed_of_the_leg(speed):
+    prior = named_prior("torpedo", Axis.YAW)
+    base = operating_point(prior, speed).base
+    scales = scales_of(prior, base, 0.26)
+    assert (scales["a22"], scales["b2"]) == pytest.approx((base.damping, -base.authority))
+    vague = replace(prior, covariance=np.diag([4.0 * 1.1**2, 0.3**2, 0.01**2]))
+    assert scales_of(vague, base, 0.26)["a22"] == pytest.approx(2.0 * base.damping)
 
 
 def test_an_unknown_prior_is_answered_with_the_near_one():
