@@ -27,7 +27,9 @@ WITHIN = 1.0 + 1e-6
 ROUGH = 0.25
 """Smallest last digit, as a share of the median step, that makes even steps look uneven."""
 SAME = 1e-3
-"""Share of a step within which stamps are already at even steps: 0.2, 0.4, 0.6 have all the digits that they need."""
+"""Share of a step within which a step is a whole multiple of it: 0.2, 0.4, 0.6 have all the digits that they need."""
+BY_TURNS = 1.25
+"""Largest range of the errors of rounded stamps, in units of the last digit: one, and what the line through them is off."""
 MOST = 99.0
 """Percentile of the steps up to which they are averaged to the usual step: longer ones may be gaps."""
 SHORT = 3.0
@@ -53,12 +55,25 @@ def rebuilt(time: FloatArray, name: str) -> tuple[FloatArray, list[Note]]:
             continue
         even = next((e for rows in (seen, np.arange(seen.size)) if (e := _even(stamps, last, rows)) is not None), None)
         if even is not None:
-            if not shared and float(np.max(np.abs(even - stamps))) < SAME * float(np.median(steps)):
+            if not shared and _rows_are_missing(steps, (even - stamps) / last):
                 return time, []
             rebuilt_time = time.copy()
             rebuilt_time[seen] = even
             return rebuilt_time, [_note(name, stamps)]
     return time, []
+
+
+def _rows_are_missing(steps: FloatArray, off: FloatArray) -> bool:
+    """Whether steps (n - 1,) are whole multiples of the usual one as rows that are missing leave them, here and there.
+
+    A step that is no whole number of last digits is now and then rounded to one more, but by turns, so that the even steps are
+    nowhere further `off` (n,) than the last digit is worth.
+    """
+    usual = float(np.median(steps))
+    at_once = steps / usual
+    if float(np.max(np.abs(at_once - np.round(at_once)))) > SAME:
+        return False
+    return int((at_once > 1.5).sum()) < FEWEST or float(np.ptp(off)) > BY_TURNS
 
 
 def _note(name: str, stamps: FloatArray) -> Note:
@@ -100,10 +115,18 @@ def _last_digits(stamps: FloatArray) -> list[FloatArray]:
 
 
 def _whole(numbers: FloatArray, last_bit: float = 0.0) -> bool:
-    """Whether numbers are whole within `last_bit`, the value of their last bit, and not all zero in too large a unit."""
-    if not bool(np.abs(numbers).max() >= 1.0) or last_bit > WORN_OUT:
+    """Whether numbers are whole within `last_bit`, the value of their last bit, and not all zero in too large a unit.
+
+    A last digit tells apart what differs: an epoch near a round number is not whole in millions of seconds.
+    """
+    whole = np.round(numbers)
+    if (
+        not bool(np.abs(numbers).max() >= 1.0)
+        or last_bit > WORN_OUT
+        or bool((np.diff(whole)[np.diff(numbers) != 0.0] == 0.0).any())
+    ):
         return False
-    return bool(np.all(np.abs(numbers - np.round(numbers)) <= 1e-6 + last_bit + 1e-12 * np.abs(numbers)))
+    return bool(np.all(np.abs(numbers - whole) <= 1e-6 + last_bit + 1e-12 * np.abs(numbers)))
 
 
 def _even(stamps: FloatArray, last: FloatArray, rows: npt.NDArray[np.intp]) -> FloatArray | None:

@@ -57,3 +57,21 @@ def test_steps_finer_than_the_last_digit_come_back_whatever_they_are(step, decim
     coarse = np.round(time, decimals)
     found, _ = rebuilt(coarse, "t")
     assert np.abs(found - time).max() < 10.0**-decimals
+
+
+def test_an_epoch_near_a_round_number_keeps_its_stamps():
+    rng = np.random.default_rng(4)
+    time = np.round(1.7e9 + 0.05 * np.delete(np.arange(400), [90, 250]) + rng.normal(0.0, 1e-3, 398), 3)
+    found, notes = rebuilt(time, "t")
+    assert found is time
+    assert not notes
+
+
+@pytest.mark.parametrize("missing", [1, 4, 12])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_round_step_keeps_its_stamps_where_rows_are_missing(missing, seed):
+    rows = np.sort(np.random.default_rng(seed).choice(np.arange(1, 459), missing, replace=False))
+    time = np.round(120.0 + 0.1 * np.delete(np.arange(460), rows), 2)
+    found, notes = rebuilt(time, "t")
+    assert found is time
+    assert not notes
