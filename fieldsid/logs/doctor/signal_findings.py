@@ -21,6 +21,8 @@ MISSING_LIMIT = 0.05
 FROZEN_S = 1.0
 COARSE_LIMIT = 0.3
 """Largest share of samples equal to the one before; above it a signal is coarse, or is not examined for being frozen."""
+STRAIGHT = 1e-4
+"""Largest bend of a straight line, as a share of the largest bends of a signal."""
 
 LARGEST = {
     "pitch_rad": (1.6, "deg"), "pitch_goal_rad": (1.6, "deg"),
@@ -47,12 +49,25 @@ def signal_findings(run: Run, name: str, stated: Stated) -> list[Note]:
         still = np.diff(present) == 0.0
         for other in PLACE & run.signals.keys() - {name} if name in PLACE else ():
             still &= np.diff(run[other][seen]) == 0.0  # who goes due north has one east
-        found += [
-            *_frozen(name, run.time[seen], present, still),
-            *_coarse(name, present),
-            *_spikes(name, run.time[seen], present),
-        ]
+        step, own_step = float(np.median(np.diff(run.time[seen]))), _own_step(run.time[seen], present)
+        found += _frozen(name, run.time[seen], present, still, own_step)
+        found += [*_coarse(name, present), *_spikes(name, run.time[seen], present)] if own_step == step else []
     return found
+
+
+def _own_step(time: FloatArray, values: FloatArray) -> float:
+    """Return the median step of a sensor in s: that of its samples (n,), or of the ends of the lines on which most of them lie.
+
+    A sensor slower than the clock was interpolated to it. What lies between
+    its measurements shows neither its digits nor its noise.
+    """
+    steps, bend = np.diff(values), np.abs(np.diff(values, 2))
+    step, limit = float(np.median(np.diff(time))), STRAIGHT * float(np.percentile(bend, 99))
+    if float(np.median(np.abs(steps))) == 0.0 or not float(np.median(bend)) < limit:
+        return step
+    apart = np.diff(time[1:-1][bend > limit])
+    lines = apart[apart > 1.5 * step]  # a measurement between two samples of the clock bends the line at both
+    return float(np.median(lines)) + step if lines.size else step
 
 
 def _missing(name: str, seen: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[Note]:
@@ -89,8 +104,11 @@ def _size(run: Run, name: str, values: FloatArray, stated: Stated) -> list[Note]
     return found
 
 
-def _frozen(name: str, time: FloatArray, values: FloatArray, same: BoolArray) -> list[Note]:
-    """Return the finding that a sensor repeats one value for long, by the `same` (n - 1,), among values that otherwise change."""
+def _frozen(name: str, time: FloatArray, values: FloatArray, same: BoolArray, step: float) -> list[Note]:
+    """Return the finding that a sensor repeats one value for long, by the `same` (n - 1,), among values that otherwise change.
+
+    `step` is that of its own measurements in s.
+    """
     if same.mean() > COARSE_LIMIT:
         return []
     starts, ends = blocks_of(same)
@@ -98,7 +116,6 @@ def _frozen(name: str, time: FloatArray, values: FloatArray, same: BoolArray) ->
         return []
     lengths = time[ends] - time[starts]
     k = int(np.argmax(lengths))
-    step = float(np.median(np.diff(time)))
     limit = max(FROZEN_S, 5 * step)
     if lengths[k] <= limit:
         return []

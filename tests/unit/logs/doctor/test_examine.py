@@ -287,6 +287,16 @@ def test_a_place_is_frozen_where_both_of_its_coordinates_are():
     assert {("frozen", "x_m"), ("frozen", "y_m")} <= codes(stopped)
 
 
+def test_a_slow_sensor_brought_to_a_fast_clock_has_no_faults_of_the_lines_between_its_measurements():
+    rng, run = np.random.default_rng(8), healthy()
+    slow = np.arange(0.03, run.time[-1] + 1.0, 1.0)
+    depth = np.interp(run.time, slow, np.round(3.0 + rng.normal(0.0, 0.01, slow.size), 2))
+    surge = np.interp(run.time, slow, 1.2 + rng.normal(0.0, 0.01, slow.size))
+    assert not {c for c in codes(changed(run, depth_m=depth, surge_m_s=surge)) if c[0] in ("frozen", "spikes", "coarse")}
+    stopped = np.interp(run.time, slow, with_value(np.interp(slow, run.time, surge), slice(10, 20), 1.2))
+    assert ("frozen", "surge_m_s") in codes(changed(run, surge_m_s=stopped))
+
+
 def test_a_sign_that_is_set_is_taken_back_and_stamps_are_named_where_they_were_chosen():
     run = healthy()
     against, astern = changed(run, yaw_rate_rad_s=-run["yaw_rate_rad_s"]), changed(run, surge_m_s=-run["surge_m_s"])
