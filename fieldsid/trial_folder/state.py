@@ -13,6 +13,7 @@ from typing import Annotated, Any
 from fieldsid.display import Brief
 from fieldsid.errors import ArtifactError, LogError
 from fieldsid.logs.reader import reader_of
+from fieldsid.logs.readers.several_tables import holds_one_run
 from fieldsid.logs.run import OF_LIMITS, SIMULATED
 from fieldsid.logs.unknown_file import own_kind
 from fieldsid.records.keys import Key, Words
@@ -156,9 +157,17 @@ def _is_simulated(item: Item, entries: Sequence[Entry]) -> bool:
 
 
 def _items(folder: Path, sides: Sequence[str], unreadable: list[str]) -> Iterator[Item]:
+    joined: set[Path] = set()
     for path in sorted(folder.rglob("*")):
         inside = path.relative_to(folder)
-        if inside.parts[0] in sides or not path.is_file() or path.name == JOURNAL or any(p.startswith(".") for p in inside.parts):
+        if inside.parts[0] in sides or path.name == JOURNAL or any(p.startswith(".") for p in inside.parts):
+            continue
+        if path.parent in joined or _is_one_run(path, inside):
+            joined.add(path)
+            if path.parent not in joined:
+                yield Item(inside.as_posix(), LOG)
+            continue
+        if not path.is_file():
             continue
         try:
             item = _item(path, inside.as_posix(), folder)
@@ -167,6 +176,14 @@ def _items(folder: Path, sides: Sequence[str], unreadable: list[str]) -> Iterato
             continue
         if item is not None:
             yield item
+
+
+def _is_one_run(path: Path, inside: Path) -> bool:
+    """Whether a folder below that of the logs has the tables of one run, which are one log."""
+    try:
+        return path.is_dir() and inside.parts[0] == LOGS and len(inside.parts) > 1 and holds_one_run(path)
+    except (LogError, OSError):  # the command that reads a table of it reports what is wrong
+        return False
 
 
 def _item(path: Path, name: str, folder: Path) -> Item | None:

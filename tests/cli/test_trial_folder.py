@@ -427,6 +427,23 @@ def test_import_takes_the_logs_that_are_no_runs_yet_and_status_and_inspect_say_s
     assert [r["run"] for r in run_cli("import", "--force", "--json").json["runs"]] == ["pulses_1.0", "pulses_1.4"]
 
 
+def test_a_folder_of_the_tables_of_one_run_is_one_log(run_cli, folder):
+    for run in [*(folder / "runs").iterdir()]:
+        run.unlink()
+    time = 0.1 * np.arange(300)
+    tables = {"attitude": "yaw_rad,yaw_rate_rad_s", "speed": "surge_m_s,depth_m", "fin": "rudder_rad,thrust"}
+    for size, run in (0.1, "one"), (0.2, "two"):
+        (folder / "logs" / run).mkdir(parents=True)
+        for name, columns in tables.items():
+            rows = "".join(f"{t:.2f},{size * np.sin(t):.4f},{size * np.cos(t):.4f}\n" for t in time)
+            (folder / "logs" / run / f"{name}.csv").write_text(f"time_s,{columns}\n{rows}")
+    body = run_cli("status", "--json").json
+    assert [f["path"] for f in body["files"] if f["kind"] == "log"] == ["logs/one", "logs/two"]
+    assert body["next"]["command"] == "sysid import"
+    assert run_cli("import").code == 0
+    assert sorted(p.name for p in (folder / "runs").iterdir()) == ["one.parquet", "two.parquet"]
+
+
 def test_a_log_from_elsewhere_is_imported_by_its_name(run_cli, folder):
     (folder / "runs/pulses_1.0.parquet").rename(folder.parent / "elsewhere.parquet")
     answer = run_cli("inspect", "../elsewhere.parquet", "--json")

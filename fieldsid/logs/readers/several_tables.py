@@ -58,6 +58,11 @@ def sniff(path: Path) -> bool:
     return path.is_dir() and bool(runs_in(path))
 
 
+def holds_one_run(path: Path) -> bool:
+    """Whether a folder has tables that must be joined, all of one run; raises LogError where one cannot be read."""
+    return len(runs_in(path)) == 1
+
+
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     """Return the tables and their columns; raises LogError where the folder has several runs."""
     parts, notes = _parts(path, options, form, ChannelMap({}, time=options.clock))
