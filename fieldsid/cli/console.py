@@ -163,11 +163,11 @@ class Rows(Table):
             yield from Table.__rich_console__(shown, console, options)
             return
         heads = [str(column.header) for column in self.columns]
-        wide = max(map(len, heads)) + 2
+        wide = min(max(map(len, heads)) + 2, options.max_width // 2)  # a longer head is a model's name, and stays in one piece
         for row in zip(*(column.cells for column in self.columns), strict=True):
             for head, cell in zip(heads, map(str, row), strict=True):
                 for i, line in enumerate(folded(one_line(cell), options.max_width - wide, rest="").split("\n") if cell else ()):
-                    yield _unfolded(words(f"{'' if i else head:<{wide}}", "dim").append_text(words(line)))
+                    yield _unfolded(words(f"{'' if i else f'{head}  ':<{wide}}", "dim").append_text(words(line)))
             yield ""
 
     @staticmethod

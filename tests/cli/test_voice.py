@@ -114,6 +114,16 @@ def test_a_table_that_does_not_fit_a_narrow_terminal_is_shown_row_by_row_with_it
     assert sum(line.startswith("95 % interval") for line in lines) == 1
 
 
+@pytest.mark.parametrize("width", [40, 80])
+def test_a_column_whose_name_is_longer_than_the_page_is_shown_in_one_piece(width):
+    name = "joint_yaw" + "+quadratic_damping" * 5
+    to = Console(file=io.StringIO(), width=width, force_terminal=False)
+    print_page(to, Page("", blocks=(Block("", (("run7", "14.01", "1.30"),), ("run", "joint_yaw", name)),)))
+    lines = to.file.getvalue().splitlines()
+    assert f"{name}  1.30" in lines
+    assert any(line.split() == ["joint_yaw", "14.01"] for line in lines)
+
+
 def test_a_table_that_fits_or_a_page_that_is_wide_keeps_its_columns():
     small = table(Block("", (("a", "1.4"),), ("run", "m/s")))
     assert on_a_terminal_of(40, small).splitlines()[0].split() == ["run", "m/s"]
