@@ -50,6 +50,13 @@ def test_gains_and_radius_begin_with_what_their_model_lacks(run_cli, tmp_path, a
     assert "lacks" not in run_cli(*asked, whole, "--fin-max", "0.26", "--quiet").out
 
 
+def test_a_verification_says_what_the_model_lacks_as_the_design_does(run_cli, tmp_path):
+    lacks, gains = save_model(leaving(2.9), tmp_path / "lacks.yaml"), tmp_path / "gains.yaml"
+    assert run_cli("schedule", "design", lacks, "--fin-max", "0.26", "-o", gains).code == 0
+    says = run_cli("schedule", "verify", gains, "--quiet").out.splitlines()[0]
+    assert says.startswith("from a model that lacks something (2.90 x the noise; `sysid diagnose` first): ")
+
+
 def test_identify_keeps_in_the_model_what_it_leaves(run_cli, tmp_path):
     log = trial.flown(tmp_path, hidden=("servo_lag", {"lag": 0.35}))
     body = run_cli("identify", log, "--axis", "yaw", "--method", "output_error", "-o", tmp_path, "--no-figures", "--json").json

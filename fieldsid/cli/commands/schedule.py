@@ -214,7 +214,7 @@ def verify(
         gates=gates,
         figure=draw_figure(output, sketch("schedule", known, checked), force=force),
     )
-    headline = headline_of_verification(result, schedule, known, models or source.paths)
+    headline = headline_of_verification(result, schedule, known, models or source.paths, caveat(source.models, source.paths))
     gates_said = (f"passed: {g.name} {g.found:.3g}, wanted {g.wanted:.3g}" for g in gates if g.passed and not result.passed)
     page = Page("", blocks=(*verify_blocks(checked), *gates_said), closing=written(figure=result.figure))
     body = emit(result, render=page, headline=headline)

@@ -91,9 +91,11 @@ def headline_of_design(result: Design, models: Sequence[Path], caveat: str = "")
     return Headline(f"{caveat}kp {kp}, {schedule.kind}; {margin}", rests, next_)
 
 
-def headline_of_verification(result: Verified, schedule: Path, known: Schedule, models: Sequence[Path]) -> Headline:
+def headline_of_verification(
+    result: Verified, schedule: Path, known: Schedule, models: Sequence[Path], caveat: str = ""
+) -> Headline:
     """Return the verdict on the gains; those that fail need rows between, more data where their margin is wide, else margin."""
-    says, rests = f"{result.verdict}: {result.says}", result.rests_on.removeprefix("rests on ")
+    says, rests = f"{caveat}{result.verdict}: {result.says}", result.rests_on.removeprefix("rests on ")
     if result.verdict in ("holds", "passed") and result.passed:
         out = Path(f"{schedule.stem}_{TARGET}.yaml")
         return Headline(says, rests, pasted("schedule", "export", schedule, "--to", TARGET, "-o", out))
