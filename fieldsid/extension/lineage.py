@@ -16,7 +16,7 @@ from fieldsid.comparison.localize import Place
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.display import Brief
 from fieldsid.errors import ArtifactError
-from fieldsid.extension.extend import Extension, Gain
+from fieldsid.extension.extend import Extension, Gain, whole_of
 from fieldsid.logs.run import Run
 from fieldsid.models.model import KIND, Noise, load_model, save_model
 from fieldsid.numerics.arrays import known
@@ -65,10 +65,13 @@ class Generation(Brief):
         return () if self.step is None else self.step.gain.added
 
 
-def kept_by(extension: Extension) -> str:
-    """Return why an extension is kept: `unseen` data are predicted better, the `evidence` rises, or the user gave `--keep`."""
+def kept_by(extension: Extension, whole: Extension | None = None) -> str:
+    """Return why an extension is kept: `unseen` data are predicted better, the `evidence` rises, or the user gave `--keep`.
+
+    A step that does not pay by itself is kept for the `set` with it, `whole`, where that pays.
+    """
     if not extension.pays:
-        return "--keep"
+        return "set" if whole is not None and whole.pays else "--keep"
     return "unseen" if extension.gain.unseen else "evidence"
 
 
@@ -81,14 +84,18 @@ def save_extension(
     validation: Sequence[Run] = (),
     mapping: Path | None = None,
     force: bool = False,
+    whole: Extension | None = None,
 ) -> Path:
-    """Write the extended model with its parent, errors before and after, and the hashes of the data; raises ArtifactError."""
+    """Write the extended model with its parent, errors before and after, and the hashes of the data; raises ArtifactError.
+
+    `whole` is the addition of all effects at once of which this is a step.
+    """
     roles = [("training", r) for r in training] + [("validation", r) for r in validation]
     files = [(role, r.name, r.source) for role, r in roles if r.source is not None and r.source.exists()]
     body = {
         **body_of(extension.gain),
         "log_evidence": extension.evidence,
-        "kept_by": kept_by(extension),
+        "kept_by": kept_by(extension, whole),
         "data": [{"run": n, "role": role, "path": str(p), "sha256": sha256_of(p)} for role, n, p in files],
     }
     model = replace(extension.model, info={**extension.model.info, "extension": body})
@@ -103,9 +110,9 @@ def save_steps(
 
     Raises ArtifactError.
     """
-    training, unseen = data
+    (training, unseen), whole = data, whole_of(steps)
     for step, file, before in zip(steps, files, [parent, *files], strict=False):
-        save_extension(step, file, parent=before, training=training, validation=unseen, mapping=mapping, force=force)
+        save_extension(step, file, parent=before, training=training, validation=unseen, mapping=mapping, force=force, whole=whole)
 
 
 def parent_of(path: Path) -> Parent | None:

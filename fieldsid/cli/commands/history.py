@@ -22,7 +22,12 @@ if TYPE_CHECKING:
     from fieldsid.extension.lineage import Generation, Step
     from fieldsid.results.extensions import History
 
-KEPT = {"unseen": "unseen data are predicted better", "evidence": "the evidence pays for it", "--keep": "kept because of --keep"}
+KEPT = {
+    "unseen": "unseen data are predicted better",
+    "evidence": "the evidence pays for it",
+    "set": "kept for the set that it was added with",
+    "--keep": "kept because of --keep",
+}
 
 
 def command(model: ModelFile, figure: FigureFile = None, force: Force = False) -> Mapping[str, Any]:

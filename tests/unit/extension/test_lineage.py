@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import hidden_lag
 import pytest
@@ -11,7 +12,7 @@ from cli.trial import vehicle
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.errors import ArtifactError
 from fieldsid.extension.extend import Extension, Gain
-from fieldsid.extension.lineage import CHANGED, INTACT, MISSING, history_of, parent_of, save_extension
+from fieldsid.extension.lineage import CHANGED, INTACT, MISSING, history_of, kept_by, parent_of, save_extension
 from fieldsid.logs import load_run, save_run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise, load_model, save_model
@@ -99,3 +100,9 @@ def test_a_damaged_account_of_an_extension_is_refused(line):
     line[1].write_text(text)
     with pytest.raises(ArtifactError, match="does not say completely how it was extended"):
         history_of(line[1])
+
+
+@pytest.mark.parametrize(("step", "whole", "reason"), [(True, True, "unseen"), (False, True, "set"), (False, False, "--keep")])
+def test_a_step_that_does_not_pay_is_kept_for_the_set_where_that_pays(step, whole, reason):
+    one, both = (SimpleNamespace(pays=pays, gain=SimpleNamespace(unseen=True)) for pays in (step, whole))
+    assert kept_by(one, both) == reason
