@@ -120,11 +120,8 @@ def _whole(numbers: FloatArray, last_bit: float = 0.0) -> bool:
     A last digit tells apart what differs: an epoch near a round number is not whole in millions of seconds.
     """
     whole = np.round(numbers)
-    if (
-        not bool(np.abs(numbers).max() >= 1.0)
-        or last_bit > WORN_OUT
-        or bool((np.diff(whole)[np.diff(numbers) != 0.0] == 0.0).any())
-    ):
+    made_equal = np.diff(whole)[np.diff(numbers) != 0.0] == 0.0
+    if not bool(np.abs(numbers).max() >= 1.0) or last_bit > WORN_OUT or bool(made_equal.any()):
         return False
     return bool(np.all(np.abs(numbers - whole) <= 1e-6 + last_bit + 1e-12 * np.abs(numbers)))
 
