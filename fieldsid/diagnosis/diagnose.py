@@ -88,14 +88,14 @@ def diagnose(
     catalogue, narrow = shown_by_headings(catalogue, [*learned, *unseen], known)
     diagnosis_of = partial(_diagnosis, unlogged=unlogged, skipped=unlogged | narrow, notes=notes)
     begin = partial(Search, learned, unseen, axis, catalogue, known, report, thorough=thorough, given=model)
+    result = _best_result(begin())
+    if result.verdict.word != "unexplained" or not result.work.is_noiseless:
+        return diagnosis_of(result)
     work = begin()
-    work.base()
-    if not work.is_noiseless:
-        return diagnosis_of(_best_result(work))
     found = noiseless_search(work, lambda h: excess_explained(work, h) > MAIN_EXPLAINED_SHARE)
-    if found is not None and excess_explained(work, found) > MAIN_EXPLAINED_SHARE:
-        return diagnosis_of(_search_result(work, found, found.likelihood_fit, Verdict("effect", added_effects(work, found))))
-    return diagnosis_of(_best_result(begin()))
+    if found is None or not excess_explained(work, found) > MAIN_EXPLAINED_SHARE:
+        return diagnosis_of(result)
+    return diagnosis_of(_search_result(work, found, found.likelihood_fit, Verdict("effect", added_effects(work, found))))
 
 
 @dataclass(frozen=True, slots=True)

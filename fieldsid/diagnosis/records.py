@@ -132,6 +132,10 @@ class NextManeuver:
     ] = None
 
 
+FLOOR = "Error that the sensors leave; where they have next to no noise, that of the measured speed."
+"""What the noise floor of a diagnosis and of an extension is."""
+
+
 @dataclass(frozen=True, slots=True)
 class HeldAt:
     """The speed that the model's parameters hold at."""
@@ -154,7 +158,7 @@ class Diagnosis(Plotted):
     short: Annotated[str, Key("The same with the effects by their names alone.")]
     base: Annotated[Pair, Key("Errors of the model as it is.")]
     final: Annotated[Pair, Key("Errors with the named effects added; those of the base where none is.")]
-    noise_floor: Annotated[Noise, Key("Noise of the sensors.")]
+    noise_floor: Annotated[Noise, Key(FLOOR)]
     candidates: Annotated[tuple[Candidate, ...], Key("What was tried, the one found first, then by evidence.")]
     model: Model
     base_model: Model

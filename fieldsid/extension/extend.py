@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated
 
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
@@ -16,7 +17,7 @@ from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
 from fieldsid.diagnosis.evidence.acceptance import common_own_moment, is_accepted
 from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
-from fieldsid.diagnosis.records import Errors, Pair
+from fieldsid.diagnosis.records import FLOOR, Errors, Pair
 from fieldsid.diagnosis.report.final_model import final_model
 from fieldsid.diagnosis.search.noiseless_search import noiseless_line
 from fieldsid.diagnosis.search.search import Search
@@ -62,7 +63,7 @@ class Gain(Brief):
     added: Annotated[tuple[str, ...], Key("The effects added.")]
     before: Annotated[Pair, Key("Errors without them.")]
     after: Annotated[Pair, Key("Errors with them.")]
-    noise_floor: Annotated[Noise, Key("Noise of the sensors.")]
+    noise_floor: Annotated[Noise, Key(FLOOR)]
     unseen: Annotated[bool, Key("Whether there were runs to judge by that were not fitted.")]
     learned_on: Annotated[tuple[str, ...], Key("Runs that were fitted.")]
     judged_on: Annotated[tuple[str, ...], Key("Runs it was judged by.")]
@@ -135,13 +136,13 @@ def extend_in_steps(
     learned, judged, notes = (tuple(records), unseen, ()) if unseen else holdout_split(records)
     parts = _with_signals((*(effect_held(n, parent.own) for n in parent.effects), *new), [*learned, *judged])
     notes = (*notes, *left_out([run for run, _ in (*fitted, *checked)], parent.axis))
-    work = Search(learned, judged, parent.axis, parts, parent.effects, report, thorough=True, given=parent)
-    line = _refitted_line(work, new)
+    begin = partial(Search, axis=parent.axis, catalogue=parts, known=parent.effects, report=report, thorough=True, given=parent)
+    work, line = _refitted_line(partial(begin, learned, judged), new)
     steps = _extensions_of_line(work, line, new, notes)
-    if not judged or work.is_noiseless or whole_of(steps).pays or not is_accepted(line[0], line[-1]):
+    if not judged or whole_of(steps).pays or not is_accepted(line[0], line[-1]):
         return steps
-    work = Search((*learned, *judged), (), parent.axis, parts, parent.effects, report, thorough=True, given=parent)
-    return _extensions_of_line(work, _refitted_line(work, new), new, (*notes, FITTED_TO_ALL))
+    work, line = _refitted_line(partial(begin, (*learned, *judged), ()), new)
+    return _extensions_of_line(work, line, new, (*notes, FITTED_TO_ALL))
 
 
 def whole_of(steps: Sequence[Extension]) -> Extension:
@@ -152,22 +153,26 @@ def whole_of(steps: Sequence[Extension]) -> Extension:
     return replace(steps[-1], gain=gain, evidence=sum(s.evidence for s in steps), notes=notes)
 
 
-def _refitted_line(work: Search, new: Sequence[Effect]) -> list[ScoredModel]:
-    """Return the refitted parent and the refitted models after each addition of the new effects in their order.
+def _refitted_line(begin: Callable[[], Search], new: Sequence[Effect]) -> tuple[Search, list[ScoredModel]]:
+    """Return the refitted parent and the refitted models after each addition of the new effects in order, and their search.
 
     The full set is built up from the best few sets of each size and from the first effects in their order. Then the search of
-    `diagnose` runs with these effects alone, and the better optimum of each set is kept.
+    `diagnose` runs with these effects alone, and the better optimum of each set is kept. Without noise the line is also fitted as
+    in the search by the error, and the line that ends at the lower error is taken.
     """
+    work = begin()
     work.base()
     line = [work.root | {e.name for e in new[:size]} for size in range(len(new) + 1)]
-    if work.is_noiseless:
-        return noiseless_line(work, line)
     front = {work.root}
     for ends in line[1:]:
         children = {frozenset(c.names): c for key in front for c in work.grow(work.tried[key], forced=True)}
         front = set(sorted(children, key=lambda key: -children[key].log_evidence)[:BEAM_WIDTH]) | {ends}
     work.best()
-    return [work.tried[names] for names in line]
+    likeliest = work, [work.tried[names] for names in line]
+    if not work.is_noiseless:
+        return likeliest
+    by_error = begin()
+    return min((likeliest, (by_error, noiseless_line(by_error, line))), key=lambda found: found[1][-1].selection_errors.mean)
 
 
 def _extensions_of_line(

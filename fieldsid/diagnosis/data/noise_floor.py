@@ -21,7 +21,12 @@ def reported_noise_floor(floor: Noise, noise: Noise) -> Noise:
 
 def resolution_floor(floor: Noise, errors: Noise) -> Noise:
     """Return the smallest white noise that models are compared under: the floor, or a share of the base model's errors."""
-    return Noise(max(floor.angle, MIN_BASE_ERROR_SHARE * errors.angle), max(floor.rate, MIN_BASE_ERROR_SHARE * errors.rate))
+    return larger_of(floor, Noise(MIN_BASE_ERROR_SHARE * errors.angle, MIN_BASE_ERROR_SHARE * errors.rate))
+
+
+def larger_of(one: Noise, other: Noise) -> Noise:
+    """Return the larger white noise of two in each channel."""
+    return Noise(max(one.angle, other.angle), max(one.rate, other.rate))
 
 
 def is_noiseless(floor: Noise, least: Noise, records: Sequence[Record]) -> bool:

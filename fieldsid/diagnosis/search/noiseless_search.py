@@ -1,4 +1,4 @@
-"""A search by output error alone, for logs with almost no noise: from a towing tank, or filtered before logging.
+"""A search by output error alone, where logs with almost no noise are left unexplained: of a towing tank, or filtered.
 
 The likelihood compares models by the disturbance that each still needs. Residuals that depend on the fin or the motion are not a
 disturbance, and without noise the smallest inconsistency of the sensors outweighs the hydrodynamics: the likeliest model need not

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fieldsid.diagnosis.data.noise_floor import is_noiseless, resolution_floor
+from fieldsid.diagnosis.data.noise_floor import is_noiseless, larger_of, resolution_floor
 from fieldsid.diagnosis.evidence.acceptance import (
     compared_error,
     compared_share,
@@ -49,6 +49,7 @@ from fieldsid.diagnosis.search.whole_hull import whole_hull
 from fieldsid.diagnosis.thresholds import MAX_ERROR_RATIO, MIN_EXPLAINED_SHARE, MISSING_ERROR_RATIO, SUFFICIENT_ERROR_RATIO
 from fieldsid.fitting.covariance.noise_selection import residuals_of
 from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
+from fieldsid.fitting.predict.speed_correction import error_of_speed
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
@@ -67,8 +68,8 @@ class Search:
 
     `given` is the model with the known effects, where there is one: the base is also fitted from its values.
 
-    `floor` is the lowest estimate of the sensors' noise so far, `is_noiseless` whether the base's error is more than fifty times
-    that in every measured channel.
+    `floor` is the lowest estimate of the sensors' noise so far. `is_noiseless` is whether every measured channel has less of it
+    than a fiftieth of the base's error, or than the error that a measured speed makes: `floor` includes that error then.
     """
 
     records: tuple[Record, ...]
@@ -196,7 +197,10 @@ class Search:
             )
             fitted = min(fits, key=lambda t: error_product(t, self.axis))
             refuse_unbounded_motion(fitted.problem, fitted.x, "diagnose", instead="leave effects out of the model it starts from")
-            self.is_noiseless = is_noiseless(self.floor, resolution_floor(self.floor, fitted.weights), self.records)
+            with_speed = larger_of(self.floor, error_of_speed(fitted.problem, fitted.x))
+            self.is_noiseless = is_noiseless(self.floor, resolution_floor(with_speed, fitted.weights), self.records)
+            if self.is_noiseless:
+                self.floor = with_speed
             self._lower_floor_by(fitted.problem, fitted.x)
             self.resolution_floor = resolution_floor(self.floor, fitted.weights)
             ml_fit = fit_base(fitted, self.floor, self.resolution_floor, self.parallel)

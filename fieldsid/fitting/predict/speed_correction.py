@@ -42,6 +42,15 @@ def speed_sensitivity(problem: Problem, x: FloatArray, speed: float) -> FloatArr
     return (MEASURED_SPEED_STD_ERROR if np.isfinite(speed) else GUESSED_SPEED_STD_ERROR) * _speed_derivatives(problem, x)
 
 
+def error_of_speed(problem: Problem, x: FloatArray) -> Noise:
+    """Return the rms change of a problem's free runs with one standard error of the measured speeds, in rad and rad/s."""
+    moved, squares, counts = _at_speed_share(problem, MEASURED_SPEED_STD_ERROR), np.zeros(2), np.zeros(2)
+    for run, record in enumerate(problem.records):
+        change = (moved.residual(x, run)[0] - problem.residual(x, run)[0]) * record.ok
+        squares, counts = squares + (change**2).sum(axis=1), counts + record.ok.sum(axis=1)
+    return Noise(*np.sqrt(squares / np.maximum(counts, 1)).tolist())
+
+
 def correct_speed(problem: Problem, x: FloatArray, floor: Noise) -> tuple[Problem, FloatArray, float]:
     """Return a one-run problem at the corrected speed, x (N,) with refitted initial state, and the relative correction."""
     groups = problem.layout.groups

@@ -14,7 +14,13 @@ from truth.physics import Physics
 
 from fieldsid.fitting.predict import speed_correction
 from fieldsid.fitting.predict.predict import frozen_problem, predict, refit_nuisances
-from fieldsid.fitting.predict.speed_correction import MAX_STD_ERRORS, MEASURED_SPEED_STD_ERROR, correct_speed, speed_note
+from fieldsid.fitting.predict.speed_correction import (
+    MAX_STD_ERRORS,
+    MEASURED_SPEED_STD_ERROR,
+    correct_speed,
+    error_of_speed,
+    speed_note,
+)
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise
@@ -41,6 +47,16 @@ def logged(faster, *, seed=1, gust=0.0):
 
 def errors(shown):
     return np.sqrt(np.mean(shown.residual**2, axis=1)) / (ANGLE, RATE)
+
+
+def test_the_error_that_a_measured_speed_makes_is_the_change_of_the_flight_with_it():
+    clock, faster = Clock(0.05, 1200), 1.0 + MEASURED_SPEED_STD_ERROR
+    plan = maneuvers.multisine(clock.time, np.random.default_rng(4), 0.2)  # the same fin at both speeds
+    first, other = (flown(hull, clock, plan) for hull in (HULL, HULL._replace(damping=0.8 * faster, authority=-0.6 * faster**2)))
+    record = record_of(Run("run", first["time_s"], {k: v for k, v in first.items() if k != "time_s"}), Axis.YAW)
+    found = error_of_speed(*frozen_problem(TRUE, replace(record, speed=SPEED), ()))
+    angle, rate = (np.sqrt(np.mean((other[k] - first[k]) ** 2)) for k in ("yaw_rad", "yaw_rate_rad_s"))
+    assert (found.angle, found.rate) == pytest.approx((angle, rate), rel=0.1)
 
 
 @pytest.mark.parametrize("faster", [0.006, -0.004])

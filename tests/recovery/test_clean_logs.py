@@ -1,0 +1,63 @@
+"""Logs without noise, as a simulator writes them: what is hidden is named alone, and a model that follows is sufficient.
+
+The measured speed of the runs is a little off, as any is: below the error that this makes nothing is missing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from truth import maneuvers
+from truth.logbook import flown
+from truth.noise import Clock
+from truth.physics import Physics
+
+from fieldsid.diagnosis import diagnose
+from fieldsid.extension.extend import extend_in_steps, whole_of
+from fieldsid.fitting.fit import fit
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
+from fieldsid.models.record import record_of
+
+CLOCK = Clock(0.1, 400)
+HULL = Physics(damping=0.9, authority=-0.7, fin_bend=0.0)
+SPEEDS = (1.5, 1.503, 1.498)
+"""What the logs say of runs that were all flown at one speed."""
+
+
+def logs(hidden):
+    """Two runs to fit and one to judge by, exact but for the measured speed."""
+    plans = (
+        maneuvers.zigzag(CLOCK.time, 0.25, 0.4),
+        maneuvers.multisine(CLOCK.time, np.random.default_rng(4), 0.25),
+        maneuvers.zigzag(CLOCK.time, 0.15, 0.3),
+    )
+    runs = []
+    for i, (plan, speed) in enumerate(zip(plans, SPEEDS, strict=True)):
+        log = flown(hidden, CLOCK, plan)
+        signals = {k: log[k] for k in ("yaw_rad", "yaw_rate_rad_s", "rudder_rad")}
+        runs.append(Run(f"run{i}", log["time_s"], signals | {"surge_m_s": np.full(CLOCK.time.size, speed)}))
+    return runs[:2], runs[2:]
+
+
+def test_nothing_is_missing_where_the_model_follows_as_well_as_the_speed_was_measured():
+    fitted, unseen = logs(HULL)
+    found = diagnose(fitted, Axis.YAW, unseen)
+    assert found.verdict == "sufficient"
+    assert found.left.ratio < 1.0
+
+
+@pytest.mark.parametrize(
+    ("hidden", "name"), [({"servo_tau": 0.4}, "servo_lag"), ({"quadratic": 1.0}, "quadratic_damping")], ids=["lag", "quadratic"]
+)
+def test_what_is_hidden_is_named_alone_and_added_with_the_error_that_was_named(hidden, name):
+    fitted, unseen = logs(HULL._replace(**hidden))
+    found = diagnose(fitted, Axis.YAW, unseen)
+    assert found.verdict == "effect"
+    assert found.effects == (name,)
+    assert found.left.ratio < 1.0 < found.base.validation.over(found.noise_floor)
+    plain = fit([record_of(run, Axis.YAW) for run in fitted], Axis.YAW).model
+    added = whole_of(extend_in_steps(plain, found.effects, fitted, unseen))
+    assert added.pays
+    assert added.gain.noise_floor == found.noise_floor
+    assert max(added.gain.left(kept=True)) < 1.0
