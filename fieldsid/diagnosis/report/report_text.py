@@ -126,7 +126,9 @@ def _unexplained_sentence(search: Search, found: ScoredModel, left: ResidualTest
     """
     worse = validation_error_ratio(search.base(), search.floor)
     lowers = found.selection_errors.mean < search.base().selection_errors.mean
-    partly = f", {sized(search, found, floor)} with {' and '.join(names_added(search, found))}" if lowers else ""
+    worse_fitted = found.train.over(floor) > EQUAL_ERROR_RATIO * found.selection_errors.over(floor)
+    fitted = f" ({_size(search, found.train, floor)} on the fitted runs)" if worse_fitted else ""
+    partly = f", {sized(search, found, floor)}{fitted} with {' and '.join(names_added(search, found))}" if lowers else ""
     when = f"{left.worst_start_s:.0f}-{left.worst_end_s:.0f} s ({left.worst_ratio:.1f} x the average)"
     where = f"{'what is left' if lowers else 'it'} is largest in {left.worst_run} at {when}"
     follows = f" and moves with {left.moves_with}" if 3.0 * left.dependence < MIN_P_VALUE else ""
@@ -200,5 +202,8 @@ def what_it_does(name: str, coefficients: Collection[str]) -> str:
 
 def sized(search: Search, h: ScoredModel, floor: Noise) -> str:
     """Return a model's selection error in words: over the noise floor, or in its units where logs show almost no noise."""
-    errors = h.selection_errors
+    return _size(search, h.selection_errors, floor)
+
+
+def _size(search: Search, errors: Errors, floor: Noise) -> str:
     return errors.sized() if search.is_noiseless else f"{errors.over(floor):.2f} x the noise floor"

@@ -205,6 +205,15 @@ def test_the_unexplained_says_what_takes_a_part_of_it_and_which_larger_set_would
     assert "less likely" not in unexplained(base, part, misses)
 
 
+def test_the_unexplained_says_where_the_fitted_runs_are_left_with_more():
+    base, part = (
+        _made(train=(14.5,), unseen=(13.9,), score=0.0),
+        _made("sway_coupling", train=(6.2,), unseen=(1.34,), score=340.0),
+    )
+    said = unexplained(base, part)
+    assert "error 13.90 x the noise floor, 1.34 x the noise floor (6.20 x the noise floor on the fitted runs) with" in said
+
+
 def test_the_unexplained_says_nothing_of_what_raises_the_error_or_is_less_likely_than_none():
     base = _made(train=(1.4,), unseen=(1.5,), score=0.0)
     wave = _made("wave", train=(1.2,), unseen=(1.9,), score=30.0)
