@@ -43,6 +43,9 @@ class Verified(Result):
     verdict: Annotated[str, Key("The verdict in a word.")]
     says: Annotated[str, Key("The same in a sentence, with its number.")]
     rests_on: Annotated[str, Key("What it rests on.")]
+    not_counted: Annotated[
+        Mapping[str, tuple[str, ...]], Key("Coefficients between fin and motion that no loop was flown with, by effect.")
+    ]
     against_constant: Annotated[str, Key("How it compares with the best one gain for all speeds.")]
     constant_gains: Annotated[Gains, Key("That gain.")]
     axis: Annotated[Axis, Key("The plane.")]

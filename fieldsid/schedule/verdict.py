@@ -14,7 +14,6 @@ from fieldsid.rounding import number, number_against
 from fieldsid.schedule.check import READ_OFF, Check, StepCheck
 from fieldsid.schedule.controller import HELD_SHARE
 from fieldsid.schedule.flown.response import steady_error, swing
-from fieldsid.schedule.linear_plant import not_counted
 from fieldsid.schedule.record import Schedule
 from fieldsid.schedule.verify import AT_REST_SHARE, DEPTH_STEP_M, Verification, steps_of
 
@@ -186,7 +185,7 @@ def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource)
             *([UNSTABLE] if checked.unstable else []),
             *_extrapolated(checked),
             *_beyond_fin(checked),
-            *ignored_effects(source),
+            *left_out_of(source),
         )
     )
 
@@ -222,11 +221,8 @@ def fin_of(actuator: Mapping[str, float | None]) -> str:
     return f"lag {number(lag, 3)} s, delay {number(delay, 3)} s{own}, {fastest}"
 
 
-def ignored_effects(source: ParameterSource) -> tuple[str, ...]:
-    """Return in words the effects of a source that the design of gains ignores, or that a source cannot have."""
+def left_out_of(source: ParameterSource) -> tuple[str, ...]:
+    """Return in words the models that a source leaves out, or that a table cannot have effects."""
     if not source.models:
         return ("a table carries no effects",)
-    ignored = not_counted(source.models)
-    unsure = [f"left out, its fin's sign not known: {', '.join(source.left_out)}"] if source.left_out else []
-    parts = ", ".join(f"{effect}'s {' and '.join(names)}" for effect, names in ignored.items())
-    return (*([f"not counted: {parts}"] if ignored else []), *unsure)
+    return (f"left out, its fin's sign not known: {', '.join(source.left_out)}",) if source.left_out else ()

@@ -57,6 +57,17 @@ def test_a_verification_says_what_the_model_lacks_as_the_design_does(run_cli, tm
     assert says.startswith("from a model that lacks something (2.90 x the noise; `sysid diagnose` first): ")
 
 
+def test_gains_and_their_verification_begin_with_what_no_loop_was_flown_with(run_cli, tmp_path):
+    loose, gains = trial.vehicle(Axis.YAW, "backlash", gap=0.02), tmp_path / "gains.yaml"
+    file = save_model(loose, tmp_path / "loose.yaml")
+    says = run_cli("schedule", "design", file, "--fin-max", "0.26", "-o", gains).out.splitlines()[0]
+    assert says.startswith("flown without backlash's gap: kp ")
+    answer = run_cli("schedule", "verify", gains)
+    assert answer.out.splitlines()[0].startswith("flown without backlash's gap: holds: ")
+    assert answer.out.count("backlash") == 1 + answer.out.splitlines()[1].count("backlash")  # the model's effects are listed
+    assert run_cli("schedule", "verify", gains, "--json").json["not_counted"] == {"backlash": ["gap"]}
+
+
 def test_identify_keeps_in_the_model_what_it_leaves(run_cli, tmp_path):
     log = trial.flown(tmp_path, hidden=("servo_lag", {"lag": 0.35}))
     body = run_cli("identify", log, "--axis", "yaw", "--method", "output_error", "-o", tmp_path, "--no-figures", "--json").json

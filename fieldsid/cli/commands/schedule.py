@@ -11,7 +11,7 @@ import typer
 
 from fieldsid.cli.console import emit, print_file, say
 from fieldsid.cli.headlines.gains import (
-    caveat,
+    caveat_of_loops,
     headline_of_design,
     headline_of_export,
     headline_of_patch,
@@ -112,7 +112,7 @@ def design(
     from fieldsid.schedule.linear_plant import FinLimits
     from fieldsid.schedule.make import design_schedule, usual_controller
     from fieldsid.schedule.record import save_schedule
-    from fieldsid.schedule.verdict import ignored_effects
+    from fieldsid.schedule.verdict import left_out_of
     from fieldsid.schedule.wish import QUICKEST, Wish
 
     refuse_existing(output, force=force)
@@ -145,9 +145,9 @@ def design(
     inputs = [p for p in source.paths if p.is_file()]
     written_to = None if output is None else str(save_schedule(schedule, output, inputs=inputs, force=force))
     result = Design(schedule, written_to)
-    headline = headline_of_design(result, models, caveat(source.models, models))
+    headline = headline_of_design(result, models, caveat_of_loops(source.models, models))
     page = Page(
-        "", blocks=tuple(design_blocks(schedule, angles(), ignored_effects(source))), closing=written(schedule=written_to)
+        "", blocks=tuple(design_blocks(schedule, angles(), left_out_of(source))), closing=written(schedule=written_to)
     )
     return emit(result, render=page, headline=headline, notes=schedule.notes)
 
@@ -185,6 +185,7 @@ def verify(
     from fieldsid.face.arguments import designed_from, runs_of_models
     from fieldsid.face.quantities import DECIBEL, parse_quantity, parse_share, parse_time
     from fieldsid.results.gains import Verified
+    from fieldsid.schedule.linear_plant import not_counted
     from fieldsid.schedule.record import load_schedule
     from fieldsid.schedule.verdict import against_constant, gates_of, rests_on, verdict_of
     from fieldsid.schedule.verify import verify_schedule
@@ -204,6 +205,7 @@ def verify(
         verdict=verdict,
         says=says,
         rests_on=rests_on(checked, known, source),
+        not_counted=not_counted(source.models),
         against_constant=against_constant(checked),
         constant_gains=checked.constant_row.gains,
         axis=known.axis,
@@ -214,7 +216,8 @@ def verify(
         gates=gates,
         figure=draw_figure(output, sketch("schedule", known, checked), force=force),
     )
-    headline = headline_of_verification(result, schedule, known, models or source.paths, caveat(source.models, source.paths))
+    caveat = caveat_of_loops(source.models, source.paths)
+    headline = headline_of_verification(result, schedule, known, models or source.paths, caveat)
     gates_said = (f"passed: {g.name} {g.found:.3g}, wanted {g.wanted:.3g}" for g in gates if g.passed and not result.passed)
     page = Page("", blocks=(*verify_blocks(checked), *gates_said), closing=written(figure=result.figure))
     body = emit(result, render=page, headline=headline)

@@ -59,6 +59,14 @@ def caveat(models: Iterable[Model], files: Sequence[Path]) -> str:
     return f"from a model that lacks something ({left}{first}): "
 
 
+def caveat_of_loops(models: Sequence[Model], files: Sequence[Path]) -> str:
+    """Return the caveat of gains: what their models lack, and what no loop was flown with between fin and motion."""
+    from fieldsid.schedule.linear_plant import not_counted
+
+    parts = ", ".join(f"{effect}'s {' and '.join(names)}" for effect, names in not_counted(models).items())
+    return caveat(models, files) + (f"flown without {parts}: " if parts else "")
+
+
 def headline_of_turn(found: TurnPrediction, models: Sequence[Path], caveat: str = "") -> Headline:
     """Return the tightest turn of both sides with its 95 % band; where only the band is known, how to measure the radius."""
     from fieldsid.turning.prediction import found_by, turn_words
