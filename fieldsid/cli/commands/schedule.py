@@ -146,9 +146,7 @@ def design(
     written_to = None if output is None else str(save_schedule(schedule, output, inputs=inputs, force=force))
     result = Design(schedule, written_to)
     headline = headline_of_design(result, models, caveat_of_loops(source.models, models))
-    page = Page(
-        "", blocks=tuple(design_blocks(schedule, angles(), left_out_of(source))), closing=written(schedule=written_to)
-    )
+    page = Page("", blocks=tuple(design_blocks(schedule, angles(), left_out_of(source))), closing=written(schedule=written_to))
     return emit(result, render=page, headline=headline, notes=schedule.notes)
 
 
