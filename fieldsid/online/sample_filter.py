@@ -27,7 +27,7 @@ from fieldsid.fitting.regression.recursive_ls import (
 )
 from fieldsid.fitting.regression.svf_equation import MAX_BRIDGED_GAP_S
 from fieldsid.logs.convert.clock import SLOWER, Track, line_over_steps
-from fieldsid.logs.convert.faults.spikes import spike_limit
+from fieldsid.logs.convert.faults.spikes import ALIKE, spike_limit
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.online.row_colour import RowColour
 
@@ -79,7 +79,7 @@ class SpikeGate:
         middle = c - 0.5 * (b + d)
         sign = 1.0 if middle > 0.0 else -1.0
         distances = (sign * (c - 2.0 * b + a), sign * middle, sign * (c - 2.0 * d + e))
-        return min(distances) > self._limit
+        return min(distances) > max(self._limit, ALIKE * distances[1])
 
 
 CLOCK_RESTART_S = 1.0

@@ -1,7 +1,8 @@
 """Find spikes: single samples off the lines through the two neighbours before, the two after, and the one on each side.
 
-A spike is on the same side of all three lines, by more than a limit. A step of the signal, a kink, and the peak of a fast
-response lie on one of the lines, so that at least one of the three distances is small or of the other sign.
+A spike is on the same side of all three lines, by more than a limit and by about as much of each. A step of the signal, a kink,
+and the peak of a fast response lie on one of the lines, so that at least one of the three distances is small or of the other
+sign: small beside the others, since a log without noise has a limit below the curvature of its motion.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ SPREADS = 8.0
 """Limit of the three distances in standard deviations of the signal's noise."""
 OF_MEDIAN = 1.0 / (MEDIAN_OF_NORMAL * math.sqrt(1.5))
 """Ratio of the standard deviation of white noise to the median distance of its samples from the mean of their neighbours."""
+ALIKE = 0.5
+"""Least ratio of the distances from the lines on either side to that from the line across, which are equal for a lone sample."""
 DIGITS = 3.0
 """Limit of the three distances in units of the log's last digit."""
 FEW = 0.01
@@ -48,8 +51,8 @@ def spikes_of(values: FloatArray) -> Spikes:
     if not np.isfinite(limit):
         return none
     before, middle, after = bend[:-2], -0.5 * bend[1:-1], bend[2:]
-    sign = np.sign(middle)
-    alone = np.minimum(np.minimum(before * sign, after * sign), np.abs(middle)) > limit
+    sign, across = np.sign(middle), np.minimum(np.abs(middle), np.finfo(np.float64).max)
+    alone = np.minimum(np.minimum(before * sign, after * sign), across) > np.maximum(limit, ALIKE * across)
     places = np.flatnonzero(alone)
     if places.size > max(FEW * values.size, 1.0):
         return none

@@ -35,6 +35,15 @@ def test_a_signal_without_spikes_has_none(name, size):
     assert spikes_of(noisy(SIGNALS[name], size=size)).places.size == 0
 
 
+@pytest.mark.parametrize("digits", [5, 6, 16])
+def test_a_kink_of_a_log_without_noise_is_no_spike(digits):
+    fin = np.select([np.abs(TIME - 5 - 4 * k) < 0.99 for k in range(4)], [0.2, -0.2, -0.2, 0.2])
+    rate = np.zeros(N)
+    for k in range(N - 1):
+        rate[k + 1] = rate[k] + 0.05 * (0.7 * fin[k] + 0.007 - 0.84 * rate[k])
+    assert spikes_of(np.round(rate, digits)).places.size == 0
+
+
 @pytest.mark.parametrize("name", ["zigzag", "jumps", "turn"])
 def test_spikes_of_fifteen_spreads_are_found_and_nothing_else(name):
     places, values = np.array([17, 400, 401 + 300, 1100]), noisy(SIGNALS[name])
