@@ -65,8 +65,15 @@ def test_numbers_on_straight_lines_between_measurements_are_missing(rows, digits
 
 RAMPS = np.interp(np.arange(600), np.cumsum(RANDOM.integers(3, 60, 40)), RANDOM.standard_normal(40))
 SMOOTH = np.sin(0.02 * np.arange(600))
+PULSES = np.zeros(600)
+for k in range(599):  # answers to fin steps at even intervals, in a few digits
+    PULSES[k + 1] = PULSES[k] + 0.05 * (0.08 * (k // 40 % 4 - 1.5) - 0.84 * PULSES[k])
 
 
-@pytest.mark.parametrize("values", [RAMPS, SMOOTH, np.round(SMOOTH, 3), np.round(SMOOTH, 6)], ids=["ramps", "smooth", "3", "6"])
+@pytest.mark.parametrize(
+    "values",
+    [RAMPS, SMOOTH, np.round(SMOOTH, 3), np.round(SMOOTH, 6), np.round(3.0 * PULSES, 3)],
+    ids=["ramps", "smooth", "3", "6", "pulses"],
+)
 def test_ramps_and_smooth_numbers_are_no_lines_between_measurements(values):
     assert without_repeats("yaw_rad", values)[1] == []
