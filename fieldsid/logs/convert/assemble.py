@@ -13,6 +13,7 @@ from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, ChannelMap, Source
 from fieldsid.logs.convert.clock import ANGLES_AND_RATES, Track, one_clock, summed
 from fieldsid.logs.convert.conditioning import MAX_GAP_S, in_order, possible, refuse_impossible_steps, refuse_long_gaps
+from fieldsid.logs.convert.faults.copied_fins import without_copied_fins
 from fieldsid.logs.convert.faults.dropouts import SENSED, without_dropouts
 from fieldsid.logs.convert.faults.heading_fills import without_fills
 from fieldsid.logs.convert.faults.repeats import measured_anew, note_on_repeats, without_repeats
@@ -93,7 +94,8 @@ def assemble(
     if time.size < 2:
         counted = _counted(time, notes)
         raise LogError(f"`{path}` has too few samples", found=counted, hint=f"{_inspect(path)} shows what is in it")
-    signals = {s: signals[s] for s in COLUMNS if s in signals}
+    signals, copies = without_copied_fins({s: signals[s] for s in COLUMNS if s in signals})
+    notes += copies
     run = Run(raw.name, time, signals, path, tuple({(n.code, n.message): n for n in notes}.values()))
     run = run if part == WHOLE else run.between(*part)
     refuse_long_gaps(run.time, run.signals, options, limit_s=max_gap_s)
