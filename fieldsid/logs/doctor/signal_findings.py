@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.logs.convert.conditioning import blocks_of
-from fieldsid.logs.convert.faults.spikes import spikes_of
+from fieldsid.logs.convert.faults.spikes import DIGITS, last_digit, spikes_of
 from fieldsid.logs.convert.servo_counts import servo_of
+from fieldsid.logs.doctor.angle_and_rate import PAIRS
 from fieldsid.logs.doctor.holes import usual_step
 from fieldsid.logs.doctor.pair_findings import goes_with_way
 from fieldsid.logs.doctor.stated import Stated
@@ -17,6 +18,8 @@ FITTED = frozenset({"yaw_rad", "pitch_rad", "yaw_rate_rad_s", "pitch_rate_rad_s"
 """The signals to which the free run is fitted."""
 PLACE = frozenset({"x_m", "y_m"})
 """The coordinates of one sensor: neither is frozen while the other changes."""
+RATE_OF = dict(PAIRS)
+"""The rate of each angle."""
 MISSING_LIMIT = 0.05
 FROZEN_S = 1.0
 COARSE_LIMIT = 0.3
@@ -50,7 +53,7 @@ def signal_findings(run: Run, name: str, stated: Stated) -> list[Note]:
         for other in PLACE & run.signals.keys() - {name} if name in PLACE else ():
             still &= np.diff(run[other][seen]) == 0.0  # who goes due north has one east
         step, own_step = float(np.median(np.diff(run.time[seen]))), _own_step(run.time[seen], present)
-        found += _frozen(name, run.time[seen], present, still, own_step)
+        found += _frozen(run, name, run.time[seen], present, still, own_step)
         found += [*_coarse(name, present), *_spikes(name, run.time[seen], present)] if own_step == step else []
     return found
 
@@ -104,28 +107,48 @@ def _size(run: Run, name: str, values: FloatArray, stated: Stated) -> list[Note]
     return found
 
 
-def _frozen(name: str, time: FloatArray, values: FloatArray, same: BoolArray, step: float) -> list[Note]:
+def _frozen(run: Run, name: str, time: FloatArray, values: FloatArray, same: BoolArray, step: float) -> list[Note]:
     """Return the finding that a sensor repeats one value for long, by the `same` (n - 1,), among values that otherwise change.
 
-    `step` is that of its own measurements in s.
+    A vehicle that goes on evenly, as that of a simulator before its first pulse or in a settled turn, has still sensors. `step`
+    is that of the sensor's own measurements in s.
     """
     if same.mean() > COARSE_LIMIT:
         return []
     starts, ends = blocks_of(same)
-    if not starts.size:
-        return []
-    lengths = time[ends] - time[starts]
-    k = int(np.argmax(lengths))
     limit = max(FROZEN_S, 5 * step)
-    if lengths[k] <= limit:
+    blocks = [(float(time[s]), float(time[e]), values[s]) for s, e in zip(starts, ends, strict=True) if time[e] - time[s] > limit]
+    blocks.sort(key=lambda b: b[0] - b[1])
+    longest = next((b for b in blocks if name in PLACE or not _goes_on_evenly(run, *b[:2])), None)
+    if longest is None:
         return []
-    start, end = float(time[starts[k]]), float(time[ends[k]])
+    start, end, value = longest
     before, after = (f"`--to {start:.2f}`",) if start > time[0] else (), (f"`--from {end:.2f}`",) if end < time[-1] else ()
     message = (
-        f"{name} is frozen at {values[starts[k]]:.6g} from {start:.2f} to {end:.2f} s (limit {limit:.3g} s); "
+        f"{name} is frozen at {value:.6g} from {start:.2f} to {end:.2f} s (limit {limit:.3g} s); "
         f"leave it out: {' or '.join((*before, *after))}"
     )
-    return [Note("frozen", message, {"signal": name, "value": float(lengths[k]), "limit": limit})]
+    return [Note("frozen", message, {"signal": name, "value": end - start, "limit": limit})]
+
+
+def _goes_on_evenly(run: Run, start: float, end: float) -> bool:
+    """Return whether fins rest and measured signals but a place go along lines from start to end (s), an angle by its rate."""
+    end -= min(FROZEN_S, 0.5 * (end - start))  # the answer to a fin comes later
+    inside = (run.time >= start) & (run.time <= end)
+    if any(np.unique(run[f][inside & np.isfinite(run[f])]).size > 1 for f in FINS if run.has(f)):
+        return False
+    slopes: dict[str, tuple[float, float]] = {}
+    for name in (s for s in run.signals if s in MEASURED - PLACE and run.has(s)):
+        seen = np.isfinite(run[name])
+        time, values = run.time[seen & inside], run[name][seen & inside]
+        if time.size < 2:
+            continue
+        digit, slope = last_digit(run[name][seen]), (values[-1] - values[0]) / (time[-1] - time[0])
+        if np.max(np.abs(values - values[0] - slope * (time - time[0]))) > DIGITS * digit:
+            return False
+        slopes[name] = float(slope) if name in RATE_OF else float(values[0]), DIGITS * digit
+    pairs = ((slopes[a], slopes[r]) for a, r in RATE_OF.items() if a in slopes and r in slopes)
+    return all(abs(slope - rate) * (end - start) <= off + off_rate * (end - start) for (slope, off), (rate, off_rate) in pairs)
 
 
 def _coarse(name: str, values: FloatArray) -> list[Note]:

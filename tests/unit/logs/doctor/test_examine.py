@@ -279,6 +279,30 @@ def test_a_frozen_stretch_at_an_end_is_left_out_at_that_end(where, ways):
     assert [w for w in ("--to", "--from") if w in said] == ways
 
 
+def flown(digits, *, rest=4.0):
+    """A yaw model at rest, in pulses, and in a settled turn, without noise."""
+    time = 0.05 * np.arange(1200)
+    fin = np.where(time < rest, 0.0, np.where(time < 50.0, 0.2 * np.sign(np.sin(time)), 0.2))
+    yaw, rate = np.full(1200, 0.3), np.zeros(1200)
+    for k in range(1199):
+        yaw[k + 1], rate[k + 1] = yaw[k] + 0.05 * rate[k], rate[k] + 0.05 * (0.7 * fin[k] - 2.0 * rate[k])
+    signals = {"yaw_rad": yaw, "yaw_rate_rad_s": rate, "surge_m_s": np.full(1200, 1.4), "rudder_rad": fin}
+    return Run("sim", time, {s: np.round(v, digits) for s, v in signals.items()})
+
+
+@pytest.mark.parametrize("digits", [4, 6, 16])
+def test_a_simulator_at_rest_or_in_a_settled_turn_has_no_frozen_sensor(digits):
+    assert not {c for c in codes(flown(digits)) if c[0] == "frozen"}
+
+
+@pytest.mark.parametrize("part", [slice(160, 220), slice(800, 1000)])
+def test_a_sensor_that_freezes_without_noise_is_found(part):
+    run = flown(16)
+    for name in ("yaw_rad", "yaw_rate_rad_s"):
+        stopped = changed(run, **{name: with_value(run[name], part, run[name][170])})
+        assert ("frozen", name) in codes(stopped)
+
+
 def test_a_place_is_frozen_where_both_of_its_coordinates_are():
     run = healthy()
     east = changed(run, x_m=with_value(run["x_m"], slice(300, 360), run["x_m"][300]))
