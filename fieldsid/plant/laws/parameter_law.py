@@ -214,7 +214,7 @@ def _exponent(power: Regression) -> Exponent:
 def _notes(name: str, affine: Regression, power: Regression) -> tuple[Note, ...]:
     """Return notes: below which speed the affine law has the wrong sign, and that a high R^2 is no evidence for it."""
     notes = []
-    if affine.kind == "affine" and affine.coefficients[0] < 0 < affine.coefficients[1]:
+    if affine.kind == "affine" and affine.coefficients[0] < 0 < affine.coefficients[1] and _is_significant(affine, 0):
         zero = float(np.sqrt(-affine.coefficients[0] / affine.coefficients[1]))
         notes.append(Note("law_crosses_zero", f"the affine law of {name} crosses zero at {zero:.2f} m/s", {"speed_m_s": zero}))
     if affine.r2 > 0.95 and power.dof > 0:

@@ -38,6 +38,14 @@ def test_papers_authority_is_not_u_squared_although_the_line_is_straight(table, 
     assert any(n.code == "r2_proves_little" for n in law_notes(fit_laws(axis, rows_of(table, (name,)))))
 
 
+@pytest.mark.parametrize(("intercept", "warned"), [(-0.05, True), (-1e-9, False)])
+def test_a_law_crosses_zero_only_where_its_intercept_is_told_from_zero(intercept, warned):
+    u = np.array([1.0, 1.4, 1.8, 2.2])
+    b2 = intercept + 0.35 * u**2 + 1e-8 * np.array([1.0, -1.0, 0.0, 1.0])
+    law = authority_law("b2", 1.0, u, b2, None, list("abcd"))
+    assert ("law_crosses_zero" in {n.code for n in law.notes}) is warned
+
+
 def test_line_agrees_with_scipys_regression_in_value_error_and_r2():
     u = np.array([1.0, 1.3, 1.7, 2.0, 2.4])
     y = 0.2 + 0.3 * u**2 + np.array([0.01, -0.02, 0.015, 0.0, -0.01])
