@@ -70,7 +70,8 @@ def test_a_plan_is_printed_with_errors_minutes_metres_and_risk(printed):
         assert word in printed
     assert "next: sysid plan" in printed
     assert "-o " in printed
-    assert "errors as of a log at 20 Hz, the rate of the commands" in printed
+    said = " ".join(printed.split())
+    assert "errors as of a log at 20 Hz, the rate of the commands, with the noise believed: " in said
 
 
 def rows_of(printed):

@@ -18,6 +18,7 @@ from fieldsid.page import Block, Page
 from fieldsid.rounding import number, with_error
 
 if TYPE_CHECKING:
+    from fieldsid.models.model import Noise
     from fieldsid.planning.design.leg import Expected
     from fieldsid.planning.design.plan import Plan
 
@@ -139,7 +140,7 @@ def command(
     result = Planned(made.plan, tuple(map(str, files)), **separation)
     from fieldsid.cli.headlines.trial import headline_of_plan
 
-    page = _page(made.plan, separation.get("says", ()))
+    page = _page(made.plan, made.model.noise, separation.get("says", ()))
     return emit(result, render=page, headline=headline_of_plan(result, model))
 
 
@@ -154,7 +155,7 @@ def _check_write(write: str | None, output: Path | None) -> None:
         raise UsageError("`--write` says what, `-o` where", found=f"--write {write}", hint="add `-o DIR`")
 
 
-def _page(plan: Plan, says: Iterable[str]) -> Page:
+def _page(plan: Plan, noise: Noise, says: Iterable[str]) -> Page:
     factor, angle = angles().of("rad")
     rows = tuple(
         (
@@ -177,11 +178,21 @@ def _page(plan: Plan, says: Iterable[str]) -> Page:
         Block(f"{plan.vehicle}, {plan.axis.value}: what to fly", rows, columns, left=2),
         Block("what it buys", errors, heads, left=2),
         f"{plan.minutes:.1f} minutes, {plan.metres:.0f} m; risk of leaving the envelope at most {plan.break_probability:.1%}",
-        f"errors as of a log at {plan.legs[0].rate_hz:g} Hz, the rate of the commands",
+        f"errors as of a log at {plan.legs[0].rate_hz:g} Hz, the rate of the commands, with the noise believed: "
+        + _in_words(noise),
         *_limits(plan),
         *says,
     )
     return Page("", blocks=blocks)
+
+
+def _in_words(noise: Noise) -> str:
+    """Return the noise of the sensors that were measured, and of the disturbance if any."""
+    from fieldsid.planning.belief.prior_model import UNMEASURED
+
+    sizes = ((noise.angle, "rad"), (noise.rate, "rad/s"), (noise.disturbance, "rad/s^2"))
+    shown = [(size * angles().of(unit)[0], angles().of(unit)[1]) for size, unit in sizes if 0.0 < size < UNMEASURED]
+    return ", ".join(f"{number(size, 2)} {unit}" for size, unit in shown)
 
 
 def _limits(plan: Plan) -> Iterator[str]:
