@@ -41,6 +41,8 @@ ROUNDING = 1e-12
 DEGREES = 180.0 / math.pi
 RATES = {u.name: u.factor for u in UNITS.values() if u.dimension == "angle rate"}
 """Units of rates, in rad/s."""
+SUMMED = 10.0
+"""Ratio of the distances of an angle from the trapezoidal integral of its rate and from its sum from which on it is the sum."""
 LAG_S = 1.0
 """Largest clock offset that is sought."""
 
@@ -55,7 +57,7 @@ def angle_findings(run: Run, stated: Stated, faulty: Container[str]) -> list[Not
         if run.has(angle) and run.has(rate):
             notes = _swapped(run, angle, rate) or _angle_and_rate(run, angle, rate, stated)
             if not any(n.code in CONTRADICTING for n in notes):
-                notes = [*notes, *_jumps(run, angle, rate)]
+                notes = [*notes, *_jumps(run, angle, rate), *_summed(run, angle, rate)]
             found += notes or ([] if angle in faulty or rate in faulty else _unrelated(run, angle, rate))
     return found
 
@@ -220,6 +222,26 @@ def _jumps_over(
         return None
     at = int(np.argmax(off))
     return places, float(off[at]), limit, float(time[at])
+
+
+def _summed(run: Run, angle: str, rate: str) -> list[Note]:
+    """Return the finding that an angle is the sum of its rate, as Euler's rule has it, and what that does to a time constant."""
+    both = together(run, angle, rate)
+    if both is None:
+        return []
+    time, turned, turning = both
+    off, half = np.diff(turned) - np.diff(trapezoid_integral(time, turning)), 0.5 * np.diff(turning) * np.diff(time)
+    trapezoid, before, after = (float(np.sqrt(np.mean(x**2))) for x in (off, off + half, off - half))
+    step = float(np.median(np.diff(time)))
+    if SUMMED * min(before, after) >= trapezoid or step >= 1.0:
+        return []
+    shown, exact = -step / math.log1p(-step), min(before, after)
+    message = (
+        f"{angle} is the sum of {rate} times the step, to {exact:.2g} rad, as Euler's rule of a simulator makes it: at "
+        f"{step:.3g} s a time constant of 1 s in its equations shows as {shown:.4g} s in the log, and damping "
+        "and authority as larger than theirs; log a simulation with smaller steps"
+    )
+    return [Note("euler", message, {"signal": angle, "value": exact / trapezoid, "limit": 1.0 / SUMMED})]
 
 
 def changes_of(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray, float] | None:

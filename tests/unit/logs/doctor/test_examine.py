@@ -13,6 +13,7 @@ from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
+from fieldsid.numerics.trapezoid import trapezoid_integral
 from fieldsid.online.samples import samples_of
 
 
@@ -301,6 +302,25 @@ def test_a_sensor_that_freezes_without_noise_is_found(part):
     for name in ("yaw_rad", "yaw_rate_rad_s"):
         stopped = changed(run, **{name: with_value(run[name], part, run[name][170])})
         assert ("frozen", name) in codes(stopped)
+
+
+@pytest.mark.parametrize("digits", [5, 16])
+@pytest.mark.parametrize("late", [True, False])
+def test_a_log_that_euler_steps_made_says_what_they_do_to_a_time_constant(late, digits):
+    run = flown(digits)
+    summed = run if late else changed(run, yaw_rad=np.round(0.3 + 0.05 * np.cumsum(run["yaw_rate_rad_s"]), digits))
+    assert "a time constant of 1 s in its equations shows as 0.9748 s" in message(summed, "euler").message
+
+
+def test_a_log_that_was_measured_or_integrated_well_is_not_said_to_be_of_euler_steps():
+    run = flown(16)
+    exact = 0.3 + trapezoid_integral(run.time, run["yaw_rate_rad_s"])
+    noise = 1e-3 * np.random.default_rng(3).standard_normal((2, len(run)))
+    for signals in (
+        {"yaw_rad": exact},
+        {"yaw_rad": run["yaw_rad"] + noise[0], "yaw_rate_rad_s": run["yaw_rate_rad_s"] + noise[1]},
+    ):
+        assert "euler" not in {c for c, _ in codes(changed(run, **signals))}
 
 
 def test_a_place_is_frozen_where_both_of_its_coordinates_are():
