@@ -20,6 +20,7 @@ from matplotlib.text import Text
 from fieldsid.artifacts import replacing
 from fieldsid.figures.kinds import KINDS, TOOL, kind_of
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.page import folded
 from fieldsid.runtime.background_tasks import BackgroundTasks
 
 MEASURED = "0.45"
@@ -31,6 +32,8 @@ WARM = "#E69F00"
 QUIET = "0.75"
 SERIES = (SIMULATED, SECOND, THIRD, FOURTH, WARM, "#56B4E9", "0.2")
 DPI = 120
+LETTERS_PER_INCH = 11.5
+"""Letters of a title in an inch of the sheet."""
 TWO_SIDED_99 = 2.576
 """Quantile 0.995 of the normal distribution: bands are those of 99 %."""
 MOST_DOTS = 4000
@@ -50,7 +53,8 @@ def sheet(width: float = 9.0, height: float = 7.0, title: str = "") -> Figure:
     figure = Sheet(figsize=(width, height), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     if title:
-        figure.suptitle(title, x=0.01, ha="left", fontsize=11, parse_math=False)
+        lines = [folded(line, round(LETTERS_PER_INCH * width), rest="") for line in title.splitlines()]
+        figure.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=11, parse_math=False)
     return figure
 
 

@@ -64,3 +64,12 @@ def test_another_suffix_is_refused_with_one_that_is_drawn(tmp_path, name):
         canvas.save(canvas.sheet(), tmp_path / name)
     assert list(tmp_path.iterdir()) == []
     assert all(f".{kind}" in caught.value.hint for kind in KINDS)
+
+
+def test_a_long_title_goes_on_in_another_line_within_the_sheet():
+    title = "run, yaw: " + ", ".join(f"parameter{k} = 0.84000000 +/- 0.00000006 1/s" for k in range(5)) + "\nflown at 1.40 m/s"
+    sheet = canvas.sheet(9.0, 8.0, title)
+    sheet.draw_without_rendering()
+    assert sheet.get_suptitle().endswith("\nflown at 1.40 m/s")
+    assert sheet.texts[0].get_window_extent().x1 <= sheet.bbox.x1
+    assert "+/-\n" not in sheet.get_suptitle()
