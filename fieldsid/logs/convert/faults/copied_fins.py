@@ -10,8 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fieldsid.logs.mapping.vocabulary import AS_MEASURED
-from fieldsid.logs.run import Note
+from fieldsid.logs.run import FINS, Note
 from fieldsid.numerics.arrays import FloatArray
 
 
@@ -19,7 +18,7 @@ def without_copied_fins(signals: Mapping[str, FloatArray]) -> tuple[dict[str, Fl
     """Return the signals (n,) without measured fins that equal a moving command at every sample, and a note on each."""
     copies = {
         measured: command
-        for command, measured in AS_MEASURED.items()
+        for command, measured in zip(FINS[:2], FINS[2:], strict=True)
         if {command, measured} <= signals.keys()
         and np.array_equal(signals[command], signals[measured], equal_nan=True)
         and np.unique(signals[command][np.isfinite(signals[command])]).size > 1
