@@ -110,12 +110,14 @@ def _size(run: Run, name: str, values: FloatArray, stated: Stated) -> list[Note]
 def _frozen(run: Run, name: str, time: FloatArray, values: FloatArray, same: BoolArray, step: float) -> list[Note]:
     """Return the finding that a sensor repeats one value for long, by the `same` (n - 1,), among values that otherwise change.
 
-    A vehicle that goes on evenly, as that of a simulator before its first pulse or in a settled turn, has still sensors. `step`
-    is that of the sensor's own measurements in s.
+    A vehicle that goes on evenly, as that of a simulator before its first pulse or in a settled turn, has still sensors; and what
+    goes on by the last digit was steady. `step` is that of the sensor's own measurements in s.
     """
     if same.mean() > COARSE_LIMIT:
         return []
     starts, ends = blocks_of(same)
+    goes_on = np.append(np.abs(np.diff(values)), np.inf)[ends] <= DIGITS * last_digit(values)
+    starts, ends = starts[~goes_on], ends[~goes_on]
     limit = max(FROZEN_S, 5 * step)
     blocks = [(float(time[s]), float(time[e]), values[s]) for s, e in zip(starts, ends, strict=True) if time[e] - time[s] > limit]
     blocks.sort(key=lambda b: b[0] - b[1])

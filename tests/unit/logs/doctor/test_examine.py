@@ -296,6 +296,14 @@ def test_a_simulator_at_rest_or_in_a_settled_turn_has_no_frozen_sensor(digits):
     assert not {c for c in codes(flown(digits)) if c[0] == "frozen"}
 
 
+def test_a_speed_that_was_steady_and_goes_on_by_its_last_digit_is_not_frozen():
+    run = healthy()
+    slow = np.round(1.4 - 1e-3 * np.maximum(run.time - 5.0, 0.0), 5)
+    assert ("frozen", "surge_m_s") not in codes(changed(run, surge_m_s=slow))
+    stopped = np.where((run.time > 10.0) & (run.time < 13.0), slow[200], slow)
+    assert ("frozen", "surge_m_s") in codes(changed(run, surge_m_s=stopped))
+
+
 @pytest.mark.parametrize("part", [slice(160, 220), slice(800, 1000)])
 def test_a_sensor_that_freezes_without_noise_is_found(part):
     run = flown(16)
