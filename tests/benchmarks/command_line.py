@@ -29,7 +29,7 @@ def main():
     parser.add_argument("--cases", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    run_case((0, options.seed, None, False))  # what is compiled is compiled, what is imported is imported
+    run_case((0, options.seed, None, 1.0, False))  # what is compiled is compiled, what is imported is imported
     inside, outside = [], []
     for index in range(options.cases):
         case = make_case(index, options.seed, kind=None)

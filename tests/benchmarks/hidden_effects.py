@@ -34,7 +34,9 @@ CHANNELS = {"angle_rad": "angle_rms_rad", "rate_rad_s": "rate_rms_rad_s"}
 def main(argv=None):
     """Run the bank and print the table; returns the exit code."""
     options = parse(argv)
-    tasks = [(i, options.seed, options.kind, options.dry) for i in range(options.first, options.first + options.cases)]
+    tasks = [
+        (i, options.seed, options.kind, options.sensors, options.dry) for i in range(options.first, options.first + options.cases)
+    ]
     rows = []
     for row in results(tasks, options.jobs):
         rows.append(row)
@@ -57,6 +59,7 @@ def parse(argv):
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--kind", choices=[*KINDS, "remus"], default=None)
+    parser.add_argument("--sensors", type=float, default=1.0, help="share of the sensors' noise in the logs; 0 as a simulator's")
     parser.add_argument("--dry", action="store_true", help="make the cases, do not diagnose")
     parser.add_argument("--json", default=None, metavar="FILE")
     return parser.parse_args(argv)
@@ -73,8 +76,8 @@ def results(tasks, jobs):
 
 def run_case(task):
     """Make one case, diagnose it, and keep what the table needs."""
-    index, seed, kind, dry = task
-    case = remus_case(index, seed) if kind == "remus" else make_case(index, seed, kind=kind)
+    index, seed, kind, sensors, dry = task
+    case = remus_case(index, seed) if kind == "remus" else make_case(index, seed, kind=kind, sensors=sensors)
     row = {
         "name": case.name, "index": index, "kind": case.kind, "axis": case.axis,
         "truth": list(case.details["causes"]), "accepts": sorted(case.accepts), "effects_hidden": list(case.effects),

@@ -43,7 +43,7 @@ def test_a_probability_that_is_overstated_is_told_from_one_that_is_not():
 
 @pytest.mark.slow
 def test_of_the_verdicts_given_with_a_probability_that_share_is_right(tmp_path):
-    rows = [run_case((index, SEED, None, False)) for index in range(100)]
+    rows = [run_case((index, SEED, None, 1.0, False)) for index in range(100)]
     file = tmp_path / "rows.json"
     file.write_text(json.dumps(rows, default=float), encoding="utf-8")
     assert not overstated(of_own_bank(file))

@@ -89,8 +89,13 @@ def cases(n: int, seed: int, *, kind: str | None = None, first: int = 0) -> Iter
         yield make_case(index, seed, kind=kind)
 
 
-def make_case(index: int, seed: int, *, kind: str | None = None, colour: str | None = None) -> Case:
-    """Return one case by seed and index; kind and colour (of the noise) replace what the bank would draw."""
+def make_case(
+    index: int, seed: int, *, kind: str | None = None, colour: str | None = None, sensors: float = 1.0
+) -> Case:  # fmt: skip
+    """Return one case by seed and index; kind and colour (of the noise) replace what the bank would draw.
+
+    The logs have the share `sensors` of the noise of angle and rate for which the hidden effect was sized.
+    """
     rng = np.random.default_rng([seed, index])
     drawn = str(rng.choice(KINDS, p=SHARES))
     kind = drawn if kind is None else kind
@@ -102,6 +107,7 @@ def make_case(index: int, seed: int, *, kind: str | None = None, colour: str | N
     hidden = draw_hidden(rng, kind, names, scene)
     goal = np.exp(rng.uniform(np.log(1.45), np.log(8.0))) if kind in ("single", "imperfect") else rng.uniform(2.0, 6.0)
     scene.notes["alone"] = [tune(scene, hidden, i, goal) for i in range(len(hidden.causes))]
+    scene.notes["sensors"] = sensors
     return assemble(f"{kind}-{seed}-{index}", kind, names, scene, hidden, rng)
 
 
@@ -233,7 +239,8 @@ def assemble(name, kind, names, scene, hidden, rng):
         start = responses(physics.damping, physics.stiffness, motion.command, scene.clock.sample)[:, :, 2:]
         noise_left.append(np.sqrt(np.mean(start_removed(error, start, scene.sigma) ** 2, axis=0)))
         samples.append(sample_of(scene, i, motion, noise))
-        logs.append(write_log(rng, scene, motion, samples[-1], inputs))
+        measured = sample_of(scene, i, motion, [scene.notes.get("sensors", 1.0) * e for e in noise])
+        logs.append(write_log(rng, scene, motion, measured, inputs))
     floors = [np.sqrt(np.mean(np.square(part), axis=0)) for part in (noise_left[:TRAINING], noise_left[TRAINING:])]
     trained, _, _ = base_errors(scene, samples, floors[0])
     _, judged, base = base_errors(scene, samples, floors[1])

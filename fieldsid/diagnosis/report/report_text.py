@@ -102,7 +102,7 @@ def _effects_sentence(search: Search, verdict: Verdict, found: ScoredModel, left
         ended = (f", to {sized(search, r, floor)} with {n}" for n, r in others.items() if len(r.names) > len(found.names))
         both = f"{names} or {', '.join(others)}: these data cannot tell them apart; with {names} {fall}{''.join(ended)}"
         return Sentence(both, both)
-    rest = "" if search.is_noiseless else _unexplained_rest(left)
+    rest = _unexplained_rest(left, f"{left.ratio:.2g} x is" if not search.is_noiseless else "an error is")
     return Sentence(f"{names} ({says}): {fall}{rest}", f"{names}: {fall}{rest}")
 
 
@@ -111,12 +111,12 @@ def apart_from_the_hulls_own(effects: Sequence[str]) -> tuple[tuple[str, ...], t
     return tuple(n for n in effects if n not in HULLS_OWN), tuple(n for n in effects if n in HULLS_OWN)
 
 
-def _unexplained_rest(left: Left) -> str:
-    """Return the clause on the error that no effect of the catalogue explains, and where it is; empty without such an error."""
+def _unexplained_rest(left: Left, remains: str) -> str:
+    """Return the clause on what no effect of the catalogue explains, and where it is; empty without such an error."""
     if not left.unexplained:
         return ""
     follows = f", and moves with {left.moves_with}" if left.moves_with else ""
-    return f"; {left.ratio:.2g} x is left that nothing in the catalogue explains: it is largest in {left.where}{follows}"
+    return f"; {remains} left that nothing in the catalogue explains: it is largest in {left.where}{follows}"
 
 
 def _unexplained_sentence(search: Search, found: ScoredModel, left: ResidualTests, floor: Noise, noise: Noise) -> str:

@@ -121,7 +121,7 @@ def _timing(problem: Problem, solution: Solution) -> Iterator[Note]:
         yield Note(
             "negative_delay",
             f"the vehicle answers about {-1e3 * found.late:.0f} ms BEFORE the logged fin: no lag can be negative, it is a clock "
-            f"that is off, or a controller; {moves}; use `--effects clock_offset`, or stamp both by one clock",
+            f"that is off, a controller, or a hull that drifts (`sway_coupling`); {moves}; `sysid diagnose` tells them apart",
             data,
         )
 

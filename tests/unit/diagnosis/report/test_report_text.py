@@ -139,11 +139,12 @@ def test_the_headline_says_the_error_that_falls(fitted, unseen, settled, said):
     assert sentence.short == f"stall: {said}"
 
 
-def named(effects, left):
+def named(effects, left, *, noiseless=False):
     base, found = (_made(*n, train=(f,), unseen=(f,), score=0.0) for n, f in (((), 11.5), (effects, 1.8)))
     for h in (base, found):
         h.train, h.unseen_errors, h.effects = h.errors.train, (h.selection_errors,), ()
-    return headline(_search(base), Verdict("effect", effects), found, SimpleNamespace(), left, FLOOR, FLOOR)
+    search = _search(base, noiseless=noiseless)
+    return headline(search, Verdict("effect", effects), found, SimpleNamespace(), left, FLOOR, FLOOR)
 
 
 def test_what_every_hull_has_is_told_apart_from_what_is_unusual():
@@ -162,6 +163,13 @@ def test_what_is_left_is_said_with_its_place():
             "; 1.8 x is left that nothing in the catalogue explains: "
             "it is largest in train_1 at 12-14 s, and moves with roll rate"
         )
+
+
+def test_what_is_left_of_a_log_without_noise_is_said_too():
+    left = Left(40.0, unexplained=True, run="train_1", start_s=12.0, end_s=14.0)
+    assert named(("wave",), left, noiseless=True).short.endswith(
+        "; an error is left that nothing in the catalogue explains: it is largest in train_1 at 12-14 s"
+    )
 
 
 def _disturbed(base, h, noise):
