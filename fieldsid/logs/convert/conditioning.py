@@ -29,21 +29,13 @@ MAIN = ("yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s", *FINS)
 
 MAX_PLAUSIBLE_VALUE = 1e9
 """A larger value in SI is no measurement: the cell is damaged, or the column is not this signal."""
-LEAST_VALUE = 1e-12
-"""A signal that is nowhere larger in SI is zero: what a simulation leaves by rounding in a plane in which nothing moves."""
 STEPS_S = (1e-7, 1e5)
 """Smallest and largest plausible median step of a log's time, for any vehicle and logger."""
 
 
 def possible(signal: str, values: FloatArray) -> tuple[FloatArray, list[Note]]:
-    """Return a signal (n,) with implausibly large and infinite values as NaN, and a note where there were some.
-
-    Where it is nowhere larger than LEAST_VALUE it is zero.
-    """
-    size = np.abs(values)
-    if not (size > LEAST_VALUE).any():
-        return 0.0 * values, []
-    beyond = ~np.isnan(values) & ~(size <= MAX_PLAUSIBLE_VALUE)
+    """Return a signal (n,) with implausibly large and infinite values as NaN, and a note where there were some."""
+    beyond = ~np.isnan(values) & ~(np.abs(values) <= MAX_PLAUSIBLE_VALUE)
     if not beyond.any():
         return values, []
     message = f"{signal}: numbers beyond {MAX_PLAUSIBLE_VALUE:g}, or infinite, that count as missing: {int(beyond.sum())}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.logs.convert.conditioning import blocks_of
+from fieldsid.logs.convert.faults.repeats import LEAST_CHANGE
 from fieldsid.logs.convert.faults.spikes import DIGITS, last_digit, spikes_of
 from fieldsid.logs.convert.servo_counts import servo_of
 from fieldsid.logs.doctor.angle_and_rate import PAIRS
@@ -45,7 +46,7 @@ def signal_findings(run: Run, name: str, stated: Stated) -> list[Note]:
         return [Note("empty", f"{name} has no sample", {"signal": name})]
     present = values[seen] + 0.0  # a zero turned by a frame is -0
     found = [*_missing(name, seen), *_size(run, name, present, stated)]
-    if present.size > 2 and float(np.ptp(present)) == 0.0 and name not in GOALS.union(MOTORS):
+    if present.size > 2 and float(np.ptp(present)) <= LEAST_CHANGE and name not in GOALS.union(MOTORS):
         message = f"{name} is constant at {present[0]:.6g} over {present.size} samples; check the sensor, or map another one"
         return [*found, Note("constant", message, {"signal": name, "value": float(present[0])})]
     if name in MEASURED and present.size > 20:

@@ -22,6 +22,8 @@ DIGITS = 1.5
 STRAIGHT, BENT, UNEVEN = 2.5, 10.0, 1.5
 """Largest bend of a straight line and smallest median bend between two lines, in last digits; and the largest ratio of the 95th
 percentile of the rows per line to their median."""
+LEAST_CHANGE = 1e-12
+"""Range in SI up to which a signal is constant: a simulation leaves less by rounding in a plane in which nothing moves."""
 SIGNIFICANT = 1e-5
 """Largest last digit of a number that is written with six digits, as a share of it."""
 
@@ -29,6 +31,8 @@ SIGNIFICANT = 1e-5
 def without_repeats(name: str, values: FloatArray) -> tuple[FloatArray, list[Note]]:
     """Return a signal (n,) with the repeats of its slower sensor as NaN, and a note; unchanged where it has none."""
     seen = np.flatnonzero(np.isfinite(values))
+    if not seen.size or float(np.ptp(values[seen])) <= LEAST_CHANGE:
+        return values, []
     changed = np.flatnonzero(np.diff(values[seen]) != 0.0)
     every = _rows_per_measurement(changed)
     if every == 1:
@@ -69,7 +73,7 @@ def measured_anew(values: FloatArray) -> BoolArray:
     rows = np.asarray(np.isfinite(columns).all(axis=1))
     steps = np.abs(np.diff(columns[rows], axis=0)).max(axis=1, initial=0.0)
     changed = np.flatnonzero(steps)
-    if changed.size < FEWEST or _rows_per_measurement(changed) > 1:
+    if changed.size < FEWEST or steps.max() <= LEAST_CHANGE or _rows_per_measurement(changed) > 1:
         return rows
     if float(np.median(np.diff(changed))) < 2.0:
         rows[rows] = _bends(columns[rows])

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldsid.errors import LogError
-from fieldsid.logs.convert.conditioning import gaps_in, in_order, possible, refuse_long_gaps
+from fieldsid.logs.convert.conditioning import gaps_in, in_order, refuse_long_gaps
 from fieldsid.logs.reader import ReadOptions
 
 
@@ -62,12 +62,3 @@ def test_a_slow_sensor_on_a_fast_clock_is_no_gap():
     time = np.arange(0, 10, 0.05)
     slow = np.where(np.arange(time.size) % 20 == 0, 1.0, np.nan)
     refuse_long_gaps(time, {"yaw_rad": slow})
-
-
-@pytest.mark.parametrize(("size", "left"), [(1e-18, 0.0), (1e-6, 1.0)])
-def test_what_a_simulation_leaves_by_rounding_is_zero(size, left):
-    values = size * np.sin(np.arange(50.0))
-    values[7] = np.nan
-    found, notes = possible("pitch_rate_rad_s", values)
-    assert not notes
-    assert found == pytest.approx(left * values, rel=0.0, abs=0.0, nan_ok=True)

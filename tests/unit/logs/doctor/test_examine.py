@@ -296,6 +296,14 @@ def test_a_simulator_at_rest_or_in_a_settled_turn_has_no_frozen_sensor(digits):
     assert not {c for c in codes(flown(digits)) if c[0] == "frozen"}
 
 
+def test_what_a_simulation_leaves_by_rounding_is_constant():
+    run = healthy()
+    dust = 1e-18 * np.round(np.sin(0.1 * run.time), 1)
+    assert {c for c in codes(changed(run, pitch_rate_rad_s=dust)) if c[1] == "pitch_rate_rad_s"} == {
+        ("constant", "pitch_rate_rad_s")
+    }
+
+
 def test_a_speed_that_was_steady_and_goes_on_by_its_last_digit_is_not_frozen():
     run = healthy()
     slow = np.round(1.4 - 1e-3 * np.maximum(run.time - 5.0, 0.0), 5)

@@ -30,7 +30,8 @@ def test_a_number_that_comes_twice_is_a_sample_of_its_own():
 
 
 STOPPED = np.concatenate((np.round(MOVING[:200], 4), np.full(400, 0.5)))
-OWN = (MOVING, np.round(MOVING, 1), STOPPED, np.zeros(600), np.full(600, np.nan))
+DUST = 1e-18 * np.interp(np.arange(600), np.arange(0, 600, 5), MOVING[::5])  # of a plane at rest in a simulation
+OWN = (MOVING, np.round(MOVING, 1), STOPPED, np.zeros(600), np.full(600, np.nan), DUST, 1e-18 * np.repeat(MOVING[::5], 5))
 
 
 @pytest.mark.parametrize("values", OWN)
