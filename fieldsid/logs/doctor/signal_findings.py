@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from fieldsid.logs.convert.conditioning import blocks_of
@@ -62,8 +64,8 @@ def signal_findings(run: Run, name: str, stated: Stated) -> list[Note]:
 def _own_step(time: FloatArray, values: FloatArray) -> float:
     """Return the median step of a sensor in s: that of its samples (n,), or of the ends of the lines on which most of them lie.
 
-    A sensor slower than the clock was interpolated to it. What lies between
-    its measurements shows neither its digits nor its noise.
+    A sensor slower than the clock was interpolated to it. What lies between its measurements shows neither its digits nor its
+    noise.
     """
     steps, bend = np.diff(values), np.abs(np.diff(values, 2))
     step, limit = float(np.median(np.diff(time))), STRAIGHT * float(np.percentile(bend, 99))
@@ -117,15 +119,24 @@ def _frozen(run: Run, name: str, time: FloatArray, values: FloatArray, same: Boo
     if same.mean() > COARSE_LIMIT:
         return []
     starts, ends = blocks_of(same)
-    goes_on = np.append(np.abs(np.diff(values)), np.inf)[ends] <= DIGITS * last_digit(values)
-    starts, ends = starts[~goes_on], ends[~goes_on]
     limit = max(FROZEN_S, 5 * step)
-    blocks = [(float(time[s]), float(time[e]), values[s]) for s, e in zip(starts, ends, strict=True) if time[e] - time[s] > limit]
-    blocks.sort(key=lambda b: b[0] - b[1])
-    longest = next((b for b in blocks if name in PLACE or not _goes_on_evenly(run, *b[:2])), None)
-    if longest is None:
+    lengths = time[ends] - time[starts]
+    long = np.flatnonzero(lengths > limit)
+    if not long.size:
         return []
-    start, end, value = longest
+    goes_on = np.append(np.abs(np.diff(values)), np.inf)[ends[long]] <= DIGITS * last_digit(values)
+    long = long[~goes_on]
+    by_length = long[np.argsort(-lengths[long], kind="stable")].tolist()
+    # once for all stretches, of which a long log may have thousands
+    digits = {s: last_digit(run[s][np.isfinite(run[s])]) for s in run.signals if s in MEASURED - PLACE and run.has(s)}
+
+    def is_even(k: int) -> bool:
+        return name not in PLACE and _goes_on_evenly(run, digits, float(time[starts[k]]), float(time[ends[k]]))
+
+    frozen = next((k for k in by_length if not is_even(k)), None)
+    if frozen is None:
+        return []
+    start, end, value = float(time[starts[frozen]]), float(time[ends[frozen]]), values[starts[frozen]]
     before, after = (f"`--to {start:.2f}`",) if start > time[0] else (), (f"`--from {end:.2f}`",) if end < time[-1] else ()
     message = (
         f"{name} is frozen at {value:.6g} from {start:.2f} to {end:.2f} s (limit {limit:.3g} s); "
@@ -134,19 +145,22 @@ def _frozen(run: Run, name: str, time: FloatArray, values: FloatArray, same: Boo
     return [Note("frozen", message, {"signal": name, "value": end - start, "limit": limit})]
 
 
-def _goes_on_evenly(run: Run, start: float, end: float) -> bool:
-    """Return whether fins rest and measured signals but a place go along lines from start to end (s), an angle by its rate."""
+def _goes_on_evenly(run: Run, digits: Mapping[str, float], start: float, end: float) -> bool:
+    """Return whether fins rest and measured signals go along lines from start to end (s), an angle by its rate.
+
+    `digits` are the last digits of the signals that are looked at.
+    """
     end -= min(FROZEN_S, 0.5 * (end - start))  # the answer to a fin comes later
-    inside = (run.time >= start) & (run.time <= end)
-    if any(np.unique(run[f][inside & np.isfinite(run[f])]).size > 1 for f in FINS if run.has(f)):
+    inside = slice(int(np.searchsorted(run.time, start)), int(np.searchsorted(run.time, end, "right")))
+    if any(np.unique(fin[np.isfinite(fin)]).size > 1 for fin in (run[f][inside] for f in FINS if run.has(f))):
         return False
     slopes: dict[str, tuple[float, float]] = {}
-    for name in (s for s in run.signals if s in MEASURED - PLACE and run.has(s)):
-        seen = np.isfinite(run[name])
-        time, values = run.time[seen & inside], run[name][seen & inside]
+    for name, digit in digits.items():
+        seen = np.isfinite(run[name][inside])
+        time, values = run.time[inside][seen], run[name][inside][seen]
         if time.size < 2:
             continue
-        digit, slope = last_digit(run[name][seen]), (values[-1] - values[0]) / (time[-1] - time[0])
+        slope = (values[-1] - values[0]) / (time[-1] - time[0])
         if np.max(np.abs(values - values[0] - slope * (time - time[0]))) > DIGITS * digit:
             return False
         slopes[name] = float(slope) if name in RATE_OF else float(values[0]), DIGITS * digit
