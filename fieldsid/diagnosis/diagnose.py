@@ -34,6 +34,7 @@ from fieldsid.diagnosis.verdict import (
     left_of,
     names_added,
     probabilities,
+    stands,
     verdict_of,
     worsens,
 )
@@ -95,7 +96,8 @@ def diagnose(
     found = noiseless_search(work, lambda h: excess_explained(work, h) > MAIN_EXPLAINED_SHARE)
     if found is None or not excess_explained(work, found) > MAIN_EXPLAINED_SHARE:
         return diagnosis_of(result)
-    return diagnosis_of(_search_result(work, found, found.likelihood_fit, Verdict("effect", added_effects(work, found))))
+    by_error = _search_result(work, found, found.likelihood_fit, Verdict("effect", added_effects(work, found)))
+    return diagnosis_of(by_error if stands(work, found, by_error.residual_tests, work.floor) else result)
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +177,7 @@ def _diagnosis(
         base=base.errors,
         final=named.errors,
         noise_floor=told_floor(floor, work.records),
-        candidates=_candidates(end, floor, 1.0 if work.is_noiseless else error_left(work, found, floor)),
+        candidates=_candidates(end, floor, error_left(work, found, end.residual_tests, floor)),
         model=model,
         base_model=base_model,
         where=where,

@@ -22,14 +22,15 @@ from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.records import Left
 from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests
 from fieldsid.diagnosis.search.search import Search
+from fieldsid.diagnosis.search.whole_hull import HULLS_OWN
 from fieldsid.diagnosis.thresholds import (
     EQUAL_ERROR_RATIO,
     EVIDENCE_TEMPERATURE,
-    FAR_ERROR_RATIO,
     GUSTY_ERROR_RATIO,
     MAIN_EXPLAINED_SHARE,
     MAX_VALIDATION_ERROR_RATIO,
     MIN_P_VALUE,
+    MISFIT_SHARE,
     MISSING_ERROR_RATIO,
     RIVAL_LOG_ODDS,
     SUFFICIENT_ERROR_RATIO,
@@ -55,9 +56,8 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     Errors are relative to the reported noise floor, which includes the sensors' coloured noise. Where no effect was found, the
     verdict is `sufficient` if training and validation errors are within SUFFICIENT_ERROR_RATIO; else `disturbed` if the
     innovations pass the tests of a disturbance, and `unexplained` if not. The same two verdicts are given where the effects found
-    leave a visible error on the validation runs that is no smaller than without them, or explain less than half of a large error:
-    such an effect may exist without being the missing one. No effect is named where the remaining error is so large that the
-    missing effect is probably in no set tried, see `untried_probability`.
+    leave a visible error on the validation runs that is larger than without them, or explain less than half of a large error:
+    such an effect may exist without being the missing one. No effect is named either where those found do not stand.
     """
     floor = reported_noise_floor(search.floor, ml_fit.noise)
     was, now = compared_errors(search.base(), found, floor)
@@ -67,9 +67,10 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
             return Verdict("sufficient", ())
         return _unnamed(found, left, floor)
     large = error > MISSING_ERROR_RATIO and not search.is_noiseless
-    if error > SUFFICIENT_ERROR_RATIO and ((large and share < MAIN_EXPLAINED_SHARE) or not now.mean < was.mean):
+    raises = not now.mean < EQUAL_ERROR_RATIO * was.mean
+    if error > SUFFICIENT_ERROR_RATIO and ((large and share < MAIN_EXPLAINED_SHARE) or raises):
         return _unnamed(found, left, floor)
-    if not search.is_noiseless and untried_probability(error_left(search, found, floor)) > 0.5:
+    if not stands(search, found, left, floor):
         return Verdict("unexplained", ())
     rivals = rivals_of(search, found)
     if rivals:
@@ -77,16 +78,33 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     return Verdict("effect", added_effects(search, found))
 
 
-def error_left(search: Search, found: ScoredModel, floor: Noise) -> float:
-    """Return the smaller error over a noise floor that a model leaves, at the parameters of the fitted runs or of all runs."""
-    return min(worst_error(found, floor), compared_error(search.base(), found, floor))
+def stands(search: Search, found: ScoredModel, tests: ResidualTests, floor: Noise) -> bool:
+    """Whether the effects found may be named, given the error that they leave over a noise floor.
+
+    Those that every hull has always may. Unusual ones may unless the error is so large that the missing effect is more probably
+    in no set tried, see `untried_probability`.
+    """
+    if set(names_added(search, found)) <= set(HULLS_OWN):
+        return True
+    return untried_probability(error_left(search, found, tests, floor)) <= 0.5
+
+
+def error_left(search: Search, found: ScoredModel, tests: ResidualTests, floor: Noise) -> float:
+    """Return the error that a model leaves over the one that the right effects leave: the noise floor and MISFIT_SHARE.
+
+    It is the smaller of the errors at the parameters of the fitted runs and of all runs. Where the tests accept it as a
+    disturbance, it counts as GUSTY_ERROR_RATIO at most, because a larger one would fail them if it were a missing effect.
+    """
+    least = min(worst_error(found, floor), compared_error(search.base(), found, floor))
+    left = float(least / np.hypot(1.0, MISFIT_SHARE * worst_error(search.base(), floor)))
+    return left if _is_no_disturbance(found, tests, floor) else min(left, GUSTY_ERROR_RATIO)
 
 
 def left_of(search: Search, named: ScoredModel, found: ScoredModel, tests: ResidualTests, floor: Noise) -> Left:
     """Return the error that remains with a named model; `tests` are those of the model found, which may have more effects.
 
-    An error that the tests accept as a disturbance is not unexplained, unless it is far larger on the unseen runs or larger than
-    a sea can leave. Where effects are named, an error above MISSING_ERROR_RATIO is unexplained whatever the tests say.
+    An error that the tests accept as a disturbance is not unexplained, unless it is far larger on the unseen runs. Where effects
+    are named, an error above MISSING_ERROR_RATIO is unexplained whatever the tests say.
     """
     ratio = worst_error(named, floor)
     if ratio <= SUFFICIENT_ERROR_RATIO:
@@ -103,10 +121,9 @@ def _unnamed(found: ScoredModel, left: ResidualTests, floor: Noise) -> Verdict:
 
 
 def _is_no_disturbance(h: ScoredModel, tests: ResidualTests, floor: Noise) -> bool:
-    """Whether a model's remaining error follows the motion, is larger than a sea can leave, or is far larger on unseen runs."""
-    worst = worst_error(h, floor)
-    p = 3.0 * tests.dependence if worst < GUSTY_ERROR_RATIO else tests.p
-    return p < MIN_P_VALUE or worst > FAR_ERROR_RATIO or validation_error_ratio(h, floor) > MAX_VALIDATION_ERROR_RATIO
+    """Whether a model's remaining error fails the tests of a disturbance, or is far larger on unseen runs."""
+    p = 3.0 * tests.dependence if worst_error(h, floor) < GUSTY_ERROR_RATIO else tests.p
+    return p < MIN_P_VALUE or validation_error_ratio(h, floor) > MAX_VALIDATION_ERROR_RATIO
 
 
 def names_added(search: Search, h: ScoredModel) -> list[str]:
@@ -158,7 +175,7 @@ def probabilities(evidences: Mapping[frozenset[str], float], left: float = 1.0) 
     """Return the posterior probability of each set of effects: proportional to exp(log evidence / EVIDENCE_TEMPERATURE).
 
     They sum to one less the probability that the hidden effect is in none of the sets tried. The evidence of one set over another
-    says nothing about that probability; it is estimated from `left`, the error over the noise that the named set leaves.
+    says nothing about that probability; it is estimated from `left`, the `error_left` of the named set.
     """
     scores = np.array(list(evidences.values())) / EVIDENCE_TEMPERATURE
     weights = np.exp(scores - scores.max())
@@ -167,6 +184,6 @@ def probabilities(evidences: Mapping[frozenset[str], float], left: float = 1.0) 
 
 
 def untried_probability(left: float) -> float:
-    """Return the probability that the missing effect is in no set tried, from the error over the noise with the named set."""
+    """Return the probability that the missing effect is in no set tried, from the `error_left` of the named set."""
     share = 1.0 - 1.0 / max(left, 1.0) ** 2
     return float(max(UNTRIED_MOST * share**UNTRIED_POWER, UNTRIED_LEAST))

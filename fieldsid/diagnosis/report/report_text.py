@@ -64,7 +64,7 @@ def headline(
 ) -> Sentence:  # fmt: skip
     """Return the verdict in a sentence."""
     if verdict.word in ("effect", "undecided"):
-        return _effects_sentence(search, verdict, found, left, floor)
+        return _effects_sentence(search, verdict, found, left, floor, _calm(tests, noise))
     error, base = found.selection_errors.over(floor), sized(search, search.base(), floor)
     if verdict.word == "sufficient":
         tail = f"; a disturbance of {noise.disturbance:.2g} rad/s^2 is there" if noise.disturbance > DISTURBED else ""
@@ -89,7 +89,9 @@ def _disturbed_sentence(search: Search, found: ScoredModel, floor: Noise, noise:
     return f"what is left, {base}, is for the most part {_disturbance(noise)}; {minor_effects}"
 
 
-def _effects_sentence(search: Search, verdict: Verdict, found: ScoredModel, left: Left, floor: Noise) -> Sentence:
+def _effects_sentence(
+    search: Search, verdict: Verdict, found: ScoredModel, left: Left, floor: Noise, calm: str
+) -> Sentence:  # fmt: skip
     """Return the sentence on the effects found, the unusual first, the fall of the error, and the error that remains."""
     unusual, of_every_hull = apart_from_the_hulls_own(verdict.effects)
     with_hull = f"with the hull's own {', '.join(of_every_hull)}" if of_every_hull else ""
@@ -102,7 +104,7 @@ def _effects_sentence(search: Search, verdict: Verdict, found: ScoredModel, left
         ended = (f", to {sized(search, r, floor)} with {n}" for n, r in others.items() if len(r.names) > len(found.names))
         both = f"{names} or {', '.join(others)}: these data cannot tell them apart; with {names} {fall}{''.join(ended)}"
         return Sentence(both, both)
-    rest = _unexplained_rest(left, f"{left.ratio:.2g} x is" if not search.is_noiseless else "an error is")
+    rest = _unexplained_rest(left, f"{left.ratio:.2g} x is" if not search.is_noiseless else "an error is", calm)
     return Sentence(f"{names} ({says}): {fall}{rest}", f"{names}: {fall}{rest}")
 
 
@@ -111,12 +113,18 @@ def apart_from_the_hulls_own(effects: Sequence[str]) -> tuple[tuple[str, ...], t
     return tuple(n for n in effects if n not in HULLS_OWN), tuple(n for n in effects if n in HULLS_OWN)
 
 
-def _unexplained_rest(left: Left, remains: str) -> str:
+def _unexplained_rest(left: Left, remains: str, calm: str) -> str:
     """Return the clause on what no effect of the catalogue explains, and where it is; empty without such an error."""
     if not left.unexplained:
         return ""
     follows = f", and moves with {left.moves_with}" if left.moves_with else ""
-    return f"; {remains} left that nothing in the catalogue explains: it is largest in {left.where}{follows}"
+    return f"; {remains} left that nothing in the catalogue explains: it is largest in {left.where}{follows}{calm}"
+
+
+def _calm(tests: ResidualTests, noise: Noise) -> str:
+    """Return the clause on the disturbance that the tests do not exclude; empty where they exclude one."""
+    passes = tests.p >= MIN_P_VALUE and noise.disturbance > DISTURBED
+    return f"; the tests do not tell it from {_disturbance(noise)}" if passes else ""
 
 
 def _unexplained_sentence(search: Search, found: ScoredModel, left: ResidualTests, floor: Noise, noise: Noise) -> str:
@@ -132,12 +140,10 @@ def _unexplained_sentence(search: Search, found: ScoredModel, left: ResidualTest
     when = f"{left.worst_start_s:.0f}-{left.worst_end_s:.0f} s ({left.worst_ratio:.1f} x the average)"
     where = f"{'what is left' if lowers else 'it'} is largest in {left.worst_run} at {when}"
     follows = f" and moves with {left.moves_with}" if 3.0 * left.dependence < MIN_P_VALUE else ""
-    passes = left.p >= MIN_P_VALUE and noise.disturbance > DISTURBED
-    calm = f"; the tests do not tell it from {_disturbance(noise)}" if passes else ""
     unseen = f"; unseen runs are {worse:.1f} times worse than the fitted ones" if worse > MAX_VALIDATION_ERROR_RATIO else ""
     return (
         f"no effect of the catalogue explains what is missing: error {sized(search, search.base(), floor)}{partly}; "
-        f"{where}{follows}{calm}{unseen}{_less_likely_explanation(search, found, floor)}"
+        f"{where}{follows}{_calm(left, noise)}{unseen}{_less_likely_explanation(search, found, floor)}"
     )
 
 

@@ -36,6 +36,7 @@ def judged(
     base = SimpleNamespace(
         names=(),
         selection_errors=errors(before),
+        train=errors((fitted or (before, after))[0], runs),
         train_under=lambda _std: errors((fitted or (before, after))[0], runs),
         own_moment=0.0,
         log_evidence=0.0,
@@ -91,11 +92,28 @@ def test_an_effect_must_explain_most_of_what_all_runs_show_and_not_of_the_unseen
     assert judged(monkeypatch, 3.0, 1.56, 0.6, fitted=(2.15, 2.11), runs=runs) == word
 
 
+@pytest.mark.parametrize("noiseless", [False, True])
 @pytest.mark.parametrize(
-    ("after", "noiseless", "word"), [(3.5, False, "effect"), (5.0, False, "unexplained"), (5.0, True, "effect")]
+    ("before", "after", "named", "p", "word"),
+    [
+        (12.0, 3.5, "backlash", 1e-9, "effect"),
+        (12.0, 6.0, "backlash", 1e-9, "unexplained"),
+        (12.0, 6.0, "servo_lag", 1e-9, "effect"),
+        (120.0, 6.0, "backlash", 1e-9, "effect"),
+        (120.0, 60.0, "backlash", 1e-9, "unexplained"),
+        (12.0, 6.0, "backlash", 0.6, "effect"),
+    ],
 )
-def test_nothing_is_named_where_what_is_hidden_is_more_probably_in_no_set_tried(monkeypatch, after, noiseless, word):
-    assert judged(monkeypatch, 100.0, after, 0.6, noiseless=noiseless) == word
+def test_nothing_unusual_is_named_where_what_is_hidden_is_more_probably_in_no_set_tried(
+    monkeypatch, before, after, named, p, word, noiseless
+):
+    """Better sensors show the same error of the same model as more times their noise; a sea hides nothing."""
+    assert judged(monkeypatch, before, after, p, named=(named,), noiseless=noiseless) == word
+
+
+@pytest.mark.parametrize(("unseen", "word"), [(2.63, "effect"), (2.8, "disturbed")])
+def test_unseen_runs_too_mild_to_show_an_effect_in_a_sea_take_nothing_from_it(monkeypatch, unseen, word):
+    assert judged(monkeypatch, 2.6, unseen, 0.6, fitted=(11.2, 2.7), runs=3) == word
 
 
 def test_a_large_error_on_fitted_runs_is_one_that_is_left(monkeypatch):

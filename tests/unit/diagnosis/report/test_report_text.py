@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -134,17 +135,17 @@ def test_the_headline_says_the_error_that_falls(fitted, unseen, settled, said):
     for h, all_runs in zip((base, found), settled, strict=True):
         h.train, h.unseen_errors, h.effects = h.errors.train, (h.selection_errors, _errors(all_runs)), ()
     search = _search(base)
-    sentence = headline(search, Verdict("effect", ("stall",)), found, SimpleNamespace(), NOTHING_LEFT, FLOOR, FLOOR)
+    sentence = headline(search, Verdict("effect", ("stall",)), found, SimpleNamespace(p=0.0), NOTHING_LEFT, FLOOR, FLOOR)
     assert sentence.full.endswith(f"): {said}")
     assert sentence.short == f"stall: {said}"
 
 
-def named(effects, left, *, noiseless=False):
+def named(effects, left, *, noiseless=False, p=0.0, noise=FLOOR):
     base, found = (_made(*n, train=(f,), unseen=(f,), score=0.0) for n, f in (((), 11.5), (effects, 1.8)))
     for h in (base, found):
         h.train, h.unseen_errors, h.effects = h.errors.train, (h.selection_errors,), ()
     search = _search(base, noiseless=noiseless)
-    return headline(search, Verdict("effect", effects), found, SimpleNamespace(), left, FLOOR, FLOOR)
+    return headline(search, Verdict("effect", effects), found, SimpleNamespace(p=p), left, FLOOR, noise)
 
 
 def test_what_every_hull_has_is_told_apart_from_what_is_unusual():
@@ -163,6 +164,14 @@ def test_what_is_left_is_said_with_its_place():
             "; 1.8 x is left that nothing in the catalogue explains: "
             "it is largest in train_1 at 12-14 s, and moves with roll rate"
         )
+
+
+def test_what_is_left_is_said_to_be_a_disturbance_perhaps_where_no_test_excludes_one():
+    left = Left(6.8, unexplained=True, run="train_2", start_s=10.0, end_s=12.0)
+    noise = replace(FLOOR, disturbance=0.0004, disturbance_time=3.3)
+    of_a_sea = "; the tests do not tell it from a disturbance moment of 0.0004 rad/s^2 with a time constant of 3.3 s"
+    assert of_a_sea in named(("trim_drift",), left, p=0.4, noise=noise).short
+    assert "disturbance" not in named(("trim_drift",), left, p=1e-4, noise=noise).short
 
 
 def test_what_is_left_of_a_log_without_noise_is_said_too():
