@@ -84,7 +84,7 @@ def stands(search: Search, found: ScoredModel, tests: ResidualTests, floor: Nois
     Those that every hull has always may. Unusual ones may unless the error is so large that the missing effect is more probably
     in no set tried, see `untried_probability`.
     """
-    if set(names_added(search, found)) <= set(HULLS_OWN):
+    if HULLS_OWN.issuperset(names_added(search, found)):
         return True
     return untried_probability(error_left(search, found, tests, floor)) <= 0.5
 

@@ -20,17 +20,19 @@ from fieldsid.diagnosis.moves.grounds import Grounds
 from fieldsid.fitting.initial.effect_screen import ScreenResult, backtrack, screen_points
 from fieldsid.models.effect import Effect
 
-HULLS_OWN = ("sway_coupling", "heave_coupling", "servo_lag", "quadratic_damping", "speed_varying")
-"""The effects that every hull has, in the order of addition: the cross state changes the other parameters most."""
+ADDED = ("sway_coupling", "heave_coupling", "servo_lag", "quadratic_damping", "speed_varying")
+"""The effects of the whole hull in the order of addition: the cross state changes the other parameters most."""
+HULLS_OWN = frozenset((*ADDED, "crossflow_drag"))
+"""The effects that every hull has: quadratic damping stands for the drag along the hull in the whole hull."""
 STARTS = 3
 """Number of scan points, the best to first order, from which each of them is fitted."""
 
 
 def whole_hull(base: ScoredModel, effects: Sequence[Effect], tried: Archive, grounds: Grounds) -> ScoredModel:
-    """Return the base with those of the given effects that are in HULLS_OWN; store every intermediate set in the archive."""
+    """Return the base with those of the given effects that are in ADDED; store every intermediate set in the archive."""
     h = base
-    hull_effects = (e for e in effects if e.name in HULLS_OWN and e.name not in base.names)
-    for effect in sorted(hull_effects, key=lambda e: HULLS_OWN.index(e.name)):
+    hull_effects = (e for e in effects if e.name in ADDED and e.name not in base.names)
+    for effect in sorted(hull_effects, key=lambda e: ADDED.index(e.name)):
         fits = [fit for fit in _fits_with(h, effect, grounds) if np.isfinite(fit.log_likelihood)]
         if fits:
             key = frozenset((*h.names, effect.name))

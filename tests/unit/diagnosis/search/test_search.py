@@ -21,7 +21,7 @@ from fieldsid.diagnosis.moves.refit import refit_from_parts
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.search.accepted_sets import core_of
 from fieldsid.diagnosis.search.search import MAX_CANDIDATES, Search
-from fieldsid.diagnosis.search.whole_hull import HULLS_OWN, whole_hull
+from fieldsid.diagnosis.search.whole_hull import ADDED, whole_hull
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, EVIDENCE_TEMPERATURE
 from fieldsid.effects import all_effects
 from fieldsid.fitting.initial.effect_screen import carry_parameters
@@ -55,7 +55,7 @@ def grown(*names):
 @pytest.fixture(scope="module")
 def ended():
     """A search that has come to its end, and what it has found."""
-    made = search_for(*HULLS_OWN[:1], *HULLS_OWN[2:], "delay", "gyro_bias", "stall")
+    made = search_for(*ADDED[:1], *ADDED[2:], "delay", "gyro_bias", "stall")
     return made, made.best()
 
 
