@@ -12,10 +12,11 @@ STEP_S = 0.05
 
 
 @cache
-def flown(axis="yaw", count=1200, seed=1, colour=0.0, noise=(0.004, 0.006), factor=1.0, damped=1.0, faster=1.0):
+def flown(axis="yaw", count=1200, seed=1, colour=0.0, noise=(0.004, 0.006), factor=1.0, damped=1.0, faster=1.0, sea=(0.0, 1.0)):
     """Time, fin, angle and rate (n,) under a fin that jumps at random; noise of AR(1) colour on both sensors.
 
-    The authority is `factor` times the truth's, the damping `damped` times, the vehicle `faster` than at the truth's speed.
+    The authority is `factor` times the truth's, the damping `damped` times, the vehicle `faster` than at the truth's speed. The
+    `sea` is a moment with a standard deviation in rad/s^2 and a correlation time in s.
     """
     rng = np.random.default_rng(seed)
     values = list(TRUTH[axis].values())
@@ -25,14 +26,24 @@ def flown(axis="yaw", count=1200, seed=1, colour=0.0, noise=(0.004, 0.006), fact
     system = np.zeros((3, 3))
     system[0, 1], system[1] = 1.0, [-stiffness, -damping, 1.0]
     move = expm(system * STEP_S)
-    state = np.zeros((count, 2))
+    state, moment = np.zeros((count, 2)), moments(rng, count, *sea)
     for i in range(count - 1):
-        state[i + 1] = (move @ np.array([*state[i], authority * fin[i] + trim]))[:2]
+        state[i + 1] = (move @ np.array([*state[i], authority * fin[i] + trim + moment[i]]))[:2]
     errors = rng.standard_normal((count, 2))
     for i in range(1, count):
         errors[i] = colour * errors[i - 1] + np.sqrt(1.0 - colour**2) * errors[i]
     angle, rate = (state + errors * noise).T
     return np.arange(count) * STEP_S, fin, angle, rate
+
+
+def moments(rng, count, std, correlation_s):
+    """A disturbance moment (n,), AR(1)."""
+    out = np.zeros(count)
+    if std:
+        kept = np.exp(-STEP_S / correlation_s)
+        for i in range(1, count):
+            out[i] = kept * out[i - 1] + std * np.sqrt(1.0 - kept**2) * rng.standard_normal()
+    return out
 
 
 def fed(online, samples):

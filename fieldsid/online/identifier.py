@@ -5,10 +5,10 @@
     online.estimate().values                       # {"a22": ..., "b2": ..., "C0": ...}
     online.gains(watch.look(online.estimate()))    # of now, by the design of `sysid schedule design`
 
-The recursion and its filter are those of `--method svf_rls`. Standard errors allow for coloured residuals as those of `svf_ls`
-do, and the estimate is corrected for the bias of white sensor noise. It needs NumPy and SciPy only: a sample takes 12 us with
-numba and 31 us without. An estimate takes 0.8 ms, once in 256 samples twice that; the test for a jump of authority takes 3 ms
-once a second.
+The recursion and its filter are those of `--method svf_rls`. The estimate is by instrumental variables from the same rows, with
+the bias of neither a disturbance nor the noise of the sensors, and its standard errors allow for coloured residuals. It needs
+NumPy and SciPy only: a sample takes 12 us with numba and 31 us without. An estimate takes 1.5 ms; the test for a jump of
+authority takes 3 ms once a second.
 """
 
 from __future__ import annotations
@@ -20,14 +20,11 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from fieldsid.errors import DataError
-from fieldsid.fitting.regression.bias_compensation import inverse_of_normal, noise_share
-from fieldsid.fitting.regression.recursive_ls import INITIAL_VARIANCE, MAX_VARIANCE_SHARE, WEIGHT, H, corrected, noise_of
+from fieldsid.fitting.regression.recursive_ls import INITIAL_VARIANCE, MAX_VARIANCE_SHARE
 from fieldsid.logs.doctor.angle_and_rate import contradiction
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.numerics.white_noise import white_noise_std
 from fieldsid.online.authority_jump import AuthorityJump, Jump
 from fieldsid.online.estimate import OnlineEstimate
 from fieldsid.online.progress import LOOK_BACK_S, Progress
@@ -36,14 +33,13 @@ from fieldsid.online.sample_filter import SampleFilter
 if TYPE_CHECKING:
     from fieldsid.schedule.search.of_one_model import GainsOfOne, Wanted
 
-NOISE_WINDOW = 1024
-NOISE_EVERY = NOISE_WINDOW // 4
-"""Samples from which the sensors' noise is estimated, and samples between two estimates of it."""
+WINDOW = 1024
+JUDGED_EVERY = WINDOW // 4
+"""Samples that are stored, and samples between two tests of whether angle and rate of them contradict each other."""
 WAIT_FOR_RATE_S = 1.0
 """Time after which a vehicle that has sent no rate is taken to have no rate sensor."""
-STATE = 5
+STATE = 6
 """Version of the saved state."""
-_UPPER = np.triu_indices(4)
 
 
 def refuse_unsettled(now: OnlineEstimate, progress: Progress) -> None:
@@ -98,12 +94,12 @@ class OnlineIdentifier:
         self._filter: SampleFilter | None = None
         self._by_rate = by_rate
         self._first_time = nan
-        self._window = np.full((NOISE_WINDOW, 5), nan)
+        self._window = np.full((WINDOW, 5), nan)
         self._authority = AuthorityJump(stiff=self._stiff)
         self._jump: Jump | None = None
         self._fin_most, self._is_held = 0.0, True
         self._contradiction: str | None = None
-        self._seen, self._noise = 0, (MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S)
+        self._seen = 0
         self._speed_sum, self._speeds = 0.0, 0
 
     def update(
@@ -157,13 +153,12 @@ class OnlineIdentifier:
             empty = dict.fromkeys(names, nan)
             return OnlineEstimate(self.axis, nan, empty, dict(empty), 0, nan, {})
         fed, keep = self._filter, [0, 1, 2, 3] if self._stiff else [0, 2, 3]
-        share = self._noise_share()
-        values = np.array(corrected(fed.memory, fed.packed, noise_of(share)) if share else fed.packed[:4])
-        covariance = self._covariance(values, share.gram if share else np.zeros((4, 4)), keep)
-        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) if covariance is not None else np.full(len(keep), nan)
+        found = fed.lagged.estimate(fed.packed[:4]) if fed.counts["used"] > 2 * len(keep) else None
+        values, covariance = found or (np.full(4, nan), None)
+        errors = np.sqrt(np.diag(covariance)) if covariance is not None else np.full(len(keep), nan)
         # a parameter without excitation keeps its start value and start variance P; the covariance by residuals would be zero
         excited = fed.packed[[4, 8, 11, 13]][keep] <= MAX_VARIANCE_SHARE * INITIAL_VARIANCE
-        known = np.where(excited & (fed.counts["used"] > 2 * len(keep)), values[keep], nan)
+        known = np.where(excited, values[keep], nan)
         errors = np.where(excited & (errors > 0.0), errors, nan)
         counts = {**fed.counts, "spikes": fed.angle_gate.spikes + fed.rate_gate.spikes}
         used = counts.pop("used")
@@ -197,7 +192,6 @@ class OnlineIdentifier:
             "first_time": self._first_time if isfinite(self._first_time) else None,
             "window": [[v if isfinite(v) else None for v in row] for row in self._window.tolist()],
             "seen": self._seen,
-            "noise": list(self._noise),
             "speed": [self._speed_sum, self._speeds],
             "authority": self._authority.state(),
             "fin": [self._fin_most, self._is_held],
@@ -217,7 +211,7 @@ class OnlineIdentifier:
             made = cls(state["axis"], by_rate=state["by_rate"], **state["settings"])
             made._first_time = nan if state["first_time"] is None else float(state["first_time"])
             made._window[:] = np.array(state["window"], dtype=np.float64)
-            made._seen, made._noise = int(state["seen"]), (float(state["noise"][0]), float(state["noise"][1]))
+            made._seen = int(state["seen"])
             made._speed_sum, made._speeds = float(state["speed"][0]), int(state["speed"][1])
             made._authority.restore(state["authority"])
             made._fin_most, made._is_held = float(state["fin"][0]), bool(state["fin"][1])
@@ -274,26 +268,21 @@ class OnlineIdentifier:
         return float(recent.mean()) if recent.size else self._speed_sum / self._speeds if self._speeds else nan
 
     def _store_sample(self, time: float, angle: float, rate: float, fin: float, speed: float) -> None:
-        """Store a sample, and estimate the noise of the sensors once in NOISE_EVERY samples."""
+        """Store a sample; whether angle and rate contradict each other is judged anew once in JUDGED_EVERY samples."""
         self._fin_most = max(self._fin_most, abs(fin)) if isfinite(fin) else self._fin_most
         unwrapped = self._filter.newest_angle if self._filter is not None and isfinite(angle) else nan
-        self._window[self._seen % NOISE_WINDOW] = time, unwrapped, rate, fin, speed
+        self._window[self._seen % WINDOW] = time, unwrapped, rate, fin, speed
         self._seen += 1
-        if self._seen % NOISE_EVERY == 0:
+        if self._seen % JUDGED_EVERY == 0:
             self._contradiction = None
-            # each signal is taken alone: where angle and rate come in separate messages, no sample has both
-            signals = (c[np.isfinite(c)] for c in self._recent().T[1:3])
-            found = [white_noise_std(c, np.ones(c.size, dtype=np.bool_)) for c in signals]
-            least = MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S
-            self._noise = tuple(max(f, n) if isfinite(f) else n for f, n in zip(found, least, strict=True))  # type: ignore[assignment]
 
     def _recent(self) -> FloatArray:
-        """Return time, angle, rate, fin and surge of the last samples, (NOISE_WINDOW, 5), NaN before the first."""
-        return np.roll(self._window, -(self._seen % NOISE_WINDOW), axis=0)
+        """Return time, angle, rate, fin and surge of the last samples, (WINDOW, 5), NaN before the first."""
+        return np.roll(self._window, -(self._seen % WINDOW), axis=0)
 
     def _find_contradiction(self) -> str:
-        """Return how angle and rate contradict each other, or are mistaken for the fin; tested once in NOISE_EVERY samples."""
-        if self._contradiction is None and self._seen >= NOISE_EVERY:
+        """Return how angle and rate contradict each other, or are mistaken for the fin; tested once in JUDGED_EVERY samples."""
+        if self._contradiction is None and self._seen >= JUDGED_EVERY:
             time, angle, rate, fin, _ = self._recent()[-self._seen :].T
             restart = int(np.flatnonzero(np.diff(time, prepend=inf) <= 0.0)[-1])  # where its clock last started again
             names, part = NAMES[self.axis], slice(restart, None)
@@ -301,23 +290,3 @@ class OnlineIdentifier:
             both = run.has(names.angle) and run.has(names.rate)
             self._contradiction = contradiction(run, names.angle, names.rate) if both else ""
         return self._contradiction or ""
-
-    def _noise_share(self) -> Any:
-        fed = self._filter
-        step = float(fed.memory[H]) if fed is not None else 0.0  # zero before there is one
-        if step <= 0.0 or self._seen < NOISE_EVERY:
-            return None
-        return noise_share(1 if self._by_rate else 2, self._settings["bandwidth"], step, *self._noise)
-
-    def _covariance(self, theta: FloatArray, gram: FloatArray, keep: list[int]) -> FloatArray | None:
-        fed = self._filter
-        if fed is None or fed.counts["used"] <= 2 * len(keep):
-            return None
-        packed = np.zeros((4, 4))
-        packed[_UPPER] = fed.packed[4:]
-        inverse = (packed + np.triu(packed, 1).T)[np.ix_(keep, keep)]
-        weight = float(fed.memory[WEIGHT])
-        scale = np.sqrt(np.maximum(np.diag(inverse), 1e-300))
-        normal = np.linalg.pinv(inverse / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
-        clean = inverse_of_normal(normal, gram[np.ix_(keep, keep)] * weight)
-        return fed.colour.covariance(theta, clean)

@@ -29,7 +29,7 @@ from fieldsid.fitting.regression.svf_equation import MAX_BRIDGED_GAP_S
 from fieldsid.logs.convert.clock import SLOWER, Track, line_over_steps
 from fieldsid.logs.convert.faults.spikes import ALIKE, spike_limit
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.online.row_colour import RowColour
+from fieldsid.online.lagged_rows import LaggedRows
 
 SPIKE_WINDOW = 256
 SPIKE_LIMIT_EVERY = SPIKE_WINDOW // 2
@@ -96,11 +96,11 @@ Line = tuple[float, float]
 
 
 class SampleFilter:
-    """The state of the filter `memory`, Theta and P in `packed`, the colour of the rows `colour`, and the `counts` of faults."""
+    """The state of the filter `memory`, Theta and P in `packed`, the rows' lagged products `lagged`, the `counts` of faults."""
 
     __slots__ = (
         "_fin", "_last_angle", "_late", "_moves", "_order", "_row", "_sample", "_settings", "_stiff", "angle_gate",
-        "colour", "counts", "memory", "packed", "rate_gate",
+        "counts", "lagged", "memory", "packed", "rate_gate",
     )  # fmt: skip
 
     def __init__(self, *, stiff: bool, by_rate: bool, bandwidth: float, forgetting: float) -> None:
@@ -109,7 +109,7 @@ class SampleFilter:
         self._stiff = stiff
         self._settings = (bandwidth, forgetting, self._order)
         self._sample, self._row = np.zeros((1, 6)), np.zeros((1, 5))
-        self.colour = RowColour(bandwidth, forgetting)
+        self.lagged = LaggedRows(bandwidth, forgetting, stiff=stiff)
         self.angle_gate, self.rate_gate = SpikeGate(), SpikeGate()
         self._late: list[tuple[float, float, bool, Line | None]] = []
         self._moves: list[tuple[float, float, Line | None]] = []
@@ -247,7 +247,7 @@ class SampleFilter:
         if not step(self.memory, self.packed, *self._settings, self._sample, self._row, 0):
             return False
         self.counts["used"] += 1
-        self.colour.add(time, self._row[0])
+        self.lagged.add(time, self._row[0])
         return True
 
     def state(self) -> dict[str, Any]:
@@ -260,7 +260,7 @@ class SampleFilter:
             "moves": [list(move) for move in self._moves],
             "numbers": {k: v if isfinite(v) else None for k, v in numbers.items()},
             "counts": dict(self.counts),
-            "colour": self.colour.state(),
+            "lagged": self.lagged.state(),
             "angle_gate": self.angle_gate.state(),
             "rate_gate": self.rate_gate.state(),
         }
@@ -274,7 +274,7 @@ class SampleFilter:
         fin, angle = (state["numbers"][k] for k in ("fin", "last_angle"))
         self._fin, self._last_angle = (nan if v is None else float(v) for v in (fin, angle))
         self.counts = {k: int(state["counts"][k]) for k in self.counts}
-        self.colour.restore(state["colour"])
+        self.lagged.restore(state["lagged"])
         self.angle_gate.restore(state["angle_gate"])
         self.rate_gate.restore(state["rate_gate"])
 

@@ -18,11 +18,11 @@ FILTER: Shape = {
     "moves": [(ANY, ANY, LINE)],
     "numbers": {"fin": NOT_MEASURED, "last_angle": NOT_MEASURED},
     "counts": dict.fromkeys(("used", "missing", "repeated", "gaps", "restarts", "late"), whole_number),
-    "colour": {
-        "numbers": (COUNT, ANY, COUNT, COUNT, COUNT),
+    "lagged": {
+        "numbers": (COUNT, ANY, ANY, COUNT, COUNT, COUNT, COUNT, COUNT),
         "0": times(5, ANY),
-        "1": times(129 * 5, ANY),
-        "2": times(129 * 25, ANY),
+        "1": times(257 * 5, ANY),
+        "2": times(257 * 25, ANY),
     },
     "angle_gate": GATE,
     "rate_gate": GATE,
@@ -48,7 +48,6 @@ STATE: Shape = {
         "fin": (ANY, flag),
         "jump": maybe((ANY, ANY, ANY)),
         "seen": whole_number,
-        "noise": (above_zero(), above_zero()),
         "speed": (ANY, whole_number),
         "filter": maybe(FILTER),
     },

@@ -17,6 +17,7 @@ from fieldsid.fitting.identify import identify
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.online import OnlineIdentifier
+from fieldsid.online.lagged_rows import LaggedRows
 
 NAN = float("nan")
 
@@ -37,9 +38,7 @@ def test_at_the_end_of_a_log_it_is_the_block_estimate_within_its_error(axis, wit
     now = fed(OnlineIdentifier(axis), (time, fin, angle, rate if with_rate else np.full(time.size, NAN))).estimate()
     for name in TRUTH[axis]:
         assert abs(now.values[name] - block[name].value) < block[name].std_error
-        # an angle alone has its noise differentiated twice, with hardly any at low frequencies: the autoregression leaves more
-        most = 1.7 if with_rate else 4.0
-        assert 0.6 < now.std_errors[name] / block[name].std_error < most
+        assert 0.6 < now.std_errors[name] / block[name].std_error < 1.7
 
 
 @pytest.mark.parametrize(
@@ -52,6 +51,24 @@ def test_intervals_hold_the_truth_as_often_as_they_say(colour, flights, least):
     # 60 flights of true coverage 0.95 give less than 0.85 once in 500, 10 less than 0.7 once in 1000
     assert (held >= least).all(), held
     assert (np.sqrt((z**2).mean(axis=0)) > 0.6).all()
+
+
+@pytest.mark.parametrize("axis", ["yaw", "pitch"])
+@pytest.mark.parametrize("flights", [8, pytest.param(40, marks=pytest.mark.slow)])
+def test_a_disturbance_of_the_hull_does_not_bias_it(axis, flights):
+    ended = [fed(OnlineIdentifier(axis), flown(axis, 2400, s, sea=(0.03, 3.0))).estimate() for s in range(flights)]
+    z = np.array([far(now, axis) for now in ended])
+    # of least squares the damping is 25 to 35 % too small on average, and none of its intervals holds the truth
+    for name in (NAMES[Axis(axis)].damping, NAMES[Axis(axis)].authority):
+        assert np.mean([now.values[name] for now in ended]) == pytest.approx(TRUTH[axis][name], rel=0.1)
+    assert ((np.abs(z) < 1.96).mean(axis=0) >= 0.6).all(), z
+
+
+def test_bins_have_as_many_rows_as_each_other_at_a_rate_that_does_not_divide_them():
+    lagged = LaggedRows(4.0, 1.0, stiff=False)
+    for i in range(200):  # at 10 Hz a bin of 0.125 s has one row and a quarter
+        lagged.add(0.1 * i, np.array([0.0, 0.0, 0.0, 1.0, (-1.0) ** i]))
+    assert abs(lagged.products[0, 4, 4]) < 1e-9
 
 
 def test_its_memory_does_not_grow():
@@ -107,6 +124,7 @@ sys.meta_path.insert(0, Blocked())
 from online_flights import fed, flown
 from fieldsid.numerics.jit import HAS_NUMBA
 from fieldsid.online import OnlineIdentifier
+from fieldsid.online.lagged_rows import LaggedRows
 assert not HAS_NUMBA
 print(*fed(OnlineIdentifier("pitch"), flown("pitch", count=400)).estimate().values.values())
 """
