@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -31,11 +32,17 @@ def gain_changes(
 ) -> tuple[GainChange, ...]:
     """Return the P gains at each speed for a fin with a largest angle (rad), and with lag, delay and rate where stated.
 
-    Raises ModelError where no gain stabilises one of the two loops.
+    Both are for the estimates themselves: a design that allows for the errors of a model has smaller gains the less is known of
+    it, and two of one vehicle would differ. Raises ModelError where no gain stabilises one of the two loops.
     """
-    was, now = (design_schedule(s, fin_limit, speeds=speeds, wish=Wish(), limits=stated) for s in (old, new))
+    was, now = (design_schedule(_exactly(s), fin_limit, speeds=speeds, wish=Wish(), limits=stated) for s in (old, new))
     level = LEVEL / len(speeds)  # Bonferroni: one family of intervals over the speeds
     return tuple(_gain_change(old, new, was.at(s), now.at(s), stated, level) for s in speeds)
+
+
+def _exactly(source: ParameterSource) -> ParameterSource:
+    """Return the source with its models as if they had no errors."""
+    return replace(source, models=tuple(replace(m, covariance=np.zeros_like(m.covariance)) for m in source.models))
 
 
 def _gain_change(old: ParameterSource, new: ParameterSource, was: Row, now: Row, stated: FinLimits, level: float) -> GainChange:

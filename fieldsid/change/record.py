@@ -88,7 +88,7 @@ class ParameterChange(Brief):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class GainChange(Brief):
-    """The gain kp at one speed (m/s), before and after, its change as a share with a 95 % interval.
+    """The gain kp at one speed (m/s) for the estimates before and after, its change as a share with a 95 % interval.
 
     And what the loop is with the old gains on the vehicle as it is now: least damping ratio, phase margin in deg.
     """

@@ -106,6 +106,20 @@ def test_an_effect_on_one_side_only_makes_the_two_not_comparable():
     assert found.notes[-1].code in {"other_form", "not_at_every_speed"}
 
 
+@pytest.mark.parametrize("less_known", [0, 1])
+def test_a_model_that_is_known_less_well_needs_no_other_gain(less_known):
+    sides = [state(Axis.YAW, YAW, seed, joint=False, speeds=(1.4,)) for seed in (3, 33)]
+    relative = {"a22": 0.5, "b2": 0.3}
+    wide = [
+        replace(m, covariance=np.diag([(relative.get(n, 0.0) * m.values[n]) ** 2 for n in m.free]))
+        for m in sides[less_known].models
+    ]
+    sides[less_known] = source_of_models(wide, list(sides[less_known].names))
+    found = compare_models(*sides)
+    assert found.verdict == "unclear"
+    assert all(abs(gain.change) < 0.05 for gain in found.gains)
+
+
 def test_few_data_say_that_more_are_needed_and_not_that_nothing_changed():
     def short(source, widen):
         models = [replace(m, covariance=widen * m.covariance) for m in source.models]
