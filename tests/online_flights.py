@@ -12,11 +12,23 @@ STEP_S = 0.05
 
 
 @cache
-def flown(axis="yaw", count=1200, seed=1, colour=0.0, noise=(0.004, 0.006), factor=1.0, damped=1.0, faster=1.0, sea=(0.0, 1.0)):
+def flown(
+    axis="yaw",
+    count=1200,
+    seed=1,
+    colour=0.0,
+    noise=(0.004, 0.006),
+    factor=1.0,
+    damped=1.0,
+    faster=1.0,
+    sea=(0.0, 1.0),
+    gust=(0.0, 0.0, 0.0),
+):
     """Time, fin, angle and rate (n,) under a fin that jumps at random; noise of AR(1) colour on both sensors.
 
     The authority is `factor` times the truth's, the damping `damped` times, the vehicle `faster` than at the truth's speed. The
-    `sea` is a moment with a standard deviation in rad/s^2 and a correlation time in s.
+    `sea` is a moment with a standard deviation in rad/s^2 and a correlation time in s, a `gust` one from a time
+    to another (s).
     """
     rng = np.random.default_rng(seed)
     values = list(TRUTH[axis].values())
@@ -27,6 +39,7 @@ def flown(axis="yaw", count=1200, seed=1, colour=0.0, noise=(0.004, 0.006), fact
     system[0, 1], system[1] = 1.0, [-stiffness, -damping, 1.0]
     move = expm(system * STEP_S)
     state, moment = np.zeros((count, 2)), moments(rng, count, *sea)
+    moment[round(gust[0] / STEP_S) : round(gust[1] / STEP_S)] += gust[2]
     for i in range(count - 1):
         state[i + 1] = (move @ np.array([*state[i], authority * fin[i] + trim + moment[i]]))[:2]
     errors = rng.standard_normal((count, 2))

@@ -4,9 +4,9 @@ The products of the regression rows are summed for each second. At the end of ea
 in which a jump may have happened, the rows since then are compared with all rows before. Authority, damping and trim are free
 after a jump: a payload's inertia or a smaller fin at the stern changes authority and damping by one factor. Quadratic drag and
 stiffness stay. Damping is scaled with the speed, authority with its square. The error includes the uncertainty of the drag at
-rates that were not flown before. A second is longer than the correlation of the residuals, so that its sum of scores is one
-independent draw of their noise. Source: Chow 1960, Econometrica 28(3); the scores' variance by clusters: Liang and Zeger 1986,
-Biometrika 73(1).
+rates that were not flown before. The sum of a second's scores is one draw of their noise, and a disturbance that lasts longer
+carries it on to the next. Source: Chow 1960, Econometrica 28(3); the scores' variance by clusters: Liang and Zeger 1986,
+Biometrika 73(1); that of correlated ones by an autoregression: Andrews 1991, Econometrica 59(3).
 """
 
 from __future__ import annotations
@@ -18,18 +18,20 @@ from math import floor, isfinite, log, nan
 from typing import Annotated, Any
 
 import numpy as np
+from scipy.special import stdtrit
 
 from fieldsid.numerics.arrays import BoolArray, FloatArray, IntArray
 from fieldsid.records.keys import Key
+from fieldsid.rounding import TWO_SIDED_95
 
 SEPARATE_SECONDS, MIN_SECONDS_AFTER, MAX_SECONDS_AFTER = 60, 6, 20
 """Seconds whose sums are kept separately, and the least and the most of them that may have come after a jump."""
 MOTION_MISFIT, SPEED_POWER_MISFIT = 0.15, 1.0
 """Relative change of the estimated authority that another kind of motion may cause, as the model lacks sway and lag; and by how
 much the exponent of the authority over speed may differ from 2, as sway and heave change it."""
-MIN_STD_ERRORS = 4.5
-"""Standard errors beyond that change from which a jump is reported: with 15 candidates a second, noise alone gives fewer than one
-false jump in ten thousand hours."""
+CHANCE = 3.4e-6
+"""Probability of noise alone, to either side, beyond which a jump is reported: that of a normal variable beyond 4.5 standard
+errors. Where few seconds tell the noise, Student's distribution asks for more of them."""
 MAX_RELATIVE_ERROR = 0.1
 """Largest standard error of the authorities before and after, as a share of the larger one, at which they are compared."""
 MIN_DRAWS = 20
@@ -64,7 +66,7 @@ class _Sums:
 class AuthorityJump:
     """Sums of row products, separately for each second of the last minute; `stiff`: whether the model has a stiffness."""
 
-    __slots__ = ("_before", "_free", "_keep", "_noise", "_rows", "_seconds", "_speed", "_usual")
+    __slots__ = ("_before", "_free", "_freedom", "_keep", "_noise", "_rows", "_seconds", "_speed", "_usual")
 
     def __init__(self, *, stiff: bool) -> None:
         self._keep = np.array([0, 1, 2, FIN, ONE] if stiff else [0, 1, FIN, ONE])
@@ -72,7 +74,7 @@ class AuthorityJump:
         self._before = _Sums()
         self._seconds: deque[_Sums] = deque()
         self._rows: list[tuple[float, ...]] = []
-        self._noise, self._usual, self._speed = nan, nan, nan
+        self._noise, self._freedom, self._usual, self._speed = nan, nan, nan, nan
 
     def add(self, time: float, row: FloatArray, speed: float) -> Jump | None:
         """Add one row (5,) at a time in s and a surge in m/s, NaN where unknown; return a jump where one is detected."""
@@ -90,12 +92,12 @@ class AuthorityJump:
     def state(self) -> dict[str, Any]:
         """Return the state as plain values, NaN as None."""
         self._sum_waiting_rows()
-        numbers = [v if isfinite(v) else None for v in (self._noise, self._usual, self._speed)]
+        numbers = [v if isfinite(v) else None for v in (self._noise, self._freedom, self._usual, self._speed)]
         return {"numbers": numbers, "sums": [_plain(s) for s in (self._before, *self._seconds)]}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Restore a state; raises ValueError, TypeError or IndexError where it is not valid."""
-        self._noise, self._usual, self._speed = (nan if v is None else float(v) for v in state["numbers"])
+        self._noise, self._freedom, self._usual, self._speed = (nan if v is None else float(v) for v in state["numbers"])
         self._before, *seconds = (_sums(s) for s in state["sums"])
         self._seconds = deque(seconds)
 
@@ -137,7 +139,7 @@ class AuthorityJump:
         since = row_counts[-1] - np.append(0.0, row_counts)[places]
         inverse, determines_before = _inverses(before[:, keep][:, :, keep], MIN_EXCITATION_BEFORE)
         theta = (inverse @ before[:, keep, -1:])[..., 0]
-        noise = self._score_variances(sums, theta, places)
+        noise, freedom = self._score_variances(sums, theta, places)
         products = after[:, keep][:, :, keep]
         solved, _ = _inverses(products[:, free][:, :, free], 0.0)
         # the new coefficients depend on the target, and on drag and stiffness, which do not change
@@ -157,19 +159,33 @@ class AuthorityJump:
         error = np.sqrt(noise * np.maximum(_squares(moved, inverse) + noisier * solved[:, fin_place, fin_place], 0.0))
         _, is_moved = _inverses(after[:, (FIN, ONE)][:, :, (FIN, ONE)], MIN_EXCITATION_AFTER)
         error_before = np.sqrt(noise * np.maximum(inverse[:, fin, fin], 0.0))
-        is_known = np.maximum(error_before, error) <= MAX_RELATIVE_ERROR * np.maximum(abs(was), abs(is_now))
+        # one second, cut off in a motion, is no measure of its own noise: the others tell the authority after as well
+        most = np.array([at + int(np.argmax(sums[at:, FIN, FIN])) for at in places])
+        others, is_told_by_others = _inverses(
+            (products - sums[most][:, keep][:, :, keep])[:, free][:, :, free], MIN_EXCITATION_BEFORE
+        )
+        error_after = np.sqrt(noise * noisier * np.maximum(others[:, fin_place, fin_place], 0.0))
+        least_known = np.maximum(np.maximum(error_before, error), error_after)
+        is_known = is_told_by_others & (least_known <= MAX_RELATIVE_ERROR * np.maximum(abs(was), abs(is_now)))
         misfit = MOTION_MISFIT + SPEED_POWER_MISFIT * abs(log(self._speed / self._usual) if isfinite(self._speed) else 0.0)
-        jumps = is_moved & is_known & (abs(is_now - was) > misfit * abs(was) + MIN_STD_ERRORS * error)
+        least = misfit * abs(was)
+        # a gust passes, a jump stays: the later half of the seconds since then shows it too
+        half = np.minimum(np.arange(places.size) + (count - places + 1) // 2, places.size - 1)
+        lately = (solved[half] @ after[half][:, keep[free], -1:] + slopes[half] @ theta[..., None])[:, fin_place, 0]
+        spread = _squares(moved[half], inverse) + noisier * solved[half, fin_place, fin_place]
+        stays = is_moved[half] & (abs(lately - was) > least + TWO_SIDED_95 * np.sqrt(noise * np.maximum(spread, 0.0)))
+        jumps = is_moved & is_known & stays & (abs(is_now - was) > least + stdtrit(freedom, 1.0 - CHANCE) * error)
         best = int(np.argmin(np.where(determines_before & np.isfinite(noise), rss_before + rss_after, np.inf)))
         if not jumps[best] or places[best] > count - MIN_SECONDS_AFTER:
             return None
         return Jump(self._seconds[places[best]].begin, float(is_now[best] / was[best]), float(error[best] / abs(was[best])))
 
-    def _score_variances(self, sums: FloatArray, theta: FloatArray, places: IntArray) -> FloatArray:
-        """Return the variance of the scores before each candidate over that of the columns (P,).
+    def _score_variances(self, sums: FloatArray, theta: FloatArray, places: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return the variance of the scores before each candidate over that of the columns, and its degrees of freedom (P,).
 
-        It is the variance of a row's residual with its correlation to the neighbouring rows. Where fewer than MIN_DRAWS seconds
-        come before the candidate, the last variance known is returned.
+        It is the variance of a row's residual with its correlation to the neighbouring rows, within the second by the sum and
+        from second to second as an autoregression of first order keeps it. Where fewer than MIN_DRAWS seconds come before the
+        candidate, the last variance known is returned.
         """
         keep = self._keep
         is_before = np.arange(len(sums)) < places[:, None]
@@ -177,10 +193,16 @@ class AuthorityJump:
         columns = sums[:, keep][:, :, keep]
         scores = (sums[:, keep, -1] - np.einsum("sij,pj->psi", columns, theta)) * is_before[..., None]
         normal = np.linalg.pinv(np.einsum("ps,sij->pij", is_before.astype(float), columns), hermitian=True)
-        spread = np.maximum(np.einsum("psi,pij,psj->p", scores, normal, scores), 0.0) / keep.size
-        noise = np.where(draws >= MIN_DRAWS, spread * draws / np.maximum(draws - keep.size, 1), self._noise)
-        self._noise = float(noise[-1])
-        return noise
+        spread = np.maximum(np.einsum("psi,pij,psj->p", scores, normal, scores), 0.0)
+        onward = np.einsum("psi,pij,psj->p", scores[:, 1:], normal, scores[:, :-1])
+        kept = np.clip(onward / np.maximum(spread, 1e-300), 0.0, 1.0 - 1.0 / np.maximum(draws, 2))
+        independent = draws * (1.0 - kept) / (1.0 + kept)
+        freedom = np.maximum(independent - keep.size, 1.0)
+        noise = spread / keep.size * draws / freedom
+        is_new = draws >= MIN_DRAWS
+        noise, freedom = np.where(is_new, noise, self._noise), np.where(is_new, freedom, self._freedom)
+        self._noise, self._freedom = float(noise[-1]), float(freedom[-1])
+        return noise, freedom
 
 
 def _squares(vectors: FloatArray, matrices: FloatArray) -> FloatArray:
@@ -193,7 +215,7 @@ def _inverses(normals: FloatArray, least: float) -> tuple[FloatArray, BoolArray]
 
     It does where no column is zero and no eigenvalue of the matrix, scaled to a unit diagonal, is below `least`.
     """
-    scale = np.sqrt(np.einsum("pii->pi", normals))
+    scale = np.sqrt(np.maximum(np.einsum("pii->pi", normals), 0.0))
     is_determined, scale = (scale > 0.0).all(axis=1), np.where(scale > 0.0, scale, 1.0)
     outer = scale[:, :, None] * scale[:, None, :]
     ones = normals / outer

@@ -44,7 +44,7 @@ STATE: Shape = {
         "by_rate": maybe(flag),
         "first_time": NOT_MEASURED,
         "window": times(1024, (NOT_MEASURED, NOT_MEASURED, NOT_MEASURED, NOT_MEASURED, NOT_MEASURED)),
-        "authority": {"numbers": (NOT_MEASURED, NOT_MEASURED, NOT_MEASURED), "sums": [(NOT_MEASURED, COUNT, times(21, ANY))]},
+        "authority": {"numbers": (NOT_MEASURED,) * 4, "sums": [(NOT_MEASURED, COUNT, times(21, ANY))]},
         "fin": (ANY, flag),
         "jump": maybe((ANY, ANY, ANY)),
         "seen": whole_number,

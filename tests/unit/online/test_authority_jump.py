@@ -67,6 +67,13 @@ def test_noise_alone_is_no_jump(axis, colour, flights):
     assert found == [None] * flights
 
 
+@pytest.mark.parametrize(
+    ("seed", "shaken"), [(26, {"sea": (0.05, 5.0)}), *((s, {"gust": (40.0, 42.0, 0.1)}) for s in (2, 7, 11))]
+)
+def test_a_disturbance_is_no_jump_whether_it_lasts_or_passes(seed, shaken):
+    assert fed(OnlineIdentifier("yaw"), flown(count=1000, seed=seed, **shaken)).estimate().jump is None
+
+
 def test_another_speed_is_no_jump():
     online = OnlineIdentifier("yaw")
     for i, faster in enumerate((1.0, 1.5, 0.7)):
