@@ -60,6 +60,19 @@ def all_rows(folder: Path, tasks: Sequence[Task], work: Work, done: Callable[[],
     return [row for task in tasks for row in found[task]], known
 
 
+def without_copies(rows: Sequence[Row]) -> list[Row]:
+    """Return the rows with those of a log that is a copy of an earlier one as skipped: one flight must not count twice."""
+    first: dict[str, str] = {}
+    out: list[Row] = []
+    for row in rows:
+        log, digest = row["log"], row.get("sha256")
+        original = log if digest is None else first.setdefault(digest, log)
+        what = f"`{log}` is a copy of `{original}`"
+        kept = {name: row[name] for name in ("log", "run", "sha256", "tool") if name in row}
+        out.append(row if original == log else kept | {"status": "skipped", "what": what, "found": "", "hint": "leave it out"})
+    return out
+
+
 def write_table(folder: Path, axis: Axis, rows: Iterable[Row]) -> tuple[Path, Path]:
     """Write the table as Parquet and as CSV, each completely or not at all; raises ArtifactError."""
     import pandas as pd

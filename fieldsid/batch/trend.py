@@ -3,9 +3,10 @@
 Runs at other speeds are scaled to the median one, as damping is proportional to u and authority to u^2. Changes are found by
 optimal partitioning: the series is divided into stretches of constant value so that
     sum (x - mean)^2 / (se^2 + tau^2) + 3 log(n) per change
-is least. tau is the scatter from run to run beyond the stated errors, estimated from differences of neighbours, on which a change
-has little influence. Source: Jackson et al. 2005, IEEE Signal Processing Letters 12(2); Killick, Fearnhead and Eckley 2012, JASA
-107.
+is least, or a straight line over time takes their place where its own sum, at the price of one change, is less: a weight that is
+moved at every dive is no event of one day. tau is the scatter from run to run beyond the stated errors, estimated from
+differences of neighbours, on which a change has little influence. Source: Jackson et al. 2005, IEEE Signal Processing Letters
+12(2); Killick, Fearnhead and Eckley 2012, JASA 107.
 """
 
 from __future__ import annotations
@@ -54,8 +55,22 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
+class Drift:
+    """A steady change of a parameter: values at the first and last run by a line, and the standard error of the difference."""
+
+    before: Annotated[float, Key("Value at the first run, at the trend's speed.")]
+    after: Annotated[float, Key("Value at the last run.")]
+    std_error: Annotated[float, Key("Standard error of the difference.")]
+
+    @property
+    def share(self) -> Annotated[Number, Key()]:
+        """The change as a share of the value before; NaN where it was zero."""
+        return (self.after - self.before) / self.before if self.before else float("nan")
+
+
+@dataclass(frozen=True, slots=True)
 class Trend:
-    """One parameter over the runs (n,) in the order of their starts: values and errors at one speed, means, changes.
+    """One parameter over the runs (n,) in the order of their starts: values and errors at one speed, means, changes or a drift.
 
     `speed` is that speed in m/s (NaN where unknown), `scatter` is tau.
     """
@@ -70,6 +85,9 @@ class Trend:
     ]
     scatter: Annotated[float, Key("Scatter from run to run beyond the stated errors.")]
     changes: Annotated[tuple[Change, ...], Key("Where it changed.")]
+    drift: Annotated[
+        Drift | None, Key("Its steady change, where that explains the runs better than changes at a date; else null.")
+    ]
 
     @property
     def runs(self) -> Annotated[int, Key()]:
@@ -120,7 +138,20 @@ def _trend(rows: Sequence[Row], name: str, speeds: FloatArray, middle: float, po
         for i, at in enumerate(starts.tolist())
     )
     level = np.concatenate([np.full(p.stop - p.start, m) for p, m in zip(parts, means, strict=True)])
-    return Trend(name, start, x, se, level, middle if power else float("nan"), tau, changes)
+    speed, price = middle if power else float("nan"), PRICE * float(np.log(x.size))
+    line, drift = line_over_time(start, x, weight)
+    if float(weight @ (x - line) ** 2) + price < float(weight @ (x - level) ** 2) + price * len(changes):
+        return Trend(name, start, x, se, line, speed, tau, (), drift)
+    return Trend(name, start, x, se, level, speed, tau, changes, None)
+
+
+def line_over_time(start: FloatArray, values: FloatArray, weight: FloatArray) -> tuple[FloatArray, Drift]:
+    """Return the straight line (n,) through values (n,) with weights (n,) at the times `start` (n,) in order, and its drift."""
+    middle = float(np.average(start, weights=weight))
+    about = start - middle
+    spread = float(weight @ about**2)
+    line = float(np.average(values, weights=weight)) + float(weight @ (about * values)) / spread * about
+    return line, Drift(float(line[0]), float(line[-1]), float(about[-1] - about[0]) / sqrt(spread))
 
 
 def scatter_of(values: FloatArray, std_errors: FloatArray) -> float:

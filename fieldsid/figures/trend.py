@@ -41,21 +41,22 @@ def figure(trends: Sequence[Trend], name: str) -> Figure:
 def summary(trends: Sequence[Trend]) -> str:
     """Return what changed, in words."""
     changes = [f"{t.name} {_by(c.share)} on {c.start_utc[:10]}" for t in trends for c in t.changes]
+    changes += [f"{t.name} {_by(t.drift.share)} little by little" for t in trends if t.drift is not None]
     count = max((t.values.size for t in trends), default=0)
     return f"{', '.join(changes)}; {count} runs" if changes else f"no change beyond errors and scatter in {count} runs"
 
 
 def draw(trend: Trend, ax: Axes) -> None:
-    """Draw one parameter: runs with 95 % errors, the mean of each stretch, a line at each change."""
+    """Draw one parameter: runs with 95 % errors, the mean of each stretch and a line at each change, or the drift."""
     dates = DATES.date2num([datetime.fromtimestamp(t, UTC) for t in trend.start.tolist()])
     ax.errorbar(
         dates, trend.values, TWO_SIDED_95 * trend.std_errors, fmt="o", markersize=3.2, color=canvas.MEASURED, elinewidth=0.8,
         label="run, 95 % error",
     )  # fmt: skip
-    cuts = np.flatnonzero(np.diff(trend.means)) + 1
+    cuts = np.flatnonzero(np.diff(trend.means)) + 1 if trend.drift is None else np.zeros(0, dtype=np.intp)
     for i, part in enumerate(np.split(np.arange(trend.values.size), cuts)):
-        ends = (dates[part[0]], dates[part[-1]])
-        ax.plot(ends, trend.means[part[:2]][:1].repeat(2), color=canvas.SECOND, linewidth=2.0, label="_" if i else "mean")
+        ends, label = part[[0, -1]], "mean" if trend.drift is None else "drift"
+        ax.plot(dates[ends], trend.means[ends], color=canvas.SECOND, linewidth=2.0, label="_" if i else label)
     for i, (cut, change) in enumerate(zip(cuts.tolist(), trend.changes, strict=True)):
         at = 0.5 * (dates[cut - 1] + dates[cut])
         ax.axvline(at, color=canvas.SIMULATED, linestyle="--", linewidth=1.2, label="_" if i else "change")

@@ -7,6 +7,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,7 +23,7 @@ from fieldsid.rounding import number, with_error
 
 if TYPE_CHECKING:
     from fieldsid.batch.archive import Work
-    from fieldsid.batch.trend import Trend
+    from fieldsid.batch.trend import Change, Drift, Trend
     from fieldsid.results.trial import Batch, NotUsed
 
 
@@ -53,7 +54,7 @@ def command(
 
     Example: sysid batch archive/ --axis yaw -o batch/ --trend
     """
-    from fieldsid.batch.archive import all_rows, write_table
+    from fieldsid.batch.archive import all_rows, without_copies, write_table
     from fieldsid.batch.task import Settings, Task, logs_in
     from fieldsid.batch.trend import trends_of
     from fieldsid.cli.inputs import mapping_of
@@ -76,6 +77,7 @@ def command(
     begin = time.monotonic()
     with progress("logs", len(tasks)) as step:
         rows, known = all_rows(output, tasks, work, step)
+    rows = without_copies(rows)
     parquet, csv = write_table(output, axis, rows)
     trends = trends_of([dict(r) for r in rows], axis) if trend or figure is not None else ()
     place = figure or output / f"trend_{axis.value}.png"
@@ -156,11 +158,18 @@ def _page(result: Batch) -> Page:
 
 
 def _trend_lines(trend: Trend) -> Iterator[str]:
-    """Yield a line for each date at which a parameter changed: by how much, in per cent where it was not zero."""
+    """Yield a line for each date at which a parameter changed, or for its drift, with the amount."""
     for c in trend.changes:
-        by = f"{number(c.after - c.before, 2)} {trend.name}"
-        if c.before:
-            by = f"{with_error(100.0 * c.share, 100.0 * c.std_error / abs(c.before))} %"
-        yield f"{trend.name} changed by {by} on {c.start_utc[:10]}, from `{c.run}` on"
-    if not trend.changes:
+        yield f"{trend.name} changed by {_amount(trend, c)} on {c.start_utc[:10]}, from `{c.run}` on"
+    if trend.drift is not None:
+        first, last = (datetime.fromtimestamp(t, UTC).date().isoformat() for t in trend.start[[0, -1]].tolist())
+        yield f"{trend.name} drifted by {_amount(trend, trend.drift)} from {first} to {last}, little by little"
+    elif not trend.changes:
         yield f"{trend.name}: no change beyond errors and scatter in {trend.runs} runs"
+
+
+def _amount(trend: Trend, change: Change | Drift) -> str:
+    """Return a change with its standard error in per cent, in its unit where the value before was zero."""
+    if not change.before:
+        return f"{number(change.after - change.before, 2)} {trend.name}"
+    return f"{with_error(100.0 * change.share, 100.0 * change.std_error / abs(change.before))} %"

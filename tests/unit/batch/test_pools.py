@@ -12,7 +12,7 @@ import pytest
 from cli import trial
 
 from fieldsid.batch import local_pool
-from fieldsid.batch.archive import all_rows, known_rows
+from fieldsid.batch.archive import all_rows, known_rows, without_copies
 from fieldsid.batch.local_pool import run_here
 from fieldsid.batch.task import Settings, Task, logs_in
 from fieldsid.errors import UsageError
@@ -182,3 +182,14 @@ def test_a_cluster_that_loses_a_worker_still_answers_for_every_log(tmp_path):
                 killed = True
     assert set(rows) == set(tasks)
     assert [r[0]["status"] for t, r in rows.items() if not t.log.endswith("bad.csv")] == ["done"] * len(logs)
+
+
+def test_a_copy_of_a_log_is_no_second_flight_and_two_runs_of_one_log_are_two():
+    rows = [
+        {"log": log, "run": run, "status": "done", "sha256": digest, "b2": -1.0}
+        for log, run, digest in (("a.csv", "a_1", "1"), ("a.csv", "a_2", "1"), ("b.csv", "b", "2"), ("c.csv", "c", "1"))
+    ]
+    *kept, copy = without_copies(rows)
+    assert kept == rows[:3]
+    assert (copy["status"], copy["what"]) == ("skipped", "`c.csv` is a copy of `a.csv`")
+    assert "b2" not in copy

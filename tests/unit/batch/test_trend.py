@@ -34,8 +34,21 @@ def test_a_swapped_payload_is_found_on_its_day_with_its_size():
     by_name = {t.name: t for t in trends_of(rows, Axis.YAW)}
     (change,) = by_name["b2"].changes
     assert change.run in {"r29", "r30", "r31"}
+    assert by_name["b2"].drift is None
     assert change.share == pytest.approx(-0.22 / 1.2, abs=3.0 * change.std_error / 1.2)
     assert by_name["a22"].changes == ()
+
+
+def test_a_slow_drift_is_told_as_one_and_not_as_steps_at_dates():
+    truth = np.linspace(-1.2, -0.9, 20)
+    by_name = {t.name: t for t in trends_of(archive(truth, seed=4), Axis.YAW)}
+    b2 = by_name["b2"]
+    assert b2.changes == ()
+    assert b2.drift is not None
+    assert b2.drift.after - b2.drift.before == pytest.approx(0.3, abs=3.0 * b2.drift.std_error)
+    assert 0.005 < b2.drift.std_error < 0.03
+    assert by_name["a22"].drift is None
+    assert figure(tuple(by_name.values()), "yaw").axes
 
 
 def test_runs_at_other_speeds_are_carried_to_one():
@@ -51,7 +64,7 @@ def test_false_alarms_are_rare_with_and_without_scatter_of_the_runs(scatter):
     alarms = 0
     for seed in range(200):
         trends = trends_of(archive(np.full(40, -1.2), seed=seed, scatter=scatter), Axis.YAW)
-        alarms += any(t.changes for t in trends if t.name == "b2")
+        alarms += any(t.changes or t.drift for t in trends if t.name == "b2")
     assert alarms <= 16  # of 200: 8 %
 
 
