@@ -33,6 +33,16 @@ def _checked(speeds: list[float]) -> list[float]:
     return speeds
 
 
+def refuse_speed(speed: float) -> None:
+    """Raise UsageError for a speed in m/s at which no underwater vehicle flies by its fins."""
+    if not SLOWEST <= speed <= FASTEST:
+        raise UsageError(
+            f"a speed of {speed:g} m/s cannot be right",
+            found=f"--speed {speed:g}",
+            hint=f"give one in m/s, {SLOWEST:g} to {FASTEST:g}: `--speed 1.5`",
+        )
+
+
 def _read(text: str) -> list[float]:
     try:
         if ":" in text:

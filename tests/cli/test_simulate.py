@@ -36,6 +36,13 @@ def test_noise_from_one_seed_is_always_the_same(run_cli, tmp_path):
     assert ends[0] == ends[1] != ends[2]
 
 
+@pytest.mark.parametrize("speed", ["0", "-1", "nan", "1000"])
+def test_a_speed_that_no_vehicle_flies_at_is_refused_and_not_replaced(run_cli, tmp_path, speed):
+    answer = run_cli("simulate", trial.model_file(tmp_path), "--maneuver", "doublet", "--speed", speed)
+    assert answer.code == 2
+    assert "cannot be right" in answer.err
+
+
 def test_without_an_output_nothing_is_written(run_cli, tmp_path):
     model = trial.model_file(tmp_path)
     assert run_cli("simulate", model, "--maneuver", "doublet").code == 0

@@ -41,6 +41,7 @@ def command(
     from fieldsid.cli.headlines.models import headline_of_simulation
     from fieldsid.cli.inputs import read_run
     from fieldsid.cli.user_effects import read_model
+    from fieldsid.face.speeds import refuse_speed
     from fieldsid.results.logs import SignalRange, Simulation
 
     if (maneuver is None) == (run is None):
@@ -49,6 +50,8 @@ def command(
             found="both" if run else "neither",
             hint="`--maneuver square_pulses` or `--run RUN`",
         )
+    if speed is not None:
+        refuse_speed(speed)
     known = read_model(model)
     if run is None:
         made = _fly_maneuver(known, maneuver or "", speed, fin_max, rate)
