@@ -175,7 +175,8 @@ class Reader:
     """One kind of log.
 
     `own_map` returns the mapping of a file whose names are canonical, or None where they are not. `names_of` returns the names of
-    the columns of a table from the head of the file; it is None for logs of topics.
+    the columns of a table from the head of the file, and `table` the `Table` of the columns that a mapping names, or of all
+    (`readers/_tables.py`); both are None for logs of topics.
     """
 
     name: str
@@ -186,6 +187,7 @@ class Reader:
     read: Callable[[Path, ChannelMap, ReadOptions], RawLog]
     own_map: Callable[[Path, ReadOptions], ChannelMap | None] = never_canonical
     names_of: Callable[[Path], tuple[str, ...]] | None = None
+    table: Callable[[Path, TableForm, ReadOptions, ChannelMap | None], Any] | None = None
 
 
 def reader_of(path: Path, joined: Sequence[Path] = ()) -> Reader:

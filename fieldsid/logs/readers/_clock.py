@@ -1,17 +1,16 @@
-"""Make the inventory of a table, and find its clock: the column of the time, how it is read, and the rate of each column."""
+"""Find the clock of a table: the column of the time, how it is read, and the rate of each column."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import FieldsidError, LogError
-from fieldsid.logs.channels import Source, TableForm
+from fieldsid.logs.channels import Source
 from fieldsid.logs.convert.conditioning import in_order
 from fieldsid.logs.convert.times.clock_parts import MOSTLY
 from fieldsid.logs.convert.times.clock_text import DAY_S, clock_of_text
@@ -19,9 +18,9 @@ from fieldsid.logs.convert.times.time_column import YEARS_S, likely_time_unit
 from fieldsid.logs.mapping.canonical_names import unit_in_name, words_of
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
-from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, ReadOptions, span_of
+from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.readers._clock_columns import clocks_in_parts, dates_beside, elapsed
-from fieldsid.logs.readers._columns import Columns, is_counter, numbers_mostly, samples_of, time_of
+from fieldsid.logs.readers._columns import Columns, is_counter, time_of
 from fieldsid.logs.run import Note, origin_of
 from fieldsid.numerics.arrays import FloatArray
 
@@ -64,49 +63,6 @@ class Clock:
         return 1.0 / float(np.median(steps)) if steps.size else float("nan")
 
 
-def inventory_of_table(
-    path: Path,
-    form: str,
-    columns: Columns,
-    options: ReadOptions,
-    *,
-    table: TableForm | None = None,
-    notes: Sequence[Note] = (),
-    more: int = 0,
-) -> Inventory:
-    """Return the columns of a table with their count of numbers, rate, first values and range.
-
-    `more` is the number of columns that were not read.
-    """
-    clock = clock_of(columns, options.clock)
-    return Inventory(
-        path,
-        form,
-        clock.duration_s if clock else float("nan"),
-        tuple(_channel(columns, i, clock) for i in range(columns.width)),
-        table,
-        (*notes, *(clock.notes if clock else ())),
-        samples_of(columns, clock.time, clock.source) if clock else None,
-        no_clock=_why_no_clock(columns) if clock is None and options.clock is None else None,
-        more=more,
-    )
-
-
-def _channel(columns: Columns, index: int, clock: Clock | None) -> ChannelInfo:
-    import pandas as pd
-
-    values = numbers_mostly(columns.take(index))
-    kind = "number" if values.dtype.kind in "fiubM" else "text"
-    there = np.isfinite(values) if values.dtype.kind in "fiub" else ~np.asarray(pd.isna(values))
-    first = values[there][:3]
-    shown: list[Any] = (first.astype(str) if values.dtype.kind == "M" else first).tolist()
-    rate = clock.rate_hz(values) if clock else float("nan")
-    field = FieldInfo("", kind, tuple(shown), span_of(values))
-    return ChannelInfo(
-        columns.name(index), kind, int(there.sum()), rate, (field,), columns.units[index] if columns.units else None
-    )
-
-
 def clock_of(columns: Columns, known: Source | None) -> Clock | None:
     """Return the clock of a table: by the mapping `known`, else by the names of its columns, else by their numbers.
 
@@ -120,7 +76,7 @@ def clock_of(columns: Columns, known: Source | None) -> Clock | None:
     return next((clock for clock in named if clock is not None), None) or _by_numbers(columns)
 
 
-def _why_no_clock(columns: Columns) -> tuple[Source, FieldsidError] | None:
+def why_no_clock(columns: Columns) -> tuple[Source, FieldsidError] | None:
     """Return the first column that has a name of a time but cannot be read as one, and the reason; None without such a column."""
     for source in _named_times(columns):
         first = columns.index(source.places[0], TIME)

@@ -8,18 +8,18 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import IO, Any
+from typing import IO, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
+from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.readers._cells import ERRORS, MISSING, SENTENCE, cells, has_number, is_word
-from fieldsid.logs.readers._clock import inventory_of_table
-from fieldsid.logs.readers._columns import Columns, own_map_of, series_of, used_by
+from fieldsid.logs.readers._columns import Columns, used_by
 from fieldsid.logs.readers._plain_text import HEAD, PlainText, plain_text
+from fieldsid.logs.readers._tables import Table, table_reader
 from fieldsid.logs.readers._text import LOOKED_AT, Form, form_of
 from fieldsid.logs.readers._unpacked import GZIP, LONGEST_ROW, refuse_endless
 from fieldsid.logs.run import Note
@@ -67,28 +67,14 @@ def sniff(path: Path) -> bool:
     return not path.is_dir() and (head_of(path).startswith(GZIP) or is_text(path))
 
 
-def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
-    """Return the columns with their count of numbers, the table's rate and the first values."""
-    with opened(path, form, options) as table:
-        columns = table.columns(range(table.form.width))
-        written = table.form
-        found = TableForm(
-            written.separator, bool(written.names), written.start, form.encoding, "," if written.decimal == "," else "."
-        )
-        return inventory_of_table(path, "text table", columns, options, table=found, notes=table.notes)
-
-
-def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
-    """Return the mapped columns; raises MappingError for a column that is not there, LogError for cells that are no numbers."""
-    with opened(path, mapping.table, options) as table:
-        columns = table.columns(used_by(mapping, table.form.names, table.form.width))
-        return series_of(path, columns, mapping, tuple(table.notes), options)
-
-
-def columns_of(path: Path, form: TableForm, options: ReadOptions) -> tuple[Columns, tuple[Note, ...]]:
-    """Return all columns of a table, and notes on it; raises LogError where it is none."""
-    with opened(path, form, options) as table:
-        return table.columns(range(table.form.width)), tuple(table.notes)
+def table(path: Path, form: TableForm, options: ReadOptions, mapping: ChannelMap | None) -> Table:
+    """Return the columns of a text table that a mapping names, or all, with its form; raises LogError where it is no table."""
+    with opened(path, form, options) as text:
+        written = text.form
+        columns = text.columns(range(written.width) if mapping is None else used_by(mapping, written.names, written.width))
+        sign: Literal[".", ","] = "," if written.decimal == "," else "."
+        found = TableForm(written.separator, bool(written.names), written.start, form.encoding, sign)
+        return Table(columns, found, tuple(text.notes))
 
 
 def names_of(path: Path) -> tuple[str, ...]:
@@ -96,11 +82,6 @@ def names_of(path: Path) -> tuple[str, ...]:
     with plain_text(path, None, limit=HEAD) as text:
         head = _head_of(path, text)
         return form_of(head, TableForm(), path).names if head.strip() else ()
-
-
-def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
-    """Return the mapping of a table with canonical names, or None."""
-    return own_map_of(names_of(path))
 
 
 def _head_of(path: Path, text: PlainText) -> str:
@@ -303,13 +284,12 @@ def _exact(version: str) -> dict[str, Any]:
     return {} if (major, minor) >= (3, 1) else {"float_precision": "round_trip"}
 
 
-READER = Reader(
-    name="csv_table",
-    says="text table: .csv, .csv.gz, .tsv, .txt, .dat",
-    suffixes=(".csv", ".csv.gz", ".tsv", ".txt", ".dat"),
-    sniff=sniff,
-    inventory=inventory,
-    read=read,
-    own_map=own_map,
-    names_of=names_of,
+READER = table_reader(
+    "csv_table",
+    "text table: .csv, .csv.gz, .tsv, .txt, .dat",
+    (".csv", ".csv.gz", ".tsv", ".txt", ".dat"),
+    "text table",
+    sniff,
+    table,
+    names_of,
 )

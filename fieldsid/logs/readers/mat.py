@@ -13,10 +13,10 @@ import numpy as np
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.readers._clock import inventory_of_table
-from fieldsid.logs.readers._columns import Columns, own_map_of, series_of
+from fieldsid.logs.reader import ReadOptions
+from fieldsid.logs.readers._columns import Columns
 from fieldsid.logs.readers._mat_elements import refuse_damaged
+from fieldsid.logs.readers._tables import Table, table_reader
 from fieldsid.logs.readers._topics import library
 from fieldsid.logs.readers._unpacked import UnpackedSize
 from fieldsid.logs.unknown_file import head_of, unreadable
@@ -111,27 +111,17 @@ def _of_hdf5(path: Path) -> Iterator[tuple[str, FloatArray]]:
     yield from found
 
 
-def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
-    """Return the columns with their count of numbers, rate and first values; raises LogError where there are none."""
-    return inventory_of_table(path, "MATLAB file", _columns(path), options)
+def table(path: Path, form: TableForm, options: ReadOptions, mapping: ChannelMap | None) -> Table:
+    """Return the columns of a file; raises LogError where there are none."""
+    return Table(_columns(path))
 
 
-def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
-    """Return the mapped columns; raises MappingError for one that is not there."""
-    return series_of(path, _columns(path), mapping, (), options)
-
-
-def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
-    """Return the mapping of a file with canonical names, or None."""
-    return own_map_of(_columns(path).names)
-
-
-READER = Reader(
-    name="mat",
-    says="MATLAB file: .mat, of version 7.3 with the extra `matlab`",
-    suffixes=(".mat",),
-    sniff=sniff,
-    inventory=inventory,
-    read=read,
-    own_map=own_map,
+READER = table_reader(
+    "mat",
+    "MATLAB file: .mat, of version 7.3 with the extra `matlab`",
+    (".mat",),
+    "MATLAB file",
+    sniff,
+    table,
+    lambda path: _columns(path).names,
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,9 @@ import numpy as np
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.mapping.vocabulary import TIME
-from fieldsid.logs.reader import MOST_CHANNELS, Inventory, RawLog, Reader, ReadOptions, Series
-from fieldsid.logs.readers._clock import inventory_of_table
-from fieldsid.logs.readers._columns import Columns, own_map_of, series_of
+from fieldsid.logs.reader import MOST_CHANNELS, RawLog, ReadOptions, Series
+from fieldsid.logs.readers._columns import Columns, own_map_of
+from fieldsid.logs.readers._tables import Table, table_reader
 from fieldsid.logs.readers._unpacked import UnpackedSize, refuse_repeated
 from fieldsid.logs.run import COLUMNS, Note
 from fieldsid.logs.several.run_names import stem_of
@@ -36,25 +37,22 @@ def sniff(path: Path) -> bool:
     return head_of(path).startswith(MAGIC)
 
 
-def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
-    """Return the columns with their count of numbers and first values."""
-    table = _table(path)
-    more = len(import_module("pyarrow.parquet").read_schema(path).names) - len(table.column_names)
-    return inventory_of_table(path, "Parquet table", _columns(path, table), options, more=more)
+def table(path: Path, form: TableForm, options: ReadOptions, mapping: ChannelMap | None) -> Table:
+    """Return the columns of a table of any program; raises LogError where it cannot be read."""
+    found = _table(path)
+    names = tuple(found.column_names)
+    columns = Columns(path, names, len(names), lambda i: _cells(found.column(i)))
+    return Table(columns, more=len(_schema_of(path).names) - len(names))
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     """Return the mapped columns; a Run of this package is returned as it was written, unless a mapping file is used."""
-    table = _table(path)
-    notes = _notes_of_ours(path, table)
-    if notes is not None and mapping.origin is None:
-        return RawLog(stem_of(path), _series_of_ours(path, table), notes, finished=True)
-    return series_of(path, _columns(path, table), mapping, (), options)
-
-
-def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
-    """Return the mapping of a table with canonical names, or None."""
-    return own_map_of(_schema_of(path).names)
+    if mapping.origin is None and METADATA_KEY in (_schema_of(path).metadata or {}):
+        found = _table(path)
+        notes = _notes_of_ours(path, found)
+        if notes is not None:
+            return RawLog(stem_of(path), _series_of_ours(path, found), notes, finished=True)
+    return ANY_TABLE.read(path, mapping, options)
 
 
 def names_of(path: Path) -> tuple[str, ...]:
@@ -68,16 +66,6 @@ def _schema_of(path: Path) -> Any:
         return import_module("pyarrow.parquet").read_schema(path)
     except (OSError, ValueError) as error:
         raise _unreadable(path, error) from error
-
-
-def columns_of(path: Path, form: TableForm, options: ReadOptions) -> tuple[Columns, tuple[Note, ...]]:
-    """Return all columns of a table, and no notes; raises LogError where it cannot be read."""
-    return _columns(path, _table(path)), ()
-
-
-def _columns(path: Path, table: Any) -> Columns:
-    names = tuple(table.column_names)
-    return Columns(path, names, len(names), lambda i: _cells(table.column(i)))
 
 
 def _table(path: Path) -> Any:
@@ -178,13 +166,5 @@ def _cells(column: Any) -> Any:
     return cells
 
 
-READER = Reader(
-    name="parquet",
-    says="Parquet table, ours or any other",
-    suffixes=(".parquet",),
-    sniff=sniff,
-    inventory=inventory,
-    read=read,
-    own_map=own_map,
-    names_of=names_of,
-)
+ANY_TABLE = table_reader("parquet", "Parquet table, ours or any other", (".parquet",), "Parquet table", sniff, table, names_of)
+READER = replace(ANY_TABLE, read=read, own_map=lambda path, _: own_map_of(_schema_of(path).names))

@@ -6,10 +6,9 @@ The tables are joined like the topics of any other log.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,6 @@ from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.guesses import quaternion_of
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.reader import JOINED, TABLE, Inventory, RawLog, Reader, ReadOptions, reader_of
-from fieldsid.logs.readers import csv_table, parquet
 from fieldsid.logs.readers._clock import Clock, clock_of
 from fieldsid.logs.readers._columns import Columns, canonical_sources, numbers_mostly
 from fieldsid.logs.readers._tables_of_run import names_in_run, run_of, runs_in
@@ -32,11 +30,6 @@ from fieldsid.logs.readers._topics import MOST_DEVICES, Means, Topic, Topics, in
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import name_of_run
 from fieldsid.numerics.arrays import FloatArray
-
-TABLES: Mapping[str, Callable[[Path, TableForm, ReadOptions], tuple[Columns, tuple[Note, ...]]]] = MappingProxyType(
-    {csv_table.READER.name: csv_table.columns_of, parquet.READER.name: parquet.columns_of}
-)
-"""Functions that return the columns and notes of one table, by the name of its reader."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,19 +116,19 @@ def _parts_of_table(
 ) -> tuple[dict[str, Part], list[Note]]:
     """Return the parts of one table, and notes with its name; raises LogError for a file that is no table."""
     reader = reader_of(file)
-    if reader.name not in TABLES:
+    if reader.table is None:
         raise LogError(
             f"`{file}` is no table, and only tables are joined", found=reader.says, hint="import it by itself, as it is"
         )
-    columns, notes = TABLES[reader.name](file, form, replace(options, progress=lambda _: None))
+    table = reader.table(file, form, replace(options, progress=lambda _: None), None)
     found = {}
-    for device, rows in devices_of(columns).items():
+    for device, rows in devices_of(table.columns).items():
         known = mapping.time if mapping.time is not None and set(mapping.time.places) <= {*rows.names} else None
         clock = clock_of(rows, known)
         topic = None if clock is None else topic_of(clock.time + clock.origin_s, _numbers(rows, clock))
         if clock is not None and topic is not None and topic.time.size > 1 and topic.fields:
             found[name + device] = Part(file, topic, _counts_from(clock))
-    return found, [replace(note, message=f"{file.name}: {note.message}") for note in notes]
+    return found, [replace(note, message=f"{file.name}: {note.message}") for note in table.notes]
 
 
 def _numbers(columns: Columns, clock: Clock) -> dict[str, FloatArray]:

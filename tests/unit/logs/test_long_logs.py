@@ -37,13 +37,13 @@ def write_table(path, last="0.5"):
 @pytest.mark.parametrize("rows", [1, 7, 64, 199, 200, 1000])
 def test_a_table_is_the_same_in_blocks_of_any_size(tmp_path, monkeypatch, rows):
     path = write_table(tmp_path / "run.csv")
-    at_once, listed = load_run(path), csv_table.inventory(path, ReadOptions(), TableForm())
+    at_once, listed = load_run(path), csv_table.READER.inventory(path, ReadOptions(), TableForm())
     monkeypatch.setattr(csv_table, "BLOCK_ROWS", rows)
     run = load_run(path)
     np.testing.assert_array_equal(run.time, at_once.time)
     for signal in at_once.signals:
         np.testing.assert_array_equal(run[signal], at_once[signal])
-    again = csv_table.inventory(path, ReadOptions(), TableForm())
+    again = csv_table.READER.inventory(path, ReadOptions(), TableForm())
     for mine, theirs in zip(again.channels, listed.channels, strict=True):
         assert (mine.name, mine.kind, mine.count, mine.fields[0].span) == (
             theirs.name,
