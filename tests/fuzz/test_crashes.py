@@ -23,7 +23,7 @@ from fieldsid.fitting.problem.parameters import layout_of
 from fieldsid.logs import load_run
 from fieldsid.logs.inspection import inspect_log
 from fieldsid.logs.mapping.mapping_file import load_mapping
-from fieldsid.logs.readers._mat_elements import refuse_damaged
+from fieldsid.logs.readers._mat_elements import arrays_of
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import load_model
@@ -259,12 +259,12 @@ def in_mat(tmp_path, at, value, name=b"yaw_rad\0"):
 
 @pytest.mark.parametrize(("at", "value"), [(8, 99), (24, 2**31), (16, 77), (40, 200), (44, 2**30), (40, 8)])
 def test_a_matlab_file_that_would_end_the_process_is_refused(tmp_path, at, value):
-    refuse_damaged(write_mat(tmp_path / "good.mat", TIME, SIGNALS))
+    assert len(dict(arrays_of(write_mat(tmp_path / "good.mat", TIME, SIGNALS)))) == len(SIGNALS) + 2
     with pytest.raises(LogError, match="is a MATLAB file that is damaged"):
         load_run(in_mat(tmp_path, at, value))
 
 
-def test_matlab_arrays_of_every_class_pass(tmp_path):
+def test_matlab_arrays_of_numbers_are_read_among_those_of_every_class(tmp_path):
     import scipy.io
     import scipy.sparse
 
@@ -277,10 +277,16 @@ def test_matlab_arrays_of_every_class_pass(tmp_path):
         "struct": {"a": 1, "b": {"c": "text", "d": []}},
         "structs": np.array([(1, 2.0), (3, 4.0)], dtype=[("u", int), ("v", float)]),
         "logical": np.array([True, False]),
+        "matrix": np.arange(6, dtype=np.int16).reshape(2, 3),
+        "cube": np.arange(24.0).reshape(2, 3, 4),
     }
+    numbers = {"none", "logical", "matrix", "cube"}
     for packed in (False, True):
         scipy.io.savemat(tmp_path / "log.mat", held, do_compression=packed)
-        refuse_damaged(tmp_path / "log.mat")
+        found = dict(arrays_of(tmp_path / "log.mat"))
+        assert found.keys() == {"a", "b.d", *numbers}
+        by_scipy = scipy.io.loadmat(tmp_path / "log.mat")
+        assert all(np.array_equal(found[name], by_scipy[name]) for name in numbers)
 
 
 def test_a_position_of_one_column_is_refused(tmp_path):

@@ -22,7 +22,7 @@ from fieldsid.cli.app import main
 from fieldsid.errors import ArtifactError, LogError, UsageError
 from fieldsid.exports._patch import patch_yaml
 from fieldsid.logs.inspection import inspect_log
-from fieldsid.logs.readers._mat_elements import refuse_damaged
+from fieldsid.logs.readers._mat_elements import arrays_of
 from fieldsid.logs.readers._unpacked import SMALL, UnpackedSize
 from fieldsid.logs.readers.bags.messages.definitions import _parsed
 from fieldsid.logs.readers.bags.messages.message_layout import refuse_endless
@@ -180,7 +180,7 @@ def test_a_packed_variable_of_a_matlab_file_is_unpacked_up_to_a_size(tmp_path):
     packed = zlib.compress(bytes(SMALL + 4096), 9)
     path.write_bytes(path.read_bytes()[:128] + (15).to_bytes(4, "little") + len(packed).to_bytes(4, "little") + packed)
     with pytest.raises(LogError, match="unpacks to far more"):
-        refuse_damaged(path)
+        list(arrays_of(path))
 
 
 def test_lines_that_unpack_without_end_are_refused(tmp_path):

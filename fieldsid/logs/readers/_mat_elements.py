@@ -1,7 +1,8 @@
-"""Check the elements of a MATLAB file of version 5 before scipy reads them.
+"""Read the numbers of a MATLAB file of version 5: its numeric arrays, and those in the fields of its structs.
 
-The compiled reader of scipy trusts types and lengths: a damaged one ends the process, with no error to catch. The layout is that
-of MathWorks, MAT-File Format (2024), chapter 1: tags of a type and a length, arrays as elements inside elements.
+A compiled reader that trusts types and lengths would end the process at a damaged one. The layout is that of MathWorks, MAT-File
+Format (2024), chapter 1: tags of a type and a length, arrays as elements inside elements. Arrays that hold no columns (texts,
+cells, objects, sparse and complex ones) are passed over.
 """
 
 from __future__ import annotations
@@ -11,6 +12,10 @@ import zlib
 from collections.abc import Iterator
 from math import prod
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from fieldsid.errors import LogError
 from fieldsid.logs.readers._unpacked import UnpackedSize
@@ -18,31 +23,33 @@ from fieldsid.logs.unknown_file import COPY_AGAIN
 
 HEAD = 128
 MATRIX, COMPRESSED = 14, 15
-NUMBERS = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}
-"""Bytes of a number by the type of its element."""
-TEXT = {**NUMBERS, 16: 1, 17: 1, 18: 1}
-CELL, STRUCT, OBJECT, CHAR, SPARSE, FUNCTION, OPAQUE = 1, 2, 3, 4, 5, 16, 17
-NUMERIC = range(6, 16)
+NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+"""NumPy's type of a number by the type of its element."""
+STRUCT, NUMERIC, CLASSES = 2, range(6, 16), range(1, 18)
 COMPLEX = 0x0800
-MOST_DIMENSIONS = 32
-DEEPEST = 50
+DEEPEST = 5
 NAMES, INTEGERS = (1, 2, 16), (5, 6)
+Arrays = Iterator[tuple[str, npt.NDArray[Any]]]
+"""Numeric arrays by name; the name of a field inside a struct of a struct has the names of the structs before it."""
 
 
 class _DamagedError(Exception):
     """An element that the format does not allow."""
 
 
-def refuse_damaged(path: Path) -> None:
-    """Raise LogError where an element of a file has a type, a length or a dimension that the format does not allow."""
+def arrays_of(path: Path) -> Arrays:
+    """Yield the numeric arrays of a file.
+
+    Raises LogError where an element has a type, a length or a dimension that the format does not allow.
+    """
     data, size = path.read_bytes(), UnpackedSize(path)
     try:
-        _check_file(memoryview(data), size)
+        yield from _arrays_in_file(memoryview(data), size)
     except (_DamagedError, zlib.error, struct.error) as error:
         raise LogError(f"`{path}` is a MATLAB file that is damaged", found=str(error), hint=COPY_AGAIN) from error
 
 
-def _check_file(data: memoryview, size: UnpackedSize) -> None:
+def _arrays_in_file(data: memoryview, size: UnpackedSize) -> Arrays:
     order = {b"IM": "<", b"MI": ">"}.get(bytes(data[126:128]))
     if order is None:
         raise _DamagedError("no mark of the order of bytes")
@@ -51,7 +58,7 @@ def _check_file(data: memoryview, size: UnpackedSize) -> None:
         for inner, array in ((kind, body),) if packed is None else _elements(packed, order, padded=False):
             if inner != MATRIX:
                 raise _DamagedError(f"an element of type {inner} among the variables")
-            _check_array(array, order, 0)
+            yield from _arrays_in(array, order, "", 0)
 
 
 def _unpacked(body: memoryview, size: UnpackedSize) -> memoryview:
@@ -86,51 +93,27 @@ def _elements(data: memoryview, order: str, *, padded: bool = True) -> Iterator[
         at = after
 
 
-def _check_array(data: memoryview, order: str, depth: int) -> None:
-    """Check one array and the arrays inside it; raises _DamagedError."""
-    if depth > DEEPEST:
-        raise _DamagedError(f"arrays inside arrays, {depth} deep")
-    if not len(data):
+def _arrays_in(data: memoryview, order: str, name: str, depth: int) -> Arrays:
+    """Yield one array, or the arrays in the fields of one struct; `name` is that of a field, and empty for a variable."""
+    if not len(data) or depth > DEEPEST:
         return
     parts = _elements(data, order)
-    flags = _next(parts, INTEGERS)
-    if len(flags) != 8:
-        raise _DamagedError(f"flags of {len(flags)} bytes")
-    (word,) = struct.unpack_from(f"{order}I", flags)
-    inner = _skipped_opaque(parts) if word & 0xFF == OPAQUE else _checked_array(parts, order, word)
-    if inner * 8 > len(data):
-        raise _DamagedError(f"{inner} arrays in {len(data)} bytes")
-    for _ in range(inner):
-        _check_array(_next(parts, (MATRIX,)), order, depth + 1)
-
-
-def _skipped_opaque(parts: Iterator[tuple[int, memoryview]]) -> int:
-    """Skip the three names of an object that only MATLAB can read; return how many arrays follow."""
-    for _ in range(3):
-        _next(parts, NAMES)
-    return 1
-
-
-def _checked_array(parts: Iterator[tuple[int, memoryview]], order: str, word: int) -> int:
-    """Check the dimensions, the name and the numbers of an array whose flags are `word`; return how many arrays follow."""
-    size = _next(parts, INTEGERS)
-    dimensions: tuple[int, ...] = struct.unpack(f"{order}{len(size) // 4}i", size[: len(size) // 4 * 4])
-    if not 1 <= len(dimensions) <= MOST_DIMENSIONS or min(dimensions) < 0:
-        raise _DamagedError(f"an array of {dimensions}")
-    _next(parts, NAMES)
-    kind, parts_of_number = word & 0xFF, 2 if word & COMPLEX else 1
-    if kind in (CELL, STRUCT, OBJECT):
-        return prod(dimensions) * (1 if kind == CELL else _fields(parts, order, has_class=kind == OBJECT))
-    if kind in NUMERIC:
-        for _ in range(parts_of_number):
-            _numbers(parts, prod(dimensions))
-    elif kind == CHAR:
-        _text(parts)
-    elif kind == SPARSE:
-        _sparse(parts, order, dimensions, parts_of_number)
-    elif kind != FUNCTION:
+    (word,) = struct.unpack(f"{order}I4x", _next(parts, INTEGERS))
+    kind = word & 0xFF
+    if kind not in CLASSES:
         raise _DamagedError(f"an array of class {kind}")
-    return 1 if kind == FUNCTION else 0
+    if kind != STRUCT and (kind not in NUMERIC or word & COMPLEX):
+        return
+    stated = _next(parts, INTEGERS)
+    dimensions = struct.unpack(f"{order}{len(stated) // 4}i", stated)
+    if not dimensions or min(dimensions) < 0:
+        raise _DamagedError(f"an array of {dimensions}")
+    variable = bytes(_next(parts, NAMES)).decode("latin-1")
+    if kind in NUMERIC:
+        yield name or variable, _numbers(parts, order, dimensions)
+    elif prod(dimensions) == 1:
+        for field in _fields(parts, order):
+            yield from _arrays_in(_next(parts, (MATRIX,)), order, f"{name}.{field}" if name else field, depth + 1)
 
 
 def _next(parts: Iterator[tuple[int, memoryview]], kinds: tuple[int, ...]) -> memoryview:
@@ -140,40 +123,18 @@ def _next(parts: Iterator[tuple[int, memoryview]], kinds: tuple[int, ...]) -> me
     return body
 
 
-def _numbers(parts: Iterator[tuple[int, memoryview]], count: int) -> None:
+def _numbers(parts: Iterator[tuple[int, memoryview]], order: str, dimensions: tuple[int, ...]) -> npt.NDArray[Any]:
     kind, body = next(parts, (0, memoryview(b"")))
-    if kind not in NUMBERS or len(body) != count * NUMBERS[kind]:
-        raise _DamagedError(f"{count} numbers in an element of type {kind} of {len(body)} bytes")
+    number = np.dtype(f"{order}{NUMBERS.get(kind, 'V1')}")
+    if kind not in NUMBERS or len(body) != prod(dimensions) * number.itemsize:
+        raise _DamagedError(f"{prod(dimensions)} numbers in an element of type {kind} of {len(body)} bytes")
+    return np.frombuffer(body, number).reshape(dimensions, order="F")
 
 
-def _text(parts: Iterator[tuple[int, memoryview]]) -> None:
-    # The number of bytes of a letter depends on its encoding, and an empty text has no element at all.
-    kind, body = next(parts, (0, memoryview(b"")))
-    if len(body) and kind not in TEXT:
-        raise _DamagedError(f"letters in an element of type {kind}")
-
-
-def _sparse(parts: Iterator[tuple[int, memoryview]], order: str, dimensions: tuple[int, ...], parts_of_number: int) -> None:
-    rows, starts = (_next(parts, INTEGERS) for _ in range(2))
-    of_row = struct.unpack(f"{order}{len(rows) // 4}i", rows[: len(rows) // 4 * 4])
-    of_column = struct.unpack(f"{order}{len(starts) // 4}i", starts[: len(starts) // 4 * 4])
-    fits = len(dimensions) == 2 and len(of_column) == dimensions[1] + 1 and sorted(of_column) == list(of_column)
-    fits = fits and of_column[0] == 0 and of_column[-1] <= len(of_row)
-    if not fits or any(not 0 <= r < dimensions[0] for r in of_row[: of_column[-1]]):
-        raise _DamagedError(f"a sparse array of {dimensions} whose places lie outside of it")
-    for _ in range(parts_of_number):
-        _next(parts, tuple(NUMBERS))  # MATLAB declares logical values as doubles and writes bytes: their length cannot be checked
-
-
-def _fields(parts: Iterator[tuple[int, memoryview]], order: str, *, has_class: bool) -> int:
-    """Return the number of fields of a struct: the length of all names over that of one name."""
-    if has_class:
-        _next(parts, NAMES)
-    width = _next(parts, INTEGERS)
-    if len(width) != 4:
-        raise _DamagedError(f"the length of a field's name in {len(width)} bytes")
-    longest = int(struct.unpack(f"{order}i", width)[0])
-    names = _next(parts, NAMES)
+def _fields(parts: Iterator[tuple[int, memoryview]], order: str) -> list[str]:
+    """Return the names of the fields of a struct, which all have the same number of bytes."""
+    (longest,) = struct.unpack(f"{order}i", _next(parts, INTEGERS))
+    names = bytes(_next(parts, NAMES))
     if longest <= 0 or len(names) % longest:
         raise _DamagedError(f"names of {longest} bytes in {len(names)}")
-    return len(names) // longest
+    return [names[at : at + longest].partition(b"\0")[0].decode("latin-1") for at in range(0, len(names), longest)]

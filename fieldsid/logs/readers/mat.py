@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import warnings
 from collections import Counter
 from collections.abc import Iterator
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +13,7 @@ from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.readers._columns import Columns
-from fieldsid.logs.readers._mat_elements import refuse_damaged
+from fieldsid.logs.readers._mat_elements import arrays_of
 from fieldsid.logs.readers._tables import Table, table_reader
 from fieldsid.logs.readers._topics import library
 from fieldsid.logs.readers._unpacked import UnpackedSize
@@ -24,7 +22,6 @@ from fieldsid.numerics.arrays import FloatArray
 
 MAGIC = b"MATLAB "
 HDF5 = b"MATLAB 7.3"
-DEEPEST = 5
 SHORTEST = 3
 WIDEST = 64
 _FAILURES = (ValueError, TypeError, KeyError, IndexError, OSError, EOFError, NotImplementedError, OverflowError, MemoryError)
@@ -57,31 +54,9 @@ def _filled_rows(columns: list[FloatArray]) -> int:
 
 
 def _of_mat(path: Path) -> Iterator[tuple[str, FloatArray]]:
-    scipy_io = import_module("scipy.io")
-    refuse_damaged(path)
-    try:
-        with warnings.catch_warnings():
-            # scipy warns of objects without a name, which contain no columns
-            warnings.simplefilter("ignore", scipy_io.matlab.MatReadWarning)
-            variables = scipy_io.loadmat(str(path), squeeze_me=True, struct_as_record=False)
-    except _FAILURES as error:
-        raise unreadable(path, "a MATLAB file that cannot be read", error) from error
-    except Exception as error:  # scipy raises its own kind, and zlib another
-        if type(error).__module__.partition(".")[0] not in ("scipy", "zlib"):
-            raise
-        raise unreadable(path, "a MATLAB file that cannot be read", error) from error
-    for name, value in variables.items():
-        if not name.startswith("__"):
-            yield from _columns_in(name, value, 0)
-
-
-def _columns_in(name: str, value: Any, depth: int) -> Iterator[tuple[str, FloatArray]]:
-    """Yield the columns of a variable: a vector, the columns of a matrix, or those of a struct's fields."""
-    if hasattr(value, "_fieldnames") and depth < DEEPEST:
-        for part in value._fieldnames:  # noqa: SLF001 - scipy's only list of a struct's fields
-            yield from _columns_in(part if depth == 0 else f"{name}.{part}", getattr(value, part), depth + 1)
-    elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
-        yield from _of_array(name, value)
+    for name, array in arrays_of(path):
+        if name:  # the workspace of function handles has none
+            yield from _of_array(name, np.squeeze(array))
 
 
 def _of_array(name: str, value: Any) -> Iterator[tuple[str, FloatArray]]:
