@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -104,38 +105,28 @@ class Importer:
         self, log: Path, fin_max_rad: Mapping[str, float] | None = None, progress: Callable[[float], None] | None = None
     ) -> list[Run]:
         """Return the runs of one log: its stretches under way, each examined separately, or what `part` or `whole` select."""
+        load = partial(
+            load_run,
+            log,
+            self.mapping,
+            channels=self._sources(),
+            fin_max_rad=fin_max_rad,
+            progress=progress,
+            msg_path=self.msg_path,
+            joined=self.joined,
+            salvage=self.salvage,
+            recognise=self.recognise,
+            otherwise=self.otherwise,
+        )
         if self.whole or self.part != WHOLE:
-            return [self._load(log, fin_max_rad, progress, self.part, self.max_gap_s)]
-        return runs_under_way(lambda part, gap: self._load(log, fin_max_rad, progress, part, gap), self.max_gap_s)
+            return [load(part=self.part, max_gap_s=self.max_gap_s)]
+        return runs_under_way(lambda part, gap: load(part=part, max_gap_s=gap), self.max_gap_s)
 
     def places(self, target: Path, count: int) -> list[Path]:
         """Return the output file of each of `count` runs of a log: the target, with a number appended where there are several."""
         suffix = next(s for s in SUFFIXES if target.name.endswith(s))
         stem = target.name.removesuffix(suffix)
         return [target] if count == 1 else [target.with_name(f"{stem}_{i + 1}{suffix}") for i in range(count)]
-
-    def _load(
-        self,
-        log: Path,
-        fin_max_rad: Mapping[str, float] | None,
-        progress: Callable[[float], None] | None,
-        part: tuple[float, float],
-        max_gap_s: float,
-    ) -> Run:
-        return load_run(
-            log,
-            self.mapping,
-            channels=self._sources(),
-            msg_path=self.msg_path,
-            joined=self.joined,
-            salvage=self.salvage,
-            max_gap_s=max_gap_s,
-            part=part,
-            fin_max_rad=fin_max_rad,
-            progress=progress,
-            recognise=self.recognise,
-            otherwise=self.otherwise,
-        )
 
     def write(self, run: Run, path: Path, *, force: bool = False) -> Imported:
         """Write a run under the name of its file and return what was written."""
