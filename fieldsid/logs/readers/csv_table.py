@@ -160,53 +160,47 @@ class _Table:
                     raise
                 return self._parsed(wanted)
 
-    def _copied(self, plain: IO[bytes], line_of: Callable[[bytes], bytes]) -> None:
-        """Replace the text by a copy of the rows, each as `line_of` returns it."""
+    def _replaced(self, plain: IO[bytes], change: Callable[[bytes], tuple[bytes, list[bytes]]]) -> list[str]:
+        """Replace the text by a copy of its rows, and return what was left out of them.
+
+        `change` returns a row as it is copied, with what it leaves out.
+        """
+        found: list[str] = []
+
+        def copied(raw: bytes) -> bytes:
+            row, left_out = change(raw)
+            found.extend(part.decode(self.text.encoding, errors="replace").strip() for part in left_out)
+            return row
+
         with self.text.between(self.begin, self.end) as rows:
-            plain.writelines(map(line_of, rows))
+            plain.writelines(map(copied, rows))
         self.text = replace(self.text, stream=plain, size=plain.tell(), encoding=self.text.encoding.removesuffix("-sig"))
         self.begin, self.end = 0, plain.tell()
+        return found
 
     def _without_errors(self, plain: IO[bytes]) -> None:
         """Replace each cell by which a program marks that there is no number by an empty one."""
-        found: list[bytes] = []
-
-        def without(raw: bytes) -> bytes:
-            errors = ERRORS.findall(raw) if b"#" in raw else []
-            found.extend(errors)
-            return ERRORS.sub(b"", raw) if errors else raw
-
-        self._copied(plain, without)
+        found = self._replaced(plain, lambda raw: (ERRORS.sub(b"", raw), ERRORS.findall(raw)) if b"#" in raw else (raw, []))
         if found:
-            message = f"cells that say there is no number, as {found[0].decode()!r}, taken as missing: {len(found)}"
+            message = f"cells that say there is no number, as {found[0]!r}, taken as missing: {len(found)}"
             self.notes.append(Note("error_cells", message, {"count": len(found)}))
 
     def _without_sentences(self, plain: IO[bytes]) -> None:
         """Replace each sentence of NMEA between the rows by an empty line."""
-        found: list[bytes] = []
-
-        def without(raw: bytes) -> bytes:
-            is_sentence = SENTENCE.match(raw) is not None
-            found.extend([raw] if is_sentence else [])
-            return b"\n" if is_sentence else raw
-
-        self._copied(plain, without)
+        found = self._replaced(plain, lambda raw: (b"\n", [raw]) if SENTENCE.match(raw) else (raw, []))
         if found:
-            first = found[0].decode("latin-1").strip()[:60]
-            message = f"lines of another talker (NMEA 0183) between the rows, left out: {len(found)}, the first {first!r}"
+            message = f"lines of another talker (NMEA 0183) between the rows, left out: {len(found)}, the first {found[0][:60]!r}"
             self.notes.append(Note("nmea_lines", message, {"count": len(found)}))
 
     def _without_words(self, plain: IO[bytes]) -> bool:
         """Replace each line without a number by an empty one; return whether there was such a line."""
-        found: list[str] = []
 
-        def without(raw: bytes) -> bytes:
+        def change(raw: bytes) -> tuple[bytes, list[bytes]]:
             line = raw.decode(self.text.encoding, errors="replace").strip()
             is_row = not line or line.startswith("#") or has_number(line, self.form.separator, self.form.decimal)
-            found.extend([] if is_row else [line])
-            return raw if is_row else b"\n"
+            return (raw, []) if is_row else (b"\n", [raw])
 
-        self._copied(plain, without)
+        found = self._replaced(plain, change)
         if found:
             message = f"lines of words between the rows, left out: {len(found)}, the first {found[0][:60]!r}"
             self.notes.append(Note("text_rows", message, {"count": len(found)}))
