@@ -119,17 +119,8 @@ def _source(columns: Columns, index: int) -> Source:
         date = dates_beside(columns, (index,)) if clock is not None and clock.period_s == DAY_S else ()
         if date:
             return Source(column=place, date=tuple(map(columns.place, date)))
-    unit = columns.unit(index, TIME) or unit_by_size(cells)
+    unit = columns.unit(index, TIME) or likely_time_unit(cells)
     return Source(column=place, unit=unit)
-
-
-def unit_by_size(cells: npt.NDArray[Any]) -> str | None:
-    """Return the likely unit of a column (n,) of times by its size and its median step; None where it is not numeric."""
-    if cells.dtype.kind not in "iuf" or not cells.size:
-        return None
-    steps = np.diff(cells[np.isfinite(cells)].astype(np.float64))
-    ahead = steps[steps > 0.0]  # most steps of stamps with too few digits are zero
-    return likely_time_unit(cells, float(np.median(ahead)) if ahead.size else 0.0)
 
 
 def _clock_from(columns: Columns, source: Source) -> Clock | None:
@@ -138,7 +129,7 @@ def _clock_from(columns: Columns, source: Source) -> Clock | None:
     cells = columns.take(first)
     if not cells.size:
         return None
-    unit = source.unit if source.columns else source.unit or unit_in_name(columns.name(first), TIME) or unit_by_size(cells)
+    unit = source.unit if source.columns else source.unit or unit_in_name(columns.name(first), TIME) or likely_time_unit(cells)
     try:
         time, notes = time_of(columns, source, unit, ReadOptions(salvage=True))
     except FieldsidError:  # the column is no time

@@ -13,14 +13,13 @@ import numpy.typing as npt
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import TableForm
 from fieldsid.logs.convert.number_cells import as_numbers
-from fieldsid.logs.convert.times.time_column import seconds_of
+from fieldsid.logs.convert.times.time_column import likely_time_unit, seconds_of
 from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.readers import csv_table
 from fieldsid.logs.readers._cells import cells, is_word
-from fieldsid.logs.readers._clock import unit_by_size
 from fieldsid.logs.readers._columns import Columns
 from fieldsid.logs.readers._plain_text import HEAD, plain_text
 from fieldsid.logs.readers._text import LOOKED_AT, Form, form_of
@@ -85,7 +84,7 @@ def _times(columns: Columns, place: int) -> tuple[FloatArray, list[Note]]:
     import pandas as pd
 
     rows, stamps = pd.factorize(columns.take(place))
-    unit = columns.unit(place, TIME) or unit_by_size(stamps)
+    unit = columns.unit(place, TIME) or likely_time_unit(stamps)
     time, notes = seconds_of(stamps, unit, ReadOptions(salvage=True), name=columns.name(place))
     return np.where(rows >= 0, time[rows], np.nan), notes
 

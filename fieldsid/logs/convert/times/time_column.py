@@ -96,13 +96,11 @@ def seconds_of(
     if unit in FORMS or (dates and cells.dtype.kind == "O"):
         return _from_clock(_clock(column, unit if unit in FORMS else None), column, dates)
     if cells.dtype.kind == "M":
-        return _of_integers(cells.astype("datetime64[ns]").astype(np.int64), 1e-9, column)
+        return _of_stamps(cells.astype("datetime64[ns]"), column)
     if weeks is not None:
         return _of_weeks(column, unit, weeks)
-    if cells.dtype.kind in "iu":
-        return _of_integers(cells.astype(np.int64), _factor(unit), column)
-    if cells.dtype.kind == "f":
-        return _of_floats(cells.astype(np.float64), _factor(unit), column)
+    if cells.dtype.kind in "iuf":
+        return _of_numbers(cells.astype(np.int64 if cells.dtype.kind in "iu" else np.float64), _factor(unit), column)
     return _of_text(column, unit)
 
 
@@ -126,7 +124,7 @@ def seconds_of_parts(
     return time, [put_together(names, parts, date_names if dates else ()), *notes]
 
 
-def likely_time_unit(cells: npt.NDArray[Any], step: float = 0.0) -> str | None:
+def likely_time_unit(cells: npt.NDArray[Any]) -> str | None:
     """Return the likely unit of numbers of time: by their size, which is characteristic of an epoch, else by their median step.
 
     None where the cells are no numbers. A median step too long for a vehicle's motion in seconds, but plausible in ms, us or ns,
@@ -134,9 +132,11 @@ def likely_time_unit(cells: npt.NDArray[Any], step: float = 0.0) -> str | None:
     """
     if cells.dtype.kind not in "iuf" or not cells.size or not np.isfinite(cells[0]):
         return None
-    size = float(cells[0])
+    size, seen = float(cells[0]), cells[np.isfinite(cells)]
+    steps = np.diff(seen.astype(np.float64))
+    ahead = steps[steps > 0.0]  # most steps of stamps with too few digits are zero
+    step = float(np.median(ahead)) if ahead.size else 0.0
     epoch = "ns" if size > 1e17 else "us" if size > 1e14 else "ms" if size > 1e11 else "d" if _are_days(size, step) else ""
-    seen = cells[np.isfinite(cells)]
     if _are_digits_of_a_clock(seen):
         return "hhmmss"
     if any(low <= size < high for low, high in STAMPS):
@@ -195,31 +195,27 @@ def _factor(unit: str | None) -> float:
     return picked.factor
 
 
-def _of_integers(values: npt.NDArray[np.int64], factor: float, column: _Column) -> tuple[FloatArray, list[Note]]:
-    """Return integer times in s, and notes; the start is subtracted before scaling, so that ns of an epoch keep every digit."""
-    if round_of(values, factor) is not None:
-        return _of_floats(values.astype(np.float64), factor, column)
-    start = int(values[0])
-    time, notes = rebuilt((values - start).astype(np.float64), column.name)
-    if start * factor <= EPOCH_FROM_S:
-        return _scaled(time + start, factor), notes
-    return _scaled(time, factor), [*notes, _origin(start * factor)]
+def _of_numbers(values: npt.NDArray[Any], factor: float, column: _Column) -> tuple[FloatArray, list[Note]]:
+    """Return times (n,) in units of `factor` s in s, and notes.
 
-
-def _of_floats(values: FloatArray, factor: float, column: _Column) -> tuple[FloatArray, list[Note]]:
-    there = np.abs(values) * factor <= LATEST_S
+    The first of integers is subtracted before they become floats, so that ns of an epoch keep every digit; floats remain as they
+    are, because their digits show how they were rounded.
+    """
+    there = np.abs(values.astype(np.float64)) * factor <= LATEST_S
     notes = column.without_time(there)
-    values = values if there.all() else np.where(there, values, np.nan)
     again = round_of(values[there], factor)
+    base = 0 if again is not None or values.dtype.kind == "f" else int(values[0])
+    numbers = (values - base if base else values).astype(np.float64)
+    numbers = numbers if there.all() else np.where(there, numbers, np.nan)
     if again is not None:
-        values, note = without_restarts(values, again, column.name)
+        numbers, note = without_restarts(numbers, again, column.name)
         notes.append(note)
-    values, coarse = rebuilt(values, column.name)
-    seen = values[np.isfinite(values)]
-    start = float(seen[0]) if seen.size else 0.0
-    if start * factor <= EPOCH_FROM_S:
-        return _scaled(values, factor), [*notes, *coarse]
-    return _scaled(values - start, factor), [*notes, *coarse, _origin(start * factor)]
+    numbers, coarse = rebuilt(numbers, column.name)
+    seen = numbers[np.isfinite(numbers)]
+    first = float(seen[0]) if seen.size else 0.0
+    if (base + first) * factor <= EPOCH_FROM_S:
+        return _scaled(numbers + base if base else numbers, factor), [*notes, *coarse]
+    return _scaled(numbers - first, factor), [*notes, *coarse, _origin((base + first) * factor)]
 
 
 def _scaled(values: FloatArray, factor: float) -> FloatArray:
@@ -235,7 +231,7 @@ def _of_text(column: _Column, unit: str | None) -> tuple[FloatArray, list[Note]]
     if not wrong.size or wrong.size < cells.size // 2:
         if wrong.size and not column.options.salvage:
             raise column.error_at("holds cells that are no times", wrong)
-        return _of_floats(values, _factor(unit), column)
+        return _of_numbers(values, _factor(unit), column)
     stamps = _iso(cells)
     if np.isnat(stamps).mean() > 0.5:
         other = stamps_of_text(cells)
@@ -244,9 +240,14 @@ def _of_text(column: _Column, unit: str | None) -> tuple[FloatArray, list[Note]]
         clock = clock_of_text(cells) or clock_behind_dates(cells)
         if clock is not None:
             return _from_clock(clock, column, ())
-    there = ~np.isnat(stamps)
-    if not there.any() and wrong.size < cells.size:
+    if np.isnat(stamps).all() and wrong.size < cells.size:
         raise column.error_at("holds cells that are no times", wrong)
+    return _of_stamps(stamps, column)
+
+
+def _of_stamps(stamps: npt.NDArray[np.datetime64], column: _Column) -> tuple[FloatArray, list[Note]]:
+    """Return the seconds of dates and times (n,) from the first one on, and notes; NaT where a row has none."""
+    there = ~np.isnat(stamps)
     notes = column.without_time(there)
     nanoseconds = stamps.astype(np.int64)
     start = int(nanoseconds[there][0]) if there.any() else 0
