@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -142,14 +142,19 @@ SPELLINGS: Mapping[str, Mapping[str, Unit]] = MappingProxyType(
 _DIMENSION_OF = {"rad": "angle", "rad/s": "angle rate", "m": "length", "m/s": "speed", "1": "ratio", "1/min": "angle rate"}
 
 
-def pick_unit(name: str, dimension: str | None = None) -> Unit:
-    """Return a unit by name or common spelling (`degrees`, `°/s`, `knots`), of `dimension` where several have that spelling.
+def pick_unit(name: str, dimensions: Sequence[str] = (), what: str = "", others: str = "") -> Unit:
+    """Return a unit by name or common spelling (`degrees`, `°/s`, `knots`), of the first dimension where several have it.
 
-    Raises MappingError with the near matches.
+    Raises MappingError with the near matches, or with the units that fit where it has none of the dimensions; `what` is in the
+    unit, and `others` is said after those that fit.
     """
-    found = find_unit(name, dimension)
+    found = find_unit(name, next(iter(dimensions), None))
+    known = [u.name for u in UNITS.values() if not dimensions or u.dimension == dimensions[0]]
     if found is None:
-        raise MappingError(f"there is no unit {name!r}", found=", ".join(UNITS), hint=near(name, UNITS))
+        raise MappingError(f"{what}{': ' * bool(what)}there is no unit {name!r}", found=", ".join(known), hint=near(name, known))
+    if dimensions and found.dimension not in dimensions:
+        hint = f"use a unit of {dimensions[0]}: {', '.join(f'`{u}`' for u in known)}{others}"
+        raise MappingError(f"{what} cannot be in {name!r}", found=f"a unit of {found.dimension}", hint=hint)
     return found
 
 
@@ -180,14 +185,7 @@ def factor_to(signal: str, unit: str) -> float:
     dimension = dimension_of(signal)
     if dimension is None:
         return 1.0
-    picked = pick_unit(unit, dimension)
-    if picked.dimension != dimension:
-        fitting = [u.name for u in UNITS.values() if u.dimension == dimension]
-        raise MappingError(
-            f"`{signal}` cannot be in {picked.name!r}",
-            found=f"{picked.name} is a unit of {picked.dimension}",
-            hint=f"use one of: {', '.join(fitting)}",
-        )
+    picked = pick_unit(unit, (dimension,), f"`{signal}`")
     return picked.factor * 30.0 / math.pi if COLUMNS[signal] == "1/min" else picked.factor
 
 

@@ -17,7 +17,8 @@ from fieldsid.logs.convert.frames import Body, Frame, World
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, SUMMED, counts_unit
 from fieldsid.logs.convert.times.clock_parts import parts_of
 from fieldsid.logs.convert.times.clock_text import FORMS
-from fieldsid.logs.convert.units import UNITS, find_unit
+from fieldsid.logs.convert.times.time_column import time_unit
+from fieldsid.logs.convert.units import find_unit, pick_unit
 from fieldsid.logs.mapping.canonical_names import fitting
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.run import FINS, PART, SIGNALS, signal_of
@@ -229,10 +230,7 @@ def _time(time: _Time, place: str) -> Source:
     if columns:
         parts_of(time.unit, columns, place)
     elif time.unit is not None and time.unit not in FORMS:
-        found = find_unit(time.unit, "time")
-        known = ", ".join([u.name for u in UNITS.values() if u.dimension == "time"] + list(FORMS))
-        is_none = found is None or found.dimension != "time"
-        _refuse(f"{place}:", (is_none, f"time cannot be in {time.unit!r}", time.unit, f"use one of: {known}"))
+        time_unit(time.unit, f"{place}: time")
     date = () if time.date is None else tuple(time.date) if isinstance(time.date, list) else (time.date,)
     return Source(time.column, columns, unit=time.unit, date=date, week=time.week, scale=1.0 / rate if rate else None)
 
@@ -315,15 +313,7 @@ def _check_place(signal: str, item: _Source | _Entry, place: str) -> None:
 
 def _check_unit(signal: str, unit: str, place: str) -> None:
     """Raise MappingError unless the unit is known and fits the signal; a depth may be in a unit of pressure."""
-    dimensions, base_signal = fitting(signal), signal_of(signal)
+    dimensions = fitting(signal)
     if not dimensions or unit == COUNTS or counts_unit(signal, unit) is not None:
         return
-    known = [u.name for u in UNITS.values() if u.dimension == dimensions[0]]
-    found = find_unit(unit, dimensions[0])
-    of_fins = OF_FINS if base_signal in FINS else ""
-    fits = f"use a unit of {dimensions[0]}, such as `{SIGNALS.get(base_signal, 'deg')}`{of_fins}"
-    _refuse(
-        f"{place}: `{signal}`",
-        (found is None, f"there is no unit {unit!r}", unit, near(unit, known)),
-        (found and found.dimension not in dimensions, f"cannot be in {unit!r}", f"a unit of {found and found.dimension}", fits),
-    )
+    pick_unit(unit, dimensions, f"{place}: `{signal}`", OF_FINS if signal_of(signal) in FINS else "")

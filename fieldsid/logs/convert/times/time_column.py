@@ -32,7 +32,7 @@ from fieldsid.logs.convert.times.clock_text import (
 )
 from fieldsid.logs.convert.times.coarse_stamps import rebuilt
 from fieldsid.logs.convert.times.dates import YEARS, days_of_columns, texts
-from fieldsid.logs.convert.units import UNITS, pick_unit
+from fieldsid.logs.convert.units import Unit, pick_unit
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN
@@ -89,7 +89,7 @@ def seconds_of(
     in `dates` (one column, or year, month and day) and whose form `unit` may state, see FORMS. `weeks` are the GPS weeks of a
     time of week. A time that counts from an epoch or from midnight is shifted to start at zero, and the note `time_origin` states
     its start. Stamps with too few digits are rebuilt, see coarse_stamps.py. Cells that are no times become NaN when salvaging.
-    Raises LogError for a cell that is no time and for a unit of another dimension, MappingError for an unknown unit.
+    Raises LogError for a cell that is no time, MappingError for what is no unit of time.
     """
     column = _Column(cells, name, options or ReadOptions())
     column.refuse_empty()
@@ -185,14 +185,13 @@ def unit_of_step(step_s: float) -> str:
     return units[0] if units and step_s > SLOW_S else ""
 
 
+def time_unit(unit: str, what: str = "time") -> Unit:
+    """Return a unit of time; raises MappingError for another, which lists the units and the forms of a clock."""
+    return pick_unit(unit, ("time",), what, f", {', '.join(FORMS)}")
+
+
 def _factor(unit: str | None) -> float:
-    if unit is None:
-        return 1.0
-    picked = pick_unit(unit)
-    if picked.dimension != "time":
-        fitting = ", ".join([u.name for u in UNITS.values() if u.dimension == "time"] + list(FORMS))
-        raise LogError(f"time cannot be in {picked.name!r}", found=f"a unit of {picked.dimension}", hint=f"use one of: {fitting}")
-    return picked.factor
+    return 1.0 if unit is None else time_unit(unit).factor
 
 
 def _of_numbers(values: npt.NDArray[Any], factor: float, column: _Column) -> tuple[FloatArray, list[Note]]:

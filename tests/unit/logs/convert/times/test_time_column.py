@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fieldsid.errors import LogError
+from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.convert.times.time_column import likely_time_unit, seconds_of
 from fieldsid.logs.reader import ReadOptions
 
@@ -69,7 +69,7 @@ def test_a_word_among_times_is_an_error_that_shows_it():
 
 
 def test_a_unit_that_is_not_of_time_is_refused():
-    with pytest.raises(LogError, match="time cannot be in 'deg'"):
+    with pytest.raises(MappingError, match="time cannot be in 'deg'"):
         seconds([0.0], "deg")
 
 
