@@ -26,35 +26,6 @@ from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN, head_of, is_text, known_text
 
 NUMBERS = "fiub"
-SPARE = 1.01
-"""Factor by which a column is allocated longer than expected, because one that is too short must be copied once more."""
-
-
-class GrowingColumn:
-    """Cells (n,) of a column that grows by blocks: numbers until a block contains words, objects from then on."""
-
-    def __init__(self) -> None:
-        self._cells: npt.NDArray[Any] = np.zeros(0)
-        self._count = 0
-
-    def add(self, block: npt.NDArray[Any], expected: float) -> None:
-        """Append a block; `expected` is the probable number of cells of the complete column."""
-        if not self._count:
-            self._cells = self._cells.astype(block.dtype)
-        elif block.dtype != self._cells.dtype:
-            has_words = any(dtype.kind not in NUMBERS for dtype in (block.dtype, self._cells.dtype))
-            self._cells = self._cells.astype(object if has_words else np.result_type(block, self._cells))
-        end = self._count + block.size
-        if end > self._cells.size:
-            self._cells.resize(max(end, round(SPARE * expected)), refcheck=False)
-        self._cells[self._count : end] = block
-        self._count = end
-
-    def finished(self) -> npt.NDArray[Any]:
-        """Return all cells (n,), read-only; no block may be added after this."""
-        self._cells.resize(self._count, refcheck=False)
-        self._cells.setflags(write=False)
-        return self._cells
 
 
 _LINE = re.compile(r"line (\d+)")
@@ -210,21 +181,21 @@ class _Table:
         """Return the cells (n,) of the wanted columns: numbers where a column contains nothing else, else objects."""
         import pandas as pd
 
-        grown = {i: GrowingColumn() for i in wanted}
+        blocks: dict[int, list[npt.NDArray[Any]]] = {i: [] for i in wanted}
         count = 0
         with self.text.between(self.begin, self.end) as rows:
             try:
                 for block in pd.read_csv(rows, **self._form_for_pandas(pd.__version__)):
                     count += len(block)
-                    share = (self.text.stream.tell() - self.begin) / (self.end - self.begin)
-                    for i, column in grown.items():
-                        column.add(block.iloc[:, i].to_numpy(), count / share)
-                    self.options.progress(share)
+                    for i, column in blocks.items():
+                        column.append(block.iloc[:, i].to_numpy(copy=True))
+                    self.options.progress((self.text.stream.tell() - self.begin) / (self.end - self.begin))
             except (pd.errors.ParserError, pd.errors.EmptyDataError, ValueError) as error:
                 raise self._misfit(error) from error
         if self.options.salvage:
             self._count_bad_rows(count)
-        return {i: self._with_points(column.finished()) for i, column in grown.items()}
+        # one column after the other, so that only one is in memory twice
+        return {i: self._with_points(_joined(blocks.pop(i))) for i in wanted}
 
     def _with_points(self, cells: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return cells with decimal points: pandas does not read decimal commas in a column that contains words."""
@@ -270,6 +241,13 @@ class _Table:
             self.notes.append(
                 Note("bad_rows", f"rows left out because they have too many cells: {left_out}", {"count": left_out})
             )
+
+
+def _joined(blocks: list[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+    """Return the cells (n,) of a column, read-only: numbers where all blocks are, else objects."""
+    cells = np.concatenate(blocks) if blocks else np.zeros(0)
+    cells.setflags(write=False)
+    return cells
 
 
 def _exact(version: str) -> dict[str, Any]:

@@ -17,7 +17,6 @@ from fieldsid.logs.readers import csv_table
 from fieldsid.logs.readers.bags import packets
 from fieldsid.logs.readers.bags.containers import mcap
 from fieldsid.logs.readers.bags.stores import collected
-from fieldsid.logs.readers.csv_table import GrowingColumn
 
 ROWS = 200
 TIME = np.arange(ROWS) / 20
@@ -62,16 +61,9 @@ def test_a_word_in_the_last_block_is_told_by_its_row(tmp_path, monkeypatch, rows
     assert f"1 of {ROWS}, the first in row {ROWS}: 'fault'" in error.value.found
 
 
-def test_a_growing_column_keeps_numbers_until_words_come():
-    column = GrowingColumn()
-    for block in (np.arange(3), np.arange(2) + 0.5, np.array([True])):
-        column.add(block, 4.0)
-    assert column.finished().tolist() == [0.0, 1.0, 2.0, 0.5, 1.5, 1.0]
-    assert not column.finished().flags.writeable
-    words = GrowingColumn()
-    words.add(np.arange(2), 2.0)
-    words.add(np.array(["x", None], dtype=object), 4.0)
-    assert words.finished().tolist() == [0, 1, "x", None]
+def test_the_cells_of_a_table_cannot_be_changed(tmp_path):
+    columns = csv_table.READER.table(write_table(tmp_path / "run.csv"), TableForm(), ReadOptions(), None).columns
+    assert not any(columns.take(i).flags.writeable for i in range(columns.width))
 
 
 @pytest.mark.parametrize("kind", ["csv", "csv.gz", *KINDS])
