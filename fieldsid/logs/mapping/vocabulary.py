@@ -1,13 +1,14 @@
 """The meaning of names in logs, as rules: a signal, its phrases, and the words that exclude it.
 
-A phrase matches a name that contains all its words; more words weigh more. A rule may have a predicate `holds` on the smallest
-and largest number of the column: a `TH` of up to 360 is a true heading, one within the pitch of a vehicle a theta.
+A phrase matches a name that contains all its words; more words weigh more. A rule may limit the numbers of the column: a `TH` of
+up to 360 is a true heading, one within the pitch of a vehicle a theta.
 """
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -47,35 +48,27 @@ OTHERS = word_set(
 """Words that do not identify a signal, but are written in one with those that do, as in `rudderangle`."""
 
 
-def anything(span: Span) -> bool:
-    """Return True: the predicate of a rule without a condition on the numbers."""
-    return True
-
-
-def within(limit: float) -> Callable[[Span], bool]:
-    """Return the predicate that no number exceeds a limit in magnitude."""
-    return lambda span: max(map(abs, span)) <= limit
-
-
-def beyond(limit: float) -> Callable[[Span], bool]:
-    """Return the predicate that some number exceeds a limit in magnitude."""
-    return lambda span: max(map(abs, span)) > limit
-
-
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A signal and the phrases, separated by commas, that mean it; `alone` where the name may contain no other word."""
+    """A signal and the phrases, separated by commas, that mean it; `alone` where the name may contain no other word.
+
+    The largest magnitude in the column must be above `over`, and at most `upto`.
+    """
 
     signal: str
     phrases: str
     unless: frozenset[str] = frozenset()
-    holds: Callable[[Span], bool] = anything
+    over: float = -1.0
+    upto: float = math.inf
     alone: bool = False
+
+    def holds(self, span: Span) -> bool:
+        """Return whether the smallest and the largest number of a column may be those of the signal."""
+        return self.over < max(map(abs, span)) <= self.upto
 
 
 STEEPEST_DEG = 360.0
 """Upper bound of a pitch or roll in any unit: a larger number is something else, such as a port or an error code."""
-_TILT = within(STEEPEST_DEG)
 _TURN = word_set("rate fin")
 
 RULES = (
@@ -97,8 +90,8 @@ RULES = (
     ),
     Rule("yaw_rad", "yaw, heading, hdg, psi, compass", _TURN),
     Rule("yaw_rad", "head", _TURN | word_set("water loss pump")),
-    Rule("pitch_rad", "pitch, theta", _TURN, _TILT),
-    Rule("roll_rad", "roll, phi", _TURN, _TILT),
+    Rule("pitch_rad", "pitch, theta", _TURN, upto=STEEPEST_DEG),
+    Rule("roll_rad", "roll, phi", _TURN, upto=STEEPEST_DEG),
     Rule("depth_m", "depth", word_set("rate water bottom column total")),
     Rule(
         "surge_m_s",
@@ -107,8 +100,8 @@ RULES = (
     ),
     Rule("sway_m_s", "sway, velocity y, vel y, vy, dvl v, dvl y"),
     Rule("heave_m_s", "heave, velocity z, vel z, vz, dvl w, dvl z"),
-    Rule(LATITUDE, "latitude, lat", holds=within(90.0)),
-    Rule(LONGITUDE, "longitude, long, lon, lng", holds=within(360.0)),
+    Rule(LATITUDE, "latitude, lat", upto=90.0),
+    Rule(LONGITUDE, "longitude, long, lon, lng", upto=360.0),
     Rule("x_m", "north, northing, pos x, position x, utm y", OF_SPEED),
     Rule("y_m", "east, easting, pos y, position y, utm x", OF_SPEED),
     Rule("rudder_rad", "rudder, rud, rdr, delta r, deltar, fin yaw, fin, drud, delr", word_set("roll")),
@@ -125,8 +118,8 @@ RULES = (
         )
     ),
     Rule("pitch_rad", "the", alone=True),
-    Rule("yaw_rad", "th", holds=beyond(90.0), alone=True),
-    Rule("pitch_rad", "th", holds=within(90.0), alone=True),
+    Rule("yaw_rad", "th", over=90.0, alone=True),
+    Rule("pitch_rad", "th", upto=90.0, alone=True),
 )  # fmt: skip
 """The meaning of names. Symbols of the field, such as r or u, match only where a name has no other word."""
 
