@@ -190,8 +190,9 @@ def factor_to(signal: str, unit: str) -> float:
 
 
 def scaled(values: FloatArray, factor: float) -> FloatArray:
-    """Return values times a factor; a factor of one changes nothing, not even the last bit."""
-    return values if factor == 1.0 else values * factor
+    """Return values times a factor; where that is one over a whole number, divided by it: 50 ms are 0.05 s to the last bit."""
+    whole = float(np.rint(1.0 / factor)) if 0.0 < abs(factor) < 1.0 else 0.0
+    return values if factor == 1.0 else values / whole if whole and 1.0 / whole == factor else values * factor
 
 
 def depth_of_pressure(pressure_pa: FloatArray, *, density: float, surface_pa: float) -> FloatArray:

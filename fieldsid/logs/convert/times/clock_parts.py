@@ -27,6 +27,7 @@ from fieldsid.logs.convert.times.clock_text import (
     clock_of_text,
     made_continuous,
 )
+from fieldsid.logs.convert.units import scaled
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
@@ -85,8 +86,7 @@ def seconds_of_part(cells: npt.NDArray[Any], part: str) -> FloatArray:
     numbers = as_numbers(cells)[0]
     if part == "hhmm":
         return clock_of_digits(100.0 * numbers).seconds
-    worth = PARTS[part].worth_s
-    return numbers * worth if worth >= 1.0 else numbers / round(1.0 / worth)
+    return scaled(numbers, PARTS[part].worth_s)
 
 
 def clock_of_parts(columns: Sequence[npt.NDArray[Any]], parts: Sequence[str]) -> Clock:

@@ -32,7 +32,7 @@ from fieldsid.logs.convert.times.clock_text import (
 )
 from fieldsid.logs.convert.times.coarse_stamps import rebuilt
 from fieldsid.logs.convert.times.dates import YEARS, days_of_columns, texts
-from fieldsid.logs.convert.units import Unit, pick_unit
+from fieldsid.logs.convert.units import Unit, pick_unit, scaled
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN
@@ -213,15 +213,8 @@ def _of_numbers(values: npt.NDArray[Any], factor: float, column: _Column) -> tup
     seen = numbers[np.isfinite(numbers)]
     first = float(seen[0]) if seen.size else 0.0
     if (base + first) * factor <= EPOCH_FROM_S:
-        return _scaled(numbers + base if base else numbers, factor), [*notes, *coarse]
-    return _scaled(numbers - first, factor), [*notes, *coarse, _origin((base + first) * factor)]
-
-
-def _scaled(values: FloatArray, factor: float) -> FloatArray:
-    """Return values times a factor; where its inverse is whole, divide by that, so that 50 ms is 0.05 s to the last bit."""
-    if factor == 1.0:
-        return values
-    return values / round(1.0 / factor) if factor < 1.0 else values * factor
+        return scaled(numbers + base if base else numbers, factor), [*notes, *coarse]
+    return scaled(numbers - first, factor), [*notes, *coarse, _origin((base + first) * factor)]
 
 
 def _of_text(column: _Column, unit: str | None) -> tuple[FloatArray, list[Note]]:
@@ -292,7 +285,7 @@ def _of_weeks(column: _Column, unit: str | None, weeks: npt.NDArray[Any]) -> tup
     largest = float(np.nanmax(values, initial=0.0))
     factor = _factor(unit or ("s" if largest <= WEEK_S else "ms"))
     week_start = WEEK_S * as_numbers(weeks)[0] + GPS_EPOCH_S
-    return _from_start(_scaled(values, factor) + week_start, column)
+    return _from_start(scaled(values, factor) + week_start, column)
 
 
 def _iso(cells: npt.NDArray[Any]) -> npt.NDArray[np.datetime64]:
