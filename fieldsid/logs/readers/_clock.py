@@ -69,7 +69,7 @@ def clock_of(columns: Columns, known: Source | None) -> Clock | None:
     None where no column increases like a time.
     """
     if known is not None and known.counts_rows:
-        return Clock((known.scale or 1.0) * np.arange(columns.take(0).size, dtype=np.float64), known)
+        return Clock(time_of(columns, known, None, ReadOptions())[0], known)
     if known is not None and known.places:
         return _clock_from(columns, known)
     named = (_clock_from(columns, source) for source in _named_times(columns))

@@ -214,10 +214,7 @@ def is_counter(name: str) -> bool:
 
 
 def _time(columns: Columns, mapping: ChannelMap, options: ReadOptions) -> tuple[FloatArray, list[Note]]:
-    if mapping.time is not None and mapping.time.counts_rows:
-        rows = columns.take(min(used_by(mapping, columns.names, columns.width), default=0)).size
-        return (mapping.time.scale or 1.0) * np.arange(rows, dtype=np.float64), []
-    if mapping.time is None or not mapping.time.places:
+    if mapping.time is None or not (mapping.time.places or mapping.time.counts_rows):
         guessed = [name for name in columns.names if (meaning := meaning_of(name)) is not None and meaning[0] == TIME]
         # Without a file the mapping came from `--channel`.
         hint = f"add `time: {{column: {guessed[0]}, unit: s}}` to {mapping.place}" if mapping.origin and guessed else ""
@@ -230,14 +227,20 @@ def _time(columns: Columns, mapping: ChannelMap, options: ReadOptions) -> tuple[
             found=columns.shown(),
             hint=hint or (f"add `--channel {quote(f'time={guessed[0]}:s')}`" if guessed else NO_CLOCK),
         )
-    return time_of(columns, mapping.time, mapping.time.unit, options)
+    read = min(used_by(mapping, columns.names, columns.width), default=0)
+    return time_of(columns, mapping.time, mapping.time.unit, options, counted=read)
 
 
-def time_of(columns: Columns, source: Source, unit: str | None, options: ReadOptions) -> tuple[FloatArray, list[Note]]:
+def time_of(
+    columns: Columns, source: Source, unit: str | None, options: ReadOptions, counted: int = 0
+) -> tuple[FloatArray, list[Note]]:
     """Return the time (n,) in s of the rows of a table, from one column or as the sum of several, and notes.
 
-    Raises LogError and MappingError, see seconds_of.
+    A time without a column counts the rows, which are those of the column `counted`. Raises LogError and MappingError, see
+    seconds_of.
     """
+    if source.counts_rows:
+        return (source.scale or 1.0) * np.arange(columns.take(counted).size, dtype=np.float64), []
     dated = [columns.index(c, TIME) for c in source.date]
     dates = [columns.take(i) for i in dated]
     if source.columns:
@@ -261,29 +264,28 @@ def _without_blank_rows(columns: Columns, mapping: ChannelMap) -> tuple[Columns,
         return columns, []
     place = columns.index(mapping.time.places[0], TIME)
     times = columns.take(place)
-    if times.dtype.kind not in "fO" or not times.size:
+    rows = _without_value(times)
+    if not rows.any():
         return columns, []
-    empty = _is_missing(times)
-    words = ~empty & _is_word(times) if times.dtype.kind == "O" else np.zeros(times.size, dtype=np.bool_)
-    if not (empty.any() or words.any()):
-        return columns, []
-    others = used_by(mapping, columns.names, columns.width) - {place}
-    rows = empty | words
-    for i in others:
-        cells = columns.take(i)
-        rows &= _is_missing(cells) | (_is_word(cells) if cells.dtype.kind == "O" else False)
+    for i in used_by(mapping, columns.names, columns.width) - {place}:
+        rows &= _without_value(columns.take(i))
     if not rows.any() or rows.all():
         return columns, []
-    texts = int((rows & words).sum())
-    first = str(times[rows & words][0])[:60] if texts else ""
-    found = [Note("text_rows", f"lines of words between the rows, left out: {texts}, the first {first!r}", {"count": texts})]
-    return columns.rows(~rows), found if texts else []
+    words = times[rows][~_is_missing(times[rows])]
+    first = str(words[0])[:60] if words.size else ""
+    message = f"lines of words between the rows, left out: {words.size}, the first {first!r}"
+    return columns.rows(~rows), [Note("text_rows", message, {"count": int(words.size)})] if words.size else []
 
 
 def _is_missing(cells: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
     import pandas as pd
 
     return np.asarray(pd.isna(cells))
+
+
+def _without_value(cells: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    """Return a mask (n,) of the cells that are empty or words."""
+    return _is_missing(cells) | (_is_word(cells) if cells.dtype.kind == "O" else False)
 
 
 def _is_word(cells: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
