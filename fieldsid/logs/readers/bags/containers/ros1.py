@@ -74,12 +74,11 @@ class _Records(Records):
 
     def index(self, data: Bytes, pos: int) -> None:
         """Read connections and counts from the index at the end of a complete bag."""
-        if self._end_of_record(data, pos, len(data)) is None:
-            return
-        place = _header(data, pos).get(b"index_pos", b"")
+        first, _ = self._valid(data, pos, len(data)) or ({}, 0)
+        place = first.get(b"index_pos", b"")
         at = int.from_bytes(place, "little") if len(place) == 8 else 0
-        while pos < at < len(data) and (stop := self._end_of_record(data, at, len(data))) is not None:
-            fields = _header(data, at)
+        while pos < at < len(data) and (found := self._valid(data, at, len(data))) is not None:
+            fields, stop = found
             if fields[b"op"] == CONNECTION:
                 self._connection(fields, data, at, stop)
             elif fields[b"op"] == CHUNK_INFO:
@@ -114,10 +113,10 @@ class _Records(Records):
 
     def _end_of_other(self, data: Bytes, pos: int, end: int, place: Place) -> int:
         """Read a record with another layout than the message before it; return the offset of the next record."""
-        stop = self._end_of_record(data, pos, end)
-        if stop is None:
+        found = self._valid(data, pos, end)
+        if found is None:
             return self.behind_damage(data, pos, end, place)
-        fields = _header(data, pos)
+        fields, stop = found
         op = fields[b"op"]
         if op == MESSAGE:
             self._message(fields, data, pos, stop)
@@ -139,38 +138,27 @@ class _Records(Records):
         (size,) = _U32.unpack_from(data, pos)
         if size > LONGEST_HEADER or pos + 8 + size > end:
             return bool(size <= LONGEST_HEADER)
-        fields = _header(data, pos)
-        op = fields.get(b"op", b"")
-        full_end = pos + 8 + size + _U32.unpack_from(data, pos + 4 + size)[0]
-        if op not in NEEDED or not NEEDED[op] <= fields.keys() or full_end <= end:
+        fields, full_end = _record(data, pos, end)
+        if full_end <= end:
             return False
-        if op == CHUNK:
+        if fields[b"op"] == CHUNK:
             self._chunk(fields, data, pos, end, full_end)
         return True
 
-    def _end_of_record(self, data: Bytes, pos: int, end: int) -> int | None:
-        """Return the end of the record at `pos`, or None where the bytes are no valid record."""
-        if pos + 8 > end:
+    def _valid(self, data: Bytes, pos: int, end: int) -> tuple[Fields, int] | None:
+        """Return the header and the end of the record at `pos`, or None where the bytes are no valid record."""
+        fields, stop = _record(data, pos, end)
+        if not 0 < stop <= end:
             return None
-        (size,) = _U32.unpack_from(data, pos)
-        if not 8 <= size <= LONGEST_HEADER or pos + 8 + size > end:
-            return None
-        fields = _header(data, pos)
-        op = fields.get(b"op", b"")
-        stop: int = pos + 8 + size + _U32.unpack_from(data, pos + 4 + size)[0]
-        if op not in NEEDED or not NEEDED[op] <= fields.keys() or stop > end:
-            return None
-        if op == MESSAGE and (len(fields[b"time"]) != 8 or _number(fields) not in self.by_number):
-            return None
-        return stop
+        is_message = fields[b"op"] == MESSAGE
+        return None if is_message and (len(fields[b"time"]) != 8 or _number(fields) not in self.by_number) else (fields, stop)
 
     def end_behind_damage(self, data: Bytes, pos: int, end: int, place: Place) -> int | None:
         """Return the end of the record at `pos`, or None where the bytes are no valid record.
 
         The stamp of a message must be near those read before.
         """
-        stop = self._end_of_record(data, pos, end)
-        fields = {} if stop is None else _header(data, pos)
+        fields, stop = self._valid(data, pos, end) or ({}, None)
         low, high = max(self.near[0], place.low), min(self.near[1], place.high)
         return None if fields.get(b"op") == MESSAGE and not low <= _stamp(fields) <= high else stop
 
@@ -218,10 +206,11 @@ class _Records(Records):
 
     def stated_stamps(self, data: Bytes, pos: int) -> Iterator[tuple[int, Iterable[int]]]:
         """Yield each connection's number with its stamps in ns in the index records at `pos`."""
-        while (stop := self._end_of_record(data, pos, len(data))) is not None and _header(data, pos)[b"op"] == INDEX:
+        while (found := self._valid(data, pos, len(data))) is not None and found[0][b"op"] == INDEX:
+            fields, stop = found
             start = pos + 8 + _U32.unpack_from(data, pos)[0]
             entries = _ENTRY.iter_unpack(data[start : stop - (stop - start) % _ENTRY.size])
-            yield _number(_header(data, pos)), (sec * 1_000_000_000 + nanosec for sec, nanosec, _ in entries)
+            yield _number(fields), (sec * 1_000_000_000 + nanosec for sec, nanosec, _ in entries)
             pos = stop
 
     def candidates(self, data: Bytes, pos: int, end: int) -> Iterator[int]:
@@ -233,10 +222,16 @@ class _Records(Records):
                     yield start
 
 
-def _header(data: Bytes, pos: int) -> Fields:
-    """Return the fields of the header of the record at `pos`; empty where they do not fill the header."""
-    (size,) = _U32.unpack_from(data, pos)
-    return _fields(data, pos + 4, pos + 4 + size) or {}
+def _record(data: Bytes, pos: int, end: int) -> tuple[Fields, int]:
+    """Return the header of the record at `pos`, and the end that it states, also beyond `end`; {} and 0 where it is none."""
+    (size,) = _U32.unpack_from(data, pos) if pos + 8 <= end else (0,)
+    if not 8 <= size <= LONGEST_HEADER or pos + 8 + size > end:
+        return {}, 0
+    fields = _fields(data, pos + 4, pos + 4 + size) or {}
+    op = fields.get(b"op", b"")
+    if op not in NEEDED or not NEEDED[op] <= fields.keys():
+        return {}, 0
+    return fields, pos + 8 + size + _U32.unpack_from(data, pos + 4 + size)[0]
 
 
 def _fields(data: Bytes, pos: int, end: int) -> Fields | None:
