@@ -11,6 +11,7 @@ from typing import Any
 
 from fieldsid._version import __version__
 from fieldsid.logs.load import MAPPING_FILE
+from fieldsid.records.named_inputs import size_and_time
 
 QUESTION = 1
 """Version of the task: increased where a row would come out differently."""
@@ -42,7 +43,14 @@ class Task:
         picked_up = next((str(p) for p in (Path(MAPPING_FILE), found) if p.is_file()), None)
         named = (self.settings.mapping or picked_up, self.settings.vehicle)
         contents = [Path(name).read_text(encoding="utf-8", errors="replace") if name else "" for name in named]
-        parts = [QUESTION, __version__, str(Path(self.log).resolve()), *_stamp(Path(self.log)), asdict(self.settings), contents]
+        parts = [
+            QUESTION,
+            __version__,
+            str(Path(self.log).resolve()),
+            *size_and_time(Path(self.log)),
+            asdict(self.settings),
+            contents,
+        ]
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:24]
 
     def plain(self) -> dict[str, Any]:
@@ -79,9 +87,3 @@ def _logs_below(folder: Path) -> list[Path]:
         else:
             out.append(path)
     return out
-
-
-def _stamp(path: Path) -> tuple[int, int]:
-    files = [p for p in path.rglob("*") if p.is_file()] if path.is_dir() else [path]
-    found = [p.stat() for p in files if p.exists()]
-    return sum(s.st_size for s in found), max((s.st_mtime_ns for s in found), default=0)

@@ -25,6 +25,7 @@ from fieldsid.logs.reader import ReadOptions, reader_of
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.online.samples import LONGEST_LINE, MessageReader, Sample, samples_of
+from fieldsid.records.named_inputs import size_and_time
 
 TICK_S = 0.2
 POLL_S = 0.5
@@ -58,7 +59,7 @@ def followed(
     """
     seen, grown, pause = (-1, -1), clock.monotonic(), POLL_S
     while clock.monotonic() - grown < idle_s:
-        size = _size(path)
+        size = size_and_time(path)
         if size != seen:
             begin = clock.monotonic()
             run = _present_run(path, mapping)
@@ -136,13 +137,6 @@ def datagrams(port: int, reader: MessageReader, *, idle_s: float = inf) -> Itera
                 continue
             last_received = clock.monotonic()
             yield from (sample for line in data.splitlines() if (sample := reader.read(line)) is not None)
-
-
-def _size(path: Path) -> tuple[int, int]:
-    """Return the size in bytes and the newest modification time in ns of a file, or of all files in a folder."""
-    files = [p for p in path.rglob("*") if p.is_file()] if path.is_dir() else [path]
-    found = [p.stat() for p in files if p.exists()]
-    return sum(s.st_size for s in found), max((s.st_mtime_ns for s in found), default=0)
 
 
 def _present_run(path: Path, mapping: ChannelMap | Path | None) -> Run | None:

@@ -37,6 +37,13 @@ def sha256_of(path: Path) -> str:
     return digest.hexdigest()
 
 
+def size_and_time(path: Path) -> tuple[int, int]:
+    """Return the size in bytes and the newest modification time in ns of a file, or of all files in a folder."""
+    files = [p for p in path.rglob("*") if p.is_file()] if path.is_dir() else [path]
+    found = [p.stat() for p in files if p.exists()]
+    return sum(s.st_size for s in found), max((s.st_mtime_ns for s in found), default=0)
+
+
 def sha256_of_named(path: Path) -> str | None:
     """Return the SHA-256 of a file or folder that a record or a trial names; None where it is missing or beyond the limits."""
     if os.path.isdir(path):  # noqa: PTH112 - says no of what cannot be a path, and does not raise
