@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from fieldsid.logs.convert.clock import Track
 from fieldsid.logs.convert.conditioning import blocks_of
@@ -59,13 +58,13 @@ def _note(end: float, count: int, of: int) -> Note:
 @np.errstate(over="ignore", invalid="ignore")
 def _fills(time: FloatArray, values: FloatArray, end: float) -> BoolArray:
     """Return a mask (n,) of the samples that are fill values at an end of the range."""
-    at_end = values == end
+    at_end: BoolArray = np.asarray(values == end)
     begins, stops = blocks_of(at_end)
     inside = (begins > 0) & (stops < values.size)
     before, after = begins[inside] - 1, stops[inside]
-    others = np.flatnonzero(~at_end)
+    others = ~at_end
     none = np.zeros(values.size, dtype=np.bool_)
-    if others.size < 3 or before.size < FEWEST or at_end[before[0] : after[-1]].mean() > MOSTLY:
+    if others.sum() < 3 or before.size < FEWEST or at_end[before[0] : after[-1]].mean() > MOSTLY:
         return none
     steps, dt = within_half_turn(np.diff(values[others])), np.diff(time[others])
     least = max(MIN_JUMP_RAD, NOISES * math.sqrt(2.0) * noise_of_steps(steps))
@@ -76,11 +75,4 @@ def _fills(time: FloatArray, values: FloatArray, end: float) -> BoolArray:
     across = np.abs(within_half_turn(values[after] - values[before])) <= least + fastest * (time[after] - time[before])
     if jumped.sum() < FEWEST or across[jumped].mean() < GOES_ON:
         return none
-    return np.asarray(at_end & _far(values, others, end, least))
-
-
-def _far(values: FloatArray, others: npt.NDArray[np.intp], end: float, least: float) -> BoolArray:
-    """Return a mask (n,) of the samples whose neighbours, not counting fills, include one away from that end of the range."""
-    low = np.searchsorted(others, np.arange(values.size)).clip(1, others.size - 1)
-    off = np.abs(within_half_turn(values[others] - end))
-    return np.asarray((off[low - 1] > least) | (off[low] > least))
+    return at_end
