@@ -15,10 +15,10 @@ from fieldsid.errors import DataError
 from fieldsid.logs.convert.faults.spikes import DIGITS, SPREADS, last_digit
 from fieldsid.logs.convert.units import UNIT_LIMIT, UNITS, unit_of_ratio
 from fieldsid.logs.doctor.stated import Stated
-from fieldsid.logs.doctor.together import over, together
+from fieldsid.logs.doctor.together import delay_of, over, together
 from fieldsid.logs.run import SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.numerics.shifted_correlation import lag_of, shifted_correlations, slope_of
+from fieldsid.numerics.shifted_correlation import shifted_correlations, slope_of
 from fieldsid.numerics.trapezoid import trapezoid_integral
 from fieldsid.numerics.white_noise import MEDIAN_OF_NORMAL, robust_white_noise_std
 
@@ -43,8 +43,6 @@ RATES = {u.name: u.factor for u in UNITS.values() if u.dimension == "angle rate"
 """Units of rates, in rad/s."""
 SUMMED = 10.0
 """Ratio of the distances of an angle from the trapezoidal integral of its rate and from its sum from which on it is the sum."""
-LAG_S = 1.0
-"""Largest clock offset that is sought."""
 
 PAIRS = (("yaw_rad", "yaw_rate_rad_s"), ("pitch_rad", "pitch_rate_rad_s"), ("roll_rad", "roll_rate_rad_s"))
 CONTRADICTING = frozenset({"rate_sign", "unit", "swapped", "unrelated"})
@@ -310,10 +308,8 @@ def _in_degrees(large: str, unit: str, small: str, stated: Stated) -> tuple[str,
 
 
 def _lag_findings(angle: str, rate: str, a: FloatArray, b: FloatArray, step: float, stated: Stated) -> list[Note]:
-    late, gain = lag_of(a, b, min(round(LAG_S / step), a.size // 4))
-    lag = late * step
-    limit = max(1.5 * step, 0.05)
-    if abs(lag) <= limit or gain < 0.002:
+    lag, limit = delay_of(a, b, step), max(1.5 * step, 0.05)
+    if abs(lag) <= limit:
         return []
     message = (
         f"{angle} is {lag:+.3f} s late against {rate} (limit {limit:.3g} s): their clocks differ{stated.stamps(angle, rate)}"

@@ -14,12 +14,12 @@ import numpy as np
 from fieldsid.logs.channels import AXES
 from fieldsid.logs.convert.heading_unwrap import ALIKE
 from fieldsid.logs.convert.units import UNIT_LIMIT, factor_to, unit_of_ratio
-from fieldsid.logs.doctor.angle_and_rate import LAG_S, TRUSTED
+from fieldsid.logs.doctor.angle_and_rate import TRUSTED
 from fieldsid.logs.doctor.stated import Stated
-from fieldsid.logs.doctor.together import FEWEST, SURE, over, together, width_of
+from fieldsid.logs.doctor.together import FEWEST, SURE, delay_of, over, together, width_of
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.numerics.shifted_correlation import lag_of, slope_of
+from fieldsid.numerics.shifted_correlation import slope_of
 from fieldsid.numerics.trapezoid import trapezoid_integral
 
 SPEEDS = {unit: factor_to("surge_m_s", unit) for unit in ("kn", "mph", "km/h", "ft/s", "cm/s", "mm/s")}
@@ -107,9 +107,8 @@ def _command_and_fin(run: Run, command: str, fin: str, stated: Stated) -> list[N
     if trust > TRUSTED and slope < 0.0:
         message = f"{fin} moves against {command} (slope {slope:.3g}): {stated.flip(command, fin)}"
         found.append(Note("fin_sign", message, {"signal": fin, "value": slope, "limit": 0.0}))
-    late, gain = lag_of(a, b, min(round(LAG_S / step), a.size // 4))
-    lag = late * step
-    if lag < -1.5 * step and gain > 0.002:
+    lag = delay_of(a, b, step)
+    if lag < -1.5 * step:
         message = (
             f"{fin} moves {-lag:.3f} s before its command (limit {1.5 * step:.3g} s): their clocks differ"
             f"{stated.stamps(command, fin)}"

@@ -9,11 +9,14 @@ import numpy.typing as npt
 
 from fieldsid.logs.run import Run
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.shifted_correlation import lag_of
 
 FEWEST = 50
 """Fewest samples or windows over which signals are compared."""
 SURE = 4.0
 """Standard errors from which on a difference is significant: one of 16,000 differences of pure noise exceeds it."""
+LAG_S, LEAST_GAIN = 1.0, 0.002
+"""Largest clock offset that is sought, and the gain of correlation from which on a shift is one."""
 Number = TypeVar("Number", np.float64, np.complex128)
 
 
@@ -23,6 +26,15 @@ def together(run: Run, *signals: str) -> tuple[FloatArray, ...] | None:
         return None
     seen = np.all([np.isfinite(run[s]) for s in signals], axis=0)
     return (run.time[seen], *(run[s][seen] for s in signals)) if seen.sum() >= FEWEST else None
+
+
+def delay_of(a: FloatArray, b: FloatArray, step: float) -> float:
+    """Return the time in s by which one signal (n,) with samples each `step` s is late against another, up to LAG_S.
+
+    Zero where the correlation hardly gains by a shift.
+    """
+    late, gain = lag_of(a, b, min(round(LAG_S / step), a.size // 4))
+    return late * step if gain >= LEAST_GAIN else 0.0
 
 
 def width_of(time: FloatArray, window_s: float) -> int:
