@@ -8,7 +8,7 @@ import re
 import sys
 import traceback
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module, metadata
@@ -171,11 +171,16 @@ def define(package: str, text: str, file: str) -> Any:
 
 def near(word: str, known: Mapping[str, Any] | list[str] | tuple[str, ...]) -> str:
     """Return a sentence with the names that a mistyped word may have meant."""
-    close = difflib.get_close_matches(word, list(known), n=SUGGESTED, cutoff=MIN_LIKENESS)
-    close = [name for name in close if _likeness_without_ending(word, name) >= MIN_OWN_LIKENESS]
+    close = similar(word, known)
     if not close:
         return f"choose one of: {', '.join(sorted(known))}"
     return "did you mean " + " or ".join(f"`{c}`" for c in close) + "?"
+
+
+def similar(word: str, known: Iterable[str]) -> list[str]:
+    """Return the names that a mistyped word may have meant, the nearest first."""
+    close = difflib.get_close_matches(word, list(known), n=SUGGESTED, cutoff=MIN_LIKENESS)
+    return [name for name in close if _likeness_without_ending(word, name) >= MIN_OWN_LIKENESS]
 
 
 def _likeness_without_ending(word: str, other: str) -> float:

@@ -6,7 +6,6 @@ everything else that YAML allows (tags, dates, files that contain themselves) is
 
 from __future__ import annotations
 
-import difflib
 import json
 import os
 import stat
@@ -26,6 +25,7 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 from fieldsid.errors import ArtifactError, shortened
 from fieldsid.records.check import ShapeError, check
 from fieldsid.records.kinds import ANY, KINDS
+from fieldsid.registry import similar
 
 LARGEST_TEXT = 4 << 20
 """Most bytes of a text file: a hundred times the largest that this program writes, the state of a live estimate."""
@@ -153,7 +153,7 @@ def _integer(digits: str) -> int:
 def near_files(path: Path) -> str:
     """Return a hint with a file of a similar name in the same folder."""
     names = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() and os.access(path.parent, os.R_OK) else []
-    close = difflib.get_close_matches(path.name, names, n=1)
+    close = similar(path.name, names)
     return f"did you mean `{quote(str(path.parent / close[0]))}`?" if close else "check the path"
 
 

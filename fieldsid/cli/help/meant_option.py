@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from types import MappingProxyType
 
 import typer
+
+from fieldsid.registry import similar
 
 OTHER_WORDS: Mapping[str, frozenset[str]] = MappingProxyType(
     {option: frozenset(words.split()) for option, words in {
@@ -43,7 +44,7 @@ def meant_by(option: str, context: typer.Context) -> str:
     word = option.lower().replace("_", "-").lstrip("-")
     found = [name for name in known if len(word) > 1 and name.startswith(f"--{word}")]
     found += [name for name, words in OTHER_WORDS.items() if name in known and word in words]
-    found = found or difflib.get_close_matches(f"--{word}", list(known))
+    found = found or similar(f"--{word}", known)
     return " or ".join(_shown(name, known[name]) for name in dict.fromkeys(found))
 
 
