@@ -184,9 +184,7 @@ def integrated_windows(record: Record, path: FinPath, *, stiff: bool) -> tuple[F
     """Return columns (m, 4) [-int p, -int y, int delta, W] and targets (m,) of a run and its fin; no angle where not `stiff`."""
     h = record.steps
     rate, ok = _rate(record)
-    angle = (
-        np.interp(record.time, record.time[record.angle_ok], record.angle[record.angle_ok]) if record.angle_ok.any() else 0 * rate
-    )
+    angle = _angle(record, rate)
     count = _window_length(record)
     if len(record) <= count + 2:
         return np.zeros((0, 4)), np.zeros(0)
@@ -215,6 +213,13 @@ def _rate(record: Record) -> tuple[FloatArray, BoolArray]:
     known = record.angle_ok
     angle = _smoothed(np.interp(record.time, record.time[known], record.angle[known]), 9)
     return np.gradient(angle, record.time), known
+
+
+def _angle(record: Record, rate: FloatArray) -> FloatArray:
+    """Return the measured angle, or the integral of the rate where there is none: its unknown start is part of the trim."""
+    if record.angle_ok.any():
+        return np.interp(record.time, record.time[record.angle_ok], record.angle[record.angle_ok])
+    return _integral(0.5 * (rate[:-1] + rate[1:]) * record.steps)
 
 
 def _smoothed(values: FloatArray, width: int = 5) -> FloatArray:

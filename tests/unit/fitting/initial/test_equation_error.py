@@ -55,3 +55,14 @@ def test_what_a_cross_state_starts_from_is_what_a_steady_turn_has_built_up():
     start = dict(zip(layout.names, equation_error_starts((late,), layout)[-1], strict=False))
     assert start["cross_damping"] == pytest.approx(values["cross_damping"], rel=0.5)
     assert start["cross_rate"] == pytest.approx(values["cross_rate"], rel=0.5)
+
+
+def test_the_stiffness_of_a_log_without_an_angle_is_that_of_the_integrated_rate():
+    values = {"c22": 1.0, "c23": 0.5, "d2": -1.3, "Cb": -0.02}
+    axis, effect, _ = HULLS[0]
+    whole = flown(axis, effect, values | {"cross_damping": 2.0, "cross_rate": 0.0}, 1.2, 3, 1e-3)
+    rate_only = replace(whole, angle=np.full(whole.time.size, np.nan), angle_ok=np.zeros(whole.time.size, bool))
+    layout = layout_of((rate_only,), axis, ())
+    start = dict(zip(layout.names, equation_error_starts((rate_only,), layout)[0], strict=False))
+    for name in ("c22", "c23", "d2"):
+        assert start[name] == pytest.approx(values[name], rel=0.1), name
