@@ -178,12 +178,12 @@ def test_gains_that_fail_between_their_rows_lead_to_closer_ones_that_hold(run_cl
     monkeypatch.chdir(tmp_path)
     rows = "1.0,1.2,0.3,-0.5,0.03\n1.4,1.7,0.3,-1.0,0.03\n1.8,2.2,0.3,-1.65,0.03\n"
     (tmp_path / "pitch.csv").write_text(f"speed_m_s,c22,c23,d2,Cb\n{rows}")
-    asked = ("--controller", "pd", "--step", "5deg", "--fin-max", "0.25")
+    asked = ("--depth", "--controller", "pd", "--step", "5deg", "--fin-max", "0.25")
     designed = run_cli("schedule", "design", "pitch.csv", *asked, "-o", "gains.yaml")
     assert designed.code == 0, designed.err
     next_ = run_cli("schedule", "verify", "gains.yaml", "--json").json["headline"]["next"].split()
     assert next_[1:3] == ["schedule", "design"]
-    assert next_[4:12] == [*asked, "--speeds", "1.00,1.20,1.40,1.80"]
+    assert next_[4:13] == [*asked, "--speeds", "1.00,1.20,1.40,1.80"]
     assert run_cli(*next_[1:]).code == 0
     assert run_cli("schedule", "verify", next_[-1], "--json").json["verdict"] == "holds"
 

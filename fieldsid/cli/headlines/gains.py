@@ -137,7 +137,8 @@ def _designed_with(schedule: Schedule) -> list[str]:
         "--fin-use": None if wish.fin_use is None else f"{100.0 * wish.fin_use:g}%",
         "--fin-max": None if is_trial(Path()) else f"{max(schedule.column('fin_limit_rad')):.6g}",
     }
-    return [word for option, value in stated.items() if value is not None for word in (option, value)]
+    depth = ["--depth"] if schedule.depth else []
+    return depth + [word for option, value in stated.items() if value is not None for word in (option, value)]
 
 
 def headline_of_export(result: Exported, schedule: Path) -> Headline:
