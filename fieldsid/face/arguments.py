@@ -97,12 +97,13 @@ def read_again(log: NamedLog, mapping: ChannelMap | None = None) -> Run:
 
 
 def runs_of_models(
-    source: ParameterSource, say: Callable[[str], None], mapping: ChannelMap | None = None, *, hint: str = ""
+    source: ParameterSource, say: Callable[[str], None], mapping: ChannelMap | None = None, *, hint: str = "", depth: bool = False
 ) -> list[Run]:
-    """Return the runs to which the models of a yaw source were fitted, which show the speed lost in turns.
+    """Return the runs to which the models of a source were fitted, which show the speed lost in turns, or the path of a dive.
 
     Each is read with the mapping, else with its former one. Those that cannot be read again are left out, and say is called with
-    their names and the hint. Empty for pitch, and for a source that is no model.
+    their names and the hint. Empty for a source that is no model, and for pitch but
+    with `depth`.
     """
     from fieldsid.logs.few_of import few_of
     from fieldsid.logs.run import Run
@@ -110,12 +111,13 @@ def runs_of_models(
     from fieldsid.plant.parameter_source import logs_of
     from fieldsid.runtime.parallel_map import parallel_map
 
-    if not source.models or source.axis is not Axis.YAW:
+    if not source.models or (source.axis is not Axis.YAW and not depth):
         return []
     named = logs_of(source.paths)
     outcomes = parallel_map(lambda log: None if log.now is None else attempt(lambda of: read_again(of, mapping), log), named)
     if missing := [f"`{log.now or log.named}`" for log, run in zip(named, outcomes, strict=True) if not isinstance(run, Run)]:
-        say(f"the speed lost in a turn is not measured in runs of the models that cannot be read again: {few_of(missing)}{hint}")
+        what = "speed lost in a turn" if source.axis is Axis.YAW else "path of a dive"
+        say(f"the {what} is not measured in runs of the models that cannot be read again: {few_of(missing)}{hint}")
     return [run for run in outcomes if isinstance(run, Run)]
 
 

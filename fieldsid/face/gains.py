@@ -129,7 +129,7 @@ def design_schedule(
         wish=Wish(controller or usual_controller(source), damping, phase_margin, step, bandwidth, settling, overshoot, fin_use),
         limits=FinLimits(fin_lag, delay, known.fin_rate_rad_s if fin_rate is None else fin_rate, latency),
         depth=depth,
-        runs=runs_of_models(source, _say),
+        runs=runs_of_models(source, _say, depth=depth),
         length=known.length_m,
         fins=fins_of(known, source.axis),
     )
@@ -147,4 +147,4 @@ def verify_schedule(schedule: Schedule | File, models: Models | None = None) -> 
     known = schedule if isinstance(schedule, Schedule) else load_schedule(Path(schedule))
     name = "SCHEDULE" if isinstance(schedule, Schedule) else str(schedule)
     source = source_of(designed_from(known, name) if models is None else models)
-    return verify(known, source, runs=runs_of_models(source, _say))
+    return verify(known, source, runs=runs_of_models(source, _say, depth=known.depth))

@@ -87,6 +87,7 @@ class Check(Displayed):
     leg_fin_rms: Annotated[Number, Key("The fin there.", "leg_fin_rms_rad")]
     depth_overshoot: Annotated[Number, Key("Overshoot of a step of depth.", "depth_overshoot_percent", times=100.0)]
     depth_settling: Annotated[Number, Key("Its settling time.", "depth_settling_s")]
+    depth_error: Annotated[Number, Key("How much too deep the loop holds a depth: what level flight takes.", "depth_error_m")]
     depth_flown: Annotated[Number, Key("How long it was flown.", "depth_flown_s")]
     outcome: Annotated[Outcome, INLINE]
     """The outcome of the gains by the objective that rows are designed for."""

@@ -60,6 +60,8 @@ class LinearPlant:
     powers: FloatArray
     speed_loss: FloatArray
     hull: FloatArray | None = None
+    path_lag: float = 0.0
+    level_pitch: float = 0.0
 
     @property
     def count(self) -> int:
@@ -270,6 +272,7 @@ def _plant_of_model(
     shared = {n: column(n) for n in ACTUATOR if n in model.values and n not in following}
     trim = column(names.trim) * model.law.trim_factor(speed) + shift.get(names.trim, 0.0)
     trim = trim + followed.moment[:, 0]
+    lag, delay, fin_rate = _actuator(shared, limits, draws)
     damping = column(names.damping) * scale**exponents + shift.get(names.damping, 0.0)
     return LinearPlant(
         axis=model.axis,
@@ -279,7 +282,9 @@ def _plant_of_model(
         authority=authority,
         offset=trim / authority,
         core=cores,
-        **dict(zip(("lag", "delay", "fin_rate"), _actuator(shared, limits, draws), strict=True)),
+        lag=lag,
+        delay=delay,
+        fin_rate=fin_rate,
         powers=_powers(exponents, core_powers),
         speed_loss=np.zeros((draws, 3)),
     )

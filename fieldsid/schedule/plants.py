@@ -15,6 +15,7 @@ from fieldsid.models.hull import OF_ANGLE, Core
 from fieldsid.models.model import Noise
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.records.keys import body_of
+from fieldsid.schedule.dive_path import PATH_OF_PITCH, DivePath, dive_path_of
 from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, between, family_at, plants_at
 from fieldsid.turning.maneuvering.belief import Belief, believe, fitted_to, like_no_vehicle, not_fitted
 from fieldsid.turning.maneuvering.equations import NAMES, about_straight, coefficients
@@ -91,7 +92,7 @@ BELIEVED = "speed lost in the turn, sway and drag as all runs together have them
 class Plants:
     """The plants of a source with the limits of the fin and the loss of speed: by a posterior (`belief`), else by `surge`.
 
-    `note` says why no posterior is used although the runs would allow one.
+    `note` says why no posterior is used although the runs would allow one. `path` leads from a pitch to the depth.
     """
 
     source: ParameterSource
@@ -99,12 +100,13 @@ class Plants:
     surge: SurgeModel | None
     belief: Belief | None
     note: Note | None = None
+    path: DivePath = PATH_OF_PITCH
 
     def at(self, speed: float, fin_limit: float, draws: int, seed: int) -> LinearPlant:
         """Return the plant at a speed (m/s) with `draws` of its errors, interpolated between the models."""
         near = plants_at(self.source, speed, self.limits, draws, seed)
         if self.belief is None:
-            return with_speed_loss(between(near), self.surge, fin_limit, seed)
+            return self._diving(with_speed_loss(between(near), self.surge, fin_limit, seed))
         first = near[0][0]
         offset = np.sum([share * plant.offset for plant, share in near], axis=0)
         return believed_plant(self.belief, replace(first, offset=offset), self.limits, draws)
@@ -113,8 +115,11 @@ class Plants:
         """Return the uncertainty set at a speed (m/s): the draws of all neighbouring models, or of the posterior."""
         if self.belief is None:
             family = family_at(self.source, speed, self.limits, draws, seed)
-            return with_speed_loss(family, self.surge, fin_limit, seed)
+            return self._diving(with_speed_loss(family, self.surge, fin_limit, seed))
         return self.at(speed, fin_limit, draws, seed)
+
+    def _diving(self, plant: LinearPlant) -> LinearPlant:
+        return replace(plant, path_lag=self.path.lag(plant.speed), level_pitch=self.path.level_pitch(plant.speed))
 
     def noise_at(self, speed: float) -> Noise | None:
         """Return the noise of the model with the largest weight at a speed (m/s), None for a table."""
@@ -177,4 +182,6 @@ def plants_of(source: ParameterSource, limits: FinLimits, runs: Sequence[Run], l
 
 def models_plants(source: ParameterSource, limits: FinLimits, runs: Sequence[Run], note: Note | None = None) -> Plants:
     """Return the plants of the models, one for each of their speeds; `note` says why no posterior is used."""
-    return Plants(source, limits, fit_surge(runs) if source.axis is Axis.YAW else None, None, note)
+    if source.axis is Axis.YAW:
+        return Plants(source, limits, fit_surge(runs), None, note)
+    return Plants(source, limits, None, None, note, dive_path_of(runs))

@@ -16,6 +16,7 @@ from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.runtime.parallel_map import parallel_map
 from fieldsid.schedule.check import READ_OFF, Check, StepCheck
 from fieldsid.schedule.controller import HELD_SHARE, Gains, margins, worst_of
+from fieldsid.schedule.dive_path import DivePath
 from fieldsid.schedule.flown.response import (
     FLIGHT_ERROR_SHARE,
     LIMIT_CYCLE_SHARE,
@@ -96,6 +97,8 @@ class Verification(Plotted):
     """Lag (s), delay (s), rate limit (rad/s) and latency (s) of the simulations."""
     worse: tuple[float, ...]
     """The speeds (m/s) of rows that are worse than the constant gain."""
+    path: DivePath
+    """The path from a pitch to the depth."""
 
     @property
     def extrapolated(self) -> tuple[float, float] | None:
@@ -173,6 +176,7 @@ def verify_schedule(
         curvature,
         of.actuator,
         worse,
+        of.path,
     )
 
 
@@ -246,13 +250,13 @@ def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) ->
     one = plant.one()
     bent, unknown = (fly(one, r, Flight(pace.flight, pace.step, offset=FIN_OFFSET_RAD)) for r in (compensated, rows))
     leg = fly(one, rows, Flight(pace.leg, pace.step, push=disturbance_moment(flight.noise, pace)))
-    depth_over, depth_settled = _depth(one, rows, pace) if schedule.depth else (float("nan"), float("nan"))
+    depth_over, depth_settled, depth_off = _depth(one, rows, pace) if schedule.depth else 3 * (float("nan"),)
     check = Check(
         row.speed, flight.knot, row.supported, constant, phase, gain, delay, least_phase, least_gain, least_delay,
         int(np.sum(found.phase_deg < 0.0)),
         (small, usual, large), float(min(np.min(flown.speed[:, 0]) for flown in (flights[2], others[2]))),
         float(steady_error(bent.angle, 0.0)[0]), float(steady_error(unknown.angle, 0.0)[0]),
-        float(np.std(leg.angle[:, 0])), float(np.std(leg.fin[:, 0])), depth_over, depth_settled, pace.leg,
+        float(np.std(leg.angle[:, 0])), float(np.std(leg.fin[:, 0])), depth_over, depth_settled, depth_off, pace.leg,
         flight.place.outcome(row.gains),
     )  # fmt: skip
     return check, (flights[0].one(), flights[1].one(), flights[2].one()), leg
@@ -320,8 +324,12 @@ def _without_unsupported(step: StepCheck, flown: Steps, plant: LinearPlant, curv
     )
 
 
-def _depth(one: LinearPlant, rows: Sequence[Row], pace: Pace) -> tuple[float, float]:
-    """Return overshoot and settling time (s) of a step of depth, of down and up the worse: a trim takes fin from one side."""
+def _depth(one: LinearPlant, rows: Sequence[Row], pace: Pace) -> tuple[float, float, float]:
+    """Return overshoot and settling time (s) of a step of depth, of down and up the worse, and the error (m) of a depth held.
+
+    A trim takes fin from one side.
+    """
     flights = [fly(one, rows, Flight(pace.leg, pace.step, depth=s * DEPTH_STEP_M, pitch_limit=PITCH_LIMIT_RAD)) for s in SIDES]
-    moved = np.column_stack([s * flown.depth for s, flown in zip(SIDES, flights, strict=True)])
-    return float(overshoot(moved, DEPTH_STEP_M).max()), float(settling(flights[0].time, moved, DEPTH_STEP_M).max())
+    moved = np.column_stack([s * (flown.depth - flown.depth[0]) for s, flown in zip(SIDES, flights, strict=True)])
+    settled = settling(flights[0].time, moved, DEPTH_STEP_M).max()
+    return float(overshoot(moved, DEPTH_STEP_M).max()), float(settled), float(flights[0].depth[0, 0])

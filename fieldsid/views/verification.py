@@ -69,7 +69,17 @@ def blocks_of(found: Verification) -> Iterator[Block | str]:
         yield f"in the {large:.0f} deg step the speed falls from {slowest.speed:.2f} to {slowest.speed_least:.2f} m/s at most"
     if depth := [c for c in checks if not isnan(c.depth_settling)]:
         over, settle = max(100 * c.depth_overshoot for c in depth), max(c.depth_settling for c in depth)
-        yield f"depth step of 2 m: overshoot up to {over:.0f} %, settled within {settle:.0f} s"
+        yield f"depth step of 2 m: overshoot up to {over:.0f} %, settled within {settle:.0f} s{_path(found)}"
+
+
+def _path(found: Verification) -> str:
+    """Return how far off a depth is held, as the runs tell, or that no run tells where a pitch leads to."""
+    if not found.path.measured:
+        return "; no run shows where a pitch leads to: the path is taken as the pitch"
+    worst = max(found.scheduled, key=lambda c: abs(c.depth_error))
+    pitch, side = degrees(found.path.level_pitch(worst.speed)), "deep" if worst.depth_error > 0.0 else "shallow"
+    off = f"{abs(worst.depth_error):.2f} m too {side} at {number(worst.speed, 3)} m/s"
+    return f"; a depth is held {off}, where level flight takes a pitch of {pitch:.1f} deg"
 
 
 def _row(check: Check, constant: Check) -> tuple[str, ...]:

@@ -138,7 +138,7 @@ def design(
         ),
         limits=FinLimits(_time(fin_lag, "--fin-lag"), _time(delay, "--delay"), fastest, _time(latency, "--latency")),
         depth=depth,
-        runs=runs_of_models(source, say),
+        runs=runs_of_models(source, say, depth=depth),
         length=known.length_m,
         fins=fins_of(known, source.axis),
     )
@@ -192,7 +192,7 @@ def verify(
     least = None if require_phase_margin is None else parse_margin(require_phase_margin, "--require-phase-margin")
     known = load_schedule(schedule)
     source = read_source(models or designed_from(known, str(schedule)))
-    checked = verify_schedule(known, source, runs=runs_of_models(source, say))
+    checked = verify_schedule(known, source, runs=runs_of_models(source, say, depth=known.depth))
     gain = None if require_gain_margin is None else parse_quantity(require_gain_margin, "--require-gain-margin", DECIBEL, "6dB")
     delay = None if require_delay_margin is None else parse_time(require_delay_margin, "--require-delay-margin", "0.3s")
     most = None if max_overshoot is None else 100.0 * parse_share(max_overshoot, "--max-overshoot")

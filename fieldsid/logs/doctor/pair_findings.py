@@ -235,6 +235,12 @@ def goes_with_depth(run: Run) -> bool:
     return found is not None and found[0] > TRUSTED and LEAST_DIVE < found[1] < MOST_DIVE
 
 
+def goes_against_depth(run: Run) -> bool:
+    """Return whether the depth changes against what speed and pitch predict: one of the two has the wrong sign."""
+    found = _depth_correlation(run)
+    return found is not None and found[0] <= -TRUSTED
+
+
 def _depth_correlation(run: Run) -> tuple[float, float] | None:
     """Return the correlation and slope of the change of depth on that from speed and pitch; None where there is too little."""
     seen = together(run, "depth_m", "pitch_rad", "surge_m_s")
@@ -257,7 +263,7 @@ def _dive_findings(run: Run, stated: Stated) -> list[Note]:
     if trust > TRUSTED and not LEAST_DIVE < slope < MOST_DIVE:
         is_known_wrong = all(run.has(s) for s in ("x_m", "y_m")) and not goes_with_way(run)
         return [] if is_known_wrong else _dive_unit(slope, stated)
-    if trust > -TRUSTED:
+    if not goes_against_depth(run):
         return []
     message = (
         f"depth_m goes against what surge_m_s and pitch_rad make of it (correlation {trust:.2f}, limit {-TRUSTED:g}): "

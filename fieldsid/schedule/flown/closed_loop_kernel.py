@@ -47,6 +47,15 @@ class Plants(NamedTuple):
     turn_loss: FloatArray
 
 
+class Dive(NamedTuple):
+    """A step of depth (m), zero for none: the limit of the pitch reference (rad), lag (s) and level pitch (rad) of the path."""
+
+    depth: float
+    pitch_limit: float
+    lag: float
+    level: float
+
+
 @inner
 def gains_at(table: FloatArray, speed: float, out: FloatArray) -> None:
     """Fill out (8,) with the gains at a speed: linear between the rows of table (k, 8), constant beyond them."""
@@ -71,6 +80,19 @@ def steady_state(stiffness: float, authority: float, offset: float, now: FloatAr
         return 0.0, -(bias + offset) / now[KI], -offset
     angle = authority * (bias + offset) / stiff
     return angle, 0.0, min(max(bias - now[KP] * angle, -limit), limit)
+
+
+@inner
+def level_flight(
+    stiffness: float, authority: float, offset: float, now: FloatArray, level: float
+) -> tuple[float, float, float, float]:
+    """Return angle, integral, fin and depth error of level flight, which takes the pitch `level`: the loop's gains hold it."""
+    limit = now[FIN_LIMIT]
+    fin = min(max(stiffness * level / authority - offset, -limit), limit)
+    if now[KI] != 0.0:
+        return level, (fin - now[BIAS] - now[REFERENCE_GAIN] * level) / now[KI], fin, level / now[DEPTH_GAIN]
+    target = (fin - now[BIAS] + now[KP] * level) / (now[KP] + now[REFERENCE_GAIN])
+    return level, 0.0, fin, target / now[DEPTH_GAIN]
 
 
 @inner
@@ -102,8 +124,7 @@ def close_loop(
     plants: Plants,
     table: FloatArray,
     reference: float,
-    depth_step: float,
-    pitch_limit: float,
+    dive: Dive,
     speed: float,
     step: float,
     push: FloatArray,
@@ -111,9 +132,9 @@ def close_loop(
 ) -> None:
     """Fill out (n, t, 4) with angle, fin, depth and speed of n plants under the gains of table (k, 8).
 
-    push (t,) is a disturbance moment in rad/s^2. With depth_step other than zero (m) the reference is depth gain (z -
-    depth_step), limited to pitch_limit; else it is `reference` rad. From the sample at which a plant diverges on its angle is
-    inf.
+    push (t,) is a disturbance moment in rad/s^2. In a dive the reference is depth gain (z - its depth), limited, and the flight
+    begins level at the depth that the loop holds for the depth zero; else it is `reference` rad. From the sample at which a plant
+    diverges on its angle is inf.
     """
     now = np.empty(table.shape[1])
     for case in range(plants.core.shape[0]):
@@ -125,7 +146,10 @@ def close_loop(
         p = x = z = 0.0
         u = speed
         y, integral, start = steady_state(stiffness, b, offset, now)
-        fin = start
+        if dive.depth != 0.0 and now[DEPTH_GAIN] != 0.0:
+            y, integral, start, z = level_flight(stiffness, b, offset, now, dive.level)
+        fin, path = start, 0.0
+        follows = 1.0 - np.exp(-step / dive.lag) if dive.lag > 0.0 else 1.0
         for i in range(out.shape[1]):
             out[case, i, ANGLE], out[case, i, FIN], out[case, i, DEPTH], out[case, i, SURGE] = y, fin, z, u
             if not abs(p) < DIVERGED_RATE_RAD_S:
@@ -136,7 +160,9 @@ def close_loop(
                 core_at(plants.core[case], plants.core_powers[case], u / speed, core)
                 a = plants.damping[case] * power(u / speed, plants.damping_power[case])
                 b = plants.authority[case] * power(u / speed, plants.authority_power[case])
-            target = reference if depth_step == 0.0 else min(max(now[DEPTH_GAIN] * (z - depth_step), -pitch_limit), pitch_limit)
+            target = reference
+            if dive.depth != 0.0:
+                target = min(max(now[DEPTH_GAIN] * (z - dive.depth), -dive.pitch_limit), dive.pitch_limit)
             command, integral = fin_command(now, target, y, p, integral, step)
             # the fin receives the command of `late` steps ago; the fin's column of out stores the commands until then
             if late > 0:
@@ -146,7 +172,9 @@ def close_loop(
             new = fin + min(max(goal - fin, -most), most)
             mean, before = 0.5 * (fin + new) + offset, y
             y, p, x, middle = midpoint_step(named(core), kinds, a, stiffness, b * mean + push[i], mean, step, (y, p, x))
-            z -= u * 0.5 * (before + y) * step
+            was = path
+            path += follows * (0.5 * (before + y) - dive.level - path)
+            z -= u * 0.5 * (was + path) * step
             if drag > 0.0:
                 to_surge = surge_slope(u, speed, drag, plants.fin_loss[case], plants.turn_loss[case], mean, middle)
                 u = max(u + step * to_surge, SLOWEST_SHARE * speed)

@@ -18,7 +18,7 @@ from fieldsid.display import Brief
 from fieldsid.models.model import Noise
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.schedule.controller import Gains
-from fieldsid.schedule.flown.closed_loop_kernel import MOTION, Plants, close_loop
+from fieldsid.schedule.flown.closed_loop_kernel import MOTION, Dive, Plants, close_loop
 from fieldsid.schedule.flown.hull_kernel import close_hull_loop
 from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.record import Row
@@ -169,8 +169,8 @@ def steady_error(values: FloatArray, wanted: float) -> FloatArray:
 class Flight:
     """A simulation of `seconds` s in steps of `step` s: a step at time 0 of the reference (rad), or of the depth (m).
 
-    The depth follows z' = -u theta, with a pitch reference within `pitch_limit` rad. `offset` (rad) is a fin offset in addition
-    to the plant's trim. `push` (t,) is a disturbance moment in rad/s^2, a value for each step.
+    The depth follows the plant's path (schedule/dive_path.py), with a pitch reference within `pitch_limit` rad. `offset` (rad) is
+    a fin offset in addition to the plant's trim. `push` (t,) is a disturbance moment in rad/s^2, a value for each step.
     """
 
     seconds: float
@@ -204,8 +204,8 @@ def fly(plant: LinearPlant, rows: Sequence[Row], flight: Flight) -> Steps:
             plant.damping, plant.stiffness, plant.authority, offset, np.ascontiguousarray(plant.core), of_damping, of_authority,
             of_core, np.exp(-step / lag), np.round(plant.delay / step), fin_rate * step, drag, fin_loss, turn_loss,
         )  # fmt: skip
-        references = (flight.reference, flight.depth, flight.pitch_limit)
-        close_loop(plants, table, *references, plant.speed, step, push, out)
+        dive = Dive(flight.depth, flight.pitch_limit, plant.path_lag, plant.level_pitch)
+        close_loop(plants, table, flight.reference, dive, plant.speed, step, push, out)
     else:
         sign = np.where(plant.authority < 0.0, 1.0, -1.0)
         settings = np.column_stack([sign, offset, lag, fin_rate, plant.delay])

@@ -123,12 +123,14 @@ def row_of(sought: Sought, *, depth: bool, supported: bool) -> Row:
 def _depth_gain(family: LinearPlant, gains: Gains) -> float:
     """Return the gain from depth to pitch, rad/m, with which the cascade u k T/s has its phase margin for 95 % of the draws.
 
-    T is the closed pitch loop from its reference; the crossover is where T lags by 90 deg less the margin.
+    T is the closed pitch loop from its reference, with the lag of the path; the crossover is where it lags by 90 deg less the
+    margin.
     """
     omega = FREQUENCY_GRID_RAD_S
     by_reference = gains.kp + gains.ki / (1j * omega) + family.reference_gain
     hull = family.response(omega)
-    closed = hull * by_reference[None, :] / (1.0 + hull * gains.response(omega)[None, :])
+    path = 1.0 / (1.0 + 1j * omega * family.path_lag)
+    closed = path * hull * by_reference[None, :] / (1.0 + hull * gains.response(omega)[None, :])
     phase = np.degrees(np.unwrap(np.angle(closed), axis=1))
     first = np.argmax(phase <= DEPTH_PHASE_MARGIN_DEG - 90.0, axis=1)
     reached = np.take_along_axis(np.abs(closed), first[:, None], axis=1)[:, 0]
