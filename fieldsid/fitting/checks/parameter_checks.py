@@ -26,6 +26,7 @@ def parameter_checks(problem: Problem, solution: Solution, floor: Noise) -> tupl
         *_stability(problem, solution),
         *_bounds(problem, solution),
         *_stiffness(problem, solution),
+        *_trim(problem, solution),
         *_authorities(problem, solution, floor),
         *_correlations(problem, solution),
     )
@@ -97,6 +98,18 @@ def _stiffness(problem: Problem, solution: Solution) -> Iterator[Note]:
             f"{names.stiffness} = {v[names.stiffness]:.2g} +/- {s[names.stiffness]:.2g} 1/s^2 "
             "cannot be told from zero in this maneuver",
             {"value": v[names.stiffness], "std_error": s[names.stiffness], "hint": "hold the fin longer, or fly slower"},
+        )
+
+
+def _trim(problem: Problem, solution: Solution) -> Iterator[Note]:
+    """Yield the note that a trim beside a righting moment is unknown in runs of which none has an angle."""
+    names, v = NAMES[problem.layout.axis], _values(problem, solution)
+    if names.stiffness is not None and not any(r.angle_ok.any() for r in problem.records):
+        yield Note(
+            "trim_not_identifiable",
+            f"{names.trim} = {v[names.trim]:.2g} rad/s^2 is that about an angle of our choice: a rate alone shows "
+            f"{names.trim} - {names.stiffness} {problem.layout.axis.value} at the start, and no angle was logged",
+            {"value": v[names.trim], "hint": f"map {names.angle}"},
         )
 
 

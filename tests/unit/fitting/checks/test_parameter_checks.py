@@ -60,6 +60,20 @@ def test_remarks_of_several_runs_name_the_speed_of_what_they_speak_of():
     assert "it moves a22 from" in _message(alone, "ignored_delay")
 
 
+@pytest.mark.parametrize("method", ["output_error", "svf_ls"])
+def test_the_trim_of_a_pitch_without_an_angle_is_said_to_be_unknown(method):
+    rng, time, step = np.random.default_rng(4), np.arange(0.0, 60.0, 0.05), 0.05
+    fin, pitch, rate = 0.1 * np.sign(np.sin(0.9 * time + 0.05 * time**1.3)), np.full(time.size, 0.08), np.zeros(time.size)
+    for i in range(time.size - 1):
+        rate[i + 1] = rate[i] + step * (-0.9 * rate[i] - 0.5 * pitch[i] - 1.2 * fin[i] + 0.04)
+        pitch[i + 1] = pitch[i] + step * rate[i + 1]
+    noisy = {"pitch_rad": pitch, "pitch_rate_rad_s": rate + 0.003 * rng.standard_normal(time.size), "elevator_rad": fin}
+    alone = {n: v for n, v in noisy.items() if n != "pitch_rad"}
+    (known,), (unknown,) = (identify([Run("nod", time, log)], Axis.PITCH, whole=True, method=method) for log in (noisy, alone))
+    assert "trim_not_identifiable" not in {n.code for n in known.notes}
+    assert "no angle was logged" in _message(unknown, "trim_not_identifiable")
+
+
 def test_a_plain_number_on_its_bound_has_a_meaning_and_no_unit():
     rng, n, step = np.random.default_rng(2), 800, 0.05
     time = np.arange(n) * step
