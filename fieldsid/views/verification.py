@@ -73,9 +73,9 @@ def blocks_of(found: Verification) -> Iterator[Block | str]:
 
 
 def _path(found: Verification) -> str:
-    """Return how far off a depth is held, as the runs tell, or that no run tells where a pitch leads to."""
+    """Return how far off a depth is held, as the runs tell, or that none tells where a pitch leads to."""
     if not found.path.measured:
-        return "; no run shows where a pitch leads to: the path is taken as the pitch"
+        return "; no run has a depth that goes with its pitch and speed: the path is taken as the pitch"
     worst = max(found.scheduled, key=lambda c: abs(c.depth_error))
     pitch, side = degrees(found.path.level_pitch(worst.speed)), "deep" if worst.depth_error > 0.0 else "shallow"
     off = f"{abs(worst.depth_error):.2f} m too {side} at {number(worst.speed, 3)} m/s"

@@ -86,3 +86,5 @@ def test_the_depth_that_is_held_off_and_the_step_are_those_of_the_hull(source):
     assert check.depth_overshoot == pytest.approx(max(over), abs=0.02)
     said = " ".join(str(VIEW.page(checked)).split())
     assert f"a depth is held {-check.depth_error:.2f} m too shallow at 1.00 m/s, where level flight takes a pitch of -3." in said
+    alone = " ".join(str(VIEW.page(verify_schedule(schedule, source, draws=1))).split())
+    assert "no run has a depth that goes with its pitch and speed: the path is taken as the pitch" in alone
