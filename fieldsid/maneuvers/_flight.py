@@ -25,6 +25,11 @@ class Plant(Protocol):
         """Number of vehicles."""
         ...
 
+    @property
+    def trim(self) -> FloatArray:
+        """Fin angle of straight flight (m,), rad, about which fins are given."""
+        ...
+
     def advance(self, fin: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
         """Advance by `step` s with constant fins (m,); return angle (m,), relative to the start, and rate (m,)."""
         ...
@@ -32,7 +37,7 @@ class Plant(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Limits of the commanded fin angle about trim (rad) and of its rate (rad/s)."""
+    """Limits of the commanded fin angle, its trim included (rad), and of its rate (rad/s)."""
 
     fin: float
     fin_rate: float = np.inf
@@ -44,6 +49,10 @@ class Limits:
                 found=f"fin {self.fin:g} rad, fin rate {self.fin_rate:g} rad/s",
                 hint="set `fin_max_rad` and `fin_rate_max_rad_s` in vehicle.yaml",
             )
+
+    def about(self, trim: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the lowest and the highest fin (m,) about trim angles (m,), rad; the trim itself is within them."""
+        return np.minimum(-self.fin - trim, 0.0), np.maximum(self.fin - trim, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,15 +92,15 @@ def steer(
 
 @jit
 def steer_all(
-    command: FloatArray, angle: FloatArray, rate: FloatArray, last: FloatArray, gains: FloatArray, reach: float, most: float,
-    fin: FloatArray, free: BoolArray,
+    command: FloatArray, angle: FloatArray, rate: FloatArray, last: FloatArray, gains: FloatArray, reach: float,
+    low: FloatArray, high: FloatArray, fin: FloatArray, free: BoolArray,
 ) -> int:  # fmt: skip
     """Fill fin (m,) with the limited commands and free (m,) with whether the autopilot steers; return how many it steers."""
     count = 0
     for i in range(fin.shape[0]):
         free[i] = np.isnan(command[i])
         count += free[i]
-        fin[i] = steer(command[i], angle[i], rate[i], last[i], gains, reach, -most, most)
+        fin[i] = steer(command[i], angle[i], rate[i], last[i], gains, reach, low[i], high[i])
     return count
 
 
@@ -132,7 +141,7 @@ def fly(
     schedule = schedule or Schedule()
     values, size = maneuver.checked(parameters), plant.size
     numbers, memory, gains = maneuver.vector(values), np.tile(np.array(maneuver.memory(values)), (size, 1)), autopilot.gains
-    step, length = 1.0 / schedule.rate_hz, maneuver.duration(values)
+    (low, high), step, length = limits.about(plant.trim), 1.0 / schedule.rate_hz, maneuver.duration(values)
     excite = max(length, step)
     count = end = round((schedule.run_up + excite + schedule.recover) * schedule.rate_hz) + 1
     fin, angle, rate = np.zeros((3, count, size))
@@ -146,7 +155,7 @@ def fly(
             maneuver.rule(numbers, max(since, 0.0), angle[i], rate[i], memory, command)
         elif begun and maneuver.command is not None:
             command[:] = maneuver.command(values, np.array([since]))[0]
-        steered = steer_all(command, angle[i], rate[i], last, gains, limits.fin_rate * step, limits.fin, fin[i], free[i])
+        steered = steer_all(command, angle[i], rate[i], last, gains, limits.fin_rate * step, low, high, fin[i], free[i])
         last = fin[i]
         if begun and not done and (since >= length - 1e-9 or (maneuver.rule is not None and steered == size)):
             done, finish = True, time

@@ -170,9 +170,9 @@ def test_what_a_maneuver_does_not_show_is_no_number(run_cli):
 
 def test_every_limit_is_printed_and_what_has_none_is_named(limited):
     _, out = limited
-    for words in ("fin 14.9 deg (0.26 rad) about trim", "fin rate NOT LIMITED", "heading 60 deg (1.05 rad)", "track NOT LIMITED",
-                  "pitch NOT LIMITED", "roll 20 deg (0.349 rad)", "depth 2 to 6 m", "area 200 m along, 30 m to either side",
-                  "only to be watched in flight: depth"):  # fmt: skip
+    for words in ("fin 14.9 deg (0.26 rad), trim included", "fin rate NOT LIMITED", "heading 60 deg (1.05 rad)",
+                  "track NOT LIMITED", "pitch NOT LIMITED", "roll 20 deg (0.349 rad)", "depth 2 to 6 m",
+                  "area 200 m along, 30 m to either side", "only to be watched in flight: depth"):  # fmt: skip
         assert words in out, words
 
 

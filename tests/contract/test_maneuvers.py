@@ -25,7 +25,7 @@ class Hull:
 
     def __init__(self, *pairs: tuple[float, float]) -> None:
         self.damping, self.authority = np.array(pairs, dtype=float).T
-        self.angle, self.rate = np.zeros(self.size), np.zeros(self.size)
+        self.angle, self.rate, self.trim = np.zeros((3, self.size))
 
     @property
     def size(self) -> int:

@@ -25,7 +25,7 @@ def command(
     run: Annotated[Path | None, option("--run", "RUN", "Replay the fin of this run.")] = None,
     mapping: MappingFile = None,
     speed: Annotated[float | None, option("--speed", "M_S", "Speed; the model's own if not given.")] = None,
-    fin_max: Annotated[str, option("--fin-max", "ANGLE", "Largest fin angle about trim, `20deg` or `0.35rad`.")] = "0.35rad",
+    fin_max: Annotated[str, option("--fin-max", "ANGLE", "Largest fin angle, trim included: `20deg` or `0.35rad`.")] = "0.35rad",
     rate: Annotated[float, option("--rate", "HZ", "Samples per second of a maneuver.", min=1.0, max=1000.0)] = 20.0,
     noise: Annotated[int | None, option("--noise", "SEED", "Add the model's sensor noise from this seed.")] = None,
     output: OutputFile = None,

@@ -31,6 +31,11 @@ class ModelPlant:
         self.fin = record.fin.copy()
         self.sample = 0
 
+    @property
+    def trim(self) -> FloatArray:
+        """The fin angle of straight flight (1,), rad."""
+        return np.array([self.scene.trim_fin])
+
     def advance(self, fin: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 - the clock is the record's
         """Advance by one interval with a constant fin (1,) rad; return angle (1,) rad and rate (1,) rad/s at its end."""
         self.fin[self.sample :] = fin[0] + self.scene.trim_fin

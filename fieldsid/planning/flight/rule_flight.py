@@ -172,8 +172,7 @@ def fly_fins(
     is simulated in a few iterations (`_through_actuators`).
     """
     command, angle, rate = (np.empty((plant.size, time.size)) for _ in range(3))
-    low, high = np.minimum(-limits.fin - plant.trim, 0.0), np.maximum(limits.fin - plant.trim, 0.0)
-    bounds = np.column_stack([low, high, np.full(plant.size, limits.fin_rate), plant.trim])
+    bounds = np.column_stack([*limits.about(plant.trim), np.full(plant.size, limits.fin_rate), plant.trim])
     gains, steps, out = autopilot.gains, np.diff(time), np.empty((time.size, 3))
 
     def flown(off: FloatArray) -> FloatArray:

@@ -60,7 +60,7 @@ class Envelope:
     accepted probability of leaving any of them.
     """
 
-    fin: Annotated[float, Key("Largest fin angle about trim, rad.")]
+    fin: Annotated[float, Key("Largest fin angle, that of its trim included, rad.")]
     fin_rate: Annotated[Number, Key("Fastest fin, rad/s.")] = np.inf
     heading: Annotated[float | None, Key("Largest deviation of heading, rad.")] = None
     track: Annotated[float | None, Key("Largest distance from the leg's line, m.")] = None
@@ -235,7 +235,7 @@ def limits_said(envelope: Envelope) -> dict[str, str]:
         return NOT_LIMITED if value is None else f"{said(value)}{per}"
 
     return {
-        "fin": angle(envelope.fin, " about trim"),
+        "fin": angle(envelope.fin, ", trim included"),
         "fin rate": angle(fin_rate, " per s"),
         "heading": angle(envelope.heading),
         "track": NOT_LIMITED if envelope.track is None else f"{envelope.track:g} m to either side",

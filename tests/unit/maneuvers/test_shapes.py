@@ -93,13 +93,21 @@ class Turner:
 
     size = 1
 
-    def __init__(self, gain):
-        self.gain, self.angle = gain, np.zeros(1)
+    def __init__(self, gain, trim=0.0):
+        self.gain, self.angle, self.trim = gain, np.zeros(1), np.array([trim])
 
     def advance(self, fin, step):
         rate = self.gain * fin
         self.angle = self.angle + rate * step
         return self.angle.copy(), rate
+
+
+@pytest.mark.parametrize(("trim", "low", "high"), [(0.1, -0.3, 0.2), (-0.1, -0.2, 0.3), (0.0, -0.3, 0.3)])
+def test_a_fin_that_straight_flight_takes_is_part_of_its_limit(trim, low, high):
+    """A fin of 0.3 rad at most that is held at 0.1 moves 0.2 further to that side."""
+    maneuver, values = parse_spec("zigzag:amplitude=0.3,turn=0.3,reversals=3")
+    flight = fly(maneuver, values, Turner(1.0, trim), limits=Limits(0.3), autopilot=Autopilot(1.0, 0.0))
+    assert (flight.fin.min(), flight.fin.max()) == (pytest.approx(low), pytest.approx(high))
 
 
 @pytest.mark.parametrize("gain", [1.0, -1.0])
