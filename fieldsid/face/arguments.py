@@ -102,8 +102,8 @@ def runs_of_models(
     """Return the runs to which the models of a source were fitted, which show the speed lost in turns, or the path of a dive.
 
     Each is read with the mapping, else with its former one. Those that cannot be read again are left out, and say is called with
-    their names and the hint. Empty for a source that is no model, and for pitch but
-    with `depth`.
+    their names and the hint. Empty for a source that is no model, and for pitch without
+    `depth`.
     """
     from fieldsid.logs.few_of import few_of
     from fieldsid.logs.run import Run

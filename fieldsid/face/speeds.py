@@ -24,23 +24,16 @@ def speeds_of(given: str | Iterable[float] | None) -> list[float]:
 def _checked(speeds: list[float]) -> list[float]:
     """Return the speeds; raises UsageError for one that no underwater vehicle has."""
     for speed in speeds:
-        if speed > 0.0 and not SLOWEST <= speed <= FASTEST:
-            raise UsageError(
-                f"a speed of {speed:g} m/s cannot be right",
-                found=f"--speeds {','.join(f'{s:g}' for s in speeds[:4])}",
-                hint=f"give speeds in m/s, {SLOWEST:g} to {FASTEST:g}: `--speeds 1.0,1.5,2.0`",
-            )
+        if speed > 0.0:
+            refuse_speed(speed, f"--speeds {','.join(f'{s:g}' for s in speeds[:4])}", "speeds", "`--speeds 1.0,1.5,2.0`")
     return speeds
 
 
-def refuse_speed(speed: float) -> None:
-    """Raise UsageError for a speed in m/s at which no underwater vehicle flies by its fins."""
+def refuse_speed(speed: float, found: str, what: str = "one", example: str = "`--speed 1.5`") -> None:
+    """Raise UsageError for a speed in m/s at which no underwater vehicle flies by its fins; `found` is what was typed."""
     if not SLOWEST <= speed <= FASTEST:
-        raise UsageError(
-            f"a speed of {speed:g} m/s cannot be right",
-            found=f"--speed {speed:g}",
-            hint=f"give one in m/s, {SLOWEST:g} to {FASTEST:g}: `--speed 1.5`",
-        )
+        hint = f"give {what} in m/s, {SLOWEST:g} to {FASTEST:g}: {example}"
+        raise UsageError(f"a speed of {speed:g} m/s cannot be right", found=found, hint=hint)
 
 
 def _read(text: str) -> list[float]:

@@ -7,10 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from truth import maneuvers
-from truth.logbook import flown
-from truth.noise import Clock
-from truth.physics import Physics
+from three_flights import CLOCK, HULL, three_flights
 
 from fieldsid.diagnosis import diagnose
 from fieldsid.extension.extend import extend_in_steps, whole_of
@@ -19,22 +16,14 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
 
-CLOCK = Clock(0.1, 400)
-HULL = Physics(damping=0.9, authority=-0.7, fin_bend=0.0)
 SPEEDS = (1.5, 1.503, 1.498)
 """What the logs say of runs that were all flown at one speed."""
 
 
 def logs(hidden):
     """Two runs to fit and one to judge by, exact but for the measured speed."""
-    plans = (
-        maneuvers.zigzag(CLOCK.time, 0.25, 0.4),
-        maneuvers.multisine(CLOCK.time, np.random.default_rng(4), 0.25),
-        maneuvers.zigzag(CLOCK.time, 0.15, 0.3),
-    )
     runs = []
-    for i, (plan, speed) in enumerate(zip(plans, SPEEDS, strict=True)):
-        log = flown(hidden, CLOCK, plan)
+    for i, (log, speed) in enumerate(zip(three_flights(hidden), SPEEDS, strict=True)):
         signals = {k: log[k] for k in ("yaw_rad", "yaw_rate_rad_s", "rudder_rad")}
         runs.append(Run(f"run{i}", log["time_s"], signals | {"surge_m_s": np.full(CLOCK.time.size, speed)}))
     return runs[:2], runs[2:]

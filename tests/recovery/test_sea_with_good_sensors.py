@@ -2,35 +2,22 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
-from truth import maneuvers
-from truth.logbook import flown
-from truth.noise import Clock
-from truth.physics import Physics
+from three_flights import HULL, three_flights
 
 from fieldsid.diagnosis import diagnose
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 
-CLOCK = Clock(0.1, 400)
-HULL = Physics(damping=0.9, authority=-0.7, fin_bend=0.0)
 SENSORS = {"angle_noise": 5e-4, "rate_noise": 5e-4}
 SEA = {"gust": 3e-3, "gust_s": 3.0}
+SIGNALS = ("yaw_rad", "yaw_rate_rad_s", "rudder_rad", "surge_m_s")
 
 
 def logs(hidden):
     """Two runs to fit and one to judge by."""
-    plans = (
-        maneuvers.zigzag(CLOCK.time, 0.25, 0.4),
-        maneuvers.multisine(CLOCK.time, np.random.default_rng(4), 0.25),
-        maneuvers.zigzag(CLOCK.time, 0.15, 0.3),
-    )
-    runs = []
-    for i, plan in enumerate(plans):
-        log = flown(hidden, CLOCK, plan, seed=50 + i, **SENSORS, **SEA)
-        signals = {k: log[k] for k in ("yaw_rad", "yaw_rate_rad_s", "rudder_rad", "surge_m_s")}
-        runs.append(Run(f"run{i}", log["time_s"], signals))
+    flights = three_flights(hidden, seed=50, **SENSORS, **SEA)
+    runs = [Run(f"run{i}", log["time_s"], {k: log[k] for k in SIGNALS}) for i, log in enumerate(flights)]
     return runs[:2], runs[2:]
 
 

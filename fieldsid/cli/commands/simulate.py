@@ -51,7 +51,7 @@ def command(
             hint="`--maneuver square_pulses` or `--run RUN`",
         )
     if speed is not None:
-        refuse_speed(speed)
+        refuse_speed(speed, f"--speed {speed:g}")
     known = read_model(model)
     if run is None:
         made = _fly_maneuver(known, maneuver or "", speed, fin_max, rate)

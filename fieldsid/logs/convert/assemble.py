@@ -229,9 +229,6 @@ def _quaternion(signal: str, series: Series, source: Source, mapping: ChannelMap
 
 
 def _position(signal: str, series: Series, source: Source, mapping: ChannelMap) -> dict[str, FloatArray]:
-    degrees = (
-        series.values
-        if source.unit is None
-        else scaled(series.values, pick_unit(source.unit, ("angle",), "`position`").factor / DEGREE)
-    )
+    factor = 1.0 if source.unit is None else pick_unit(source.unit, ("angle",), "`position`").factor / DEGREE
+    degrees = scaled(series.values, factor)
     return dict(zip(("x_m", "y_m"), north_and_east(degrees), strict=True))
