@@ -16,16 +16,14 @@ from fieldsid.diagnosis.data.heading_span import shown_by_headings
 from fieldsid.diagnosis.data.holdout_split import holdout_split
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
-from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, with_free_run
 from fieldsid.diagnosis.records import Candidate, Diagnosis
 from fieldsid.diagnosis.report.final_model import final_model
 from fieldsid.diagnosis.report.next_maneuver import next_maneuver
 from fieldsid.diagnosis.report.report_text import apart_from_the_hulls_own, evidence, headline
 from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests, residual_tests
-from fieldsid.diagnosis.search.noiseless_search import noiseless_search
 from fieldsid.diagnosis.search.search import MAX_CANDIDATES, Search
-from fieldsid.diagnosis.thresholds import MAIN_EXPLAINED_SHARE, RIVAL_PROBABILITY_RATIO
+from fieldsid.diagnosis.thresholds import RIVAL_PROBABILITY_RATIO
 from fieldsid.diagnosis.verdict import (
     Verdict,
     added_effects,
@@ -34,7 +32,6 @@ from fieldsid.diagnosis.verdict import (
     left_of,
     names_added,
     probabilities,
-    stands,
     verdict_of,
     worsens,
 )
@@ -87,17 +84,8 @@ def diagnose(
     if missing:
         raise DataError(f"`{missing[0]}` is in the model but cannot be simulated on these runs", found=unlogged[missing[0]])
     catalogue, narrow = shown_by_headings(catalogue, [*learned, *unseen], known)
-    diagnosis_of = partial(_diagnosis, unlogged=unlogged, skipped=unlogged | narrow, notes=notes)
-    begin = partial(Search, learned, unseen, axis, catalogue, known, report, thorough=thorough, given=model)
-    result = _best_result(begin())
-    if result.verdict.word != "unexplained" or not result.work.is_noiseless:
-        return diagnosis_of(result)
-    work = begin()
-    found = noiseless_search(work, lambda h: excess_explained(work, h) > MAIN_EXPLAINED_SHARE)
-    if found is None or not excess_explained(work, found) > MAIN_EXPLAINED_SHARE:
-        return diagnosis_of(result)
-    by_error = _search_result(work, found, found.likelihood_fit, Verdict("effect", added_effects(work, found)))
-    return diagnosis_of(by_error if stands(work, found, by_error.residual_tests, work.floor) else result)
+    work = Search(learned, unseen, axis, catalogue, known, report, thorough=thorough, given=model)
+    return _diagnosis(_search_result(work), unlogged, unlogged | narrow, notes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,13 +107,11 @@ class _SearchResult:
     leading: Sequence[ScoredModel]
 
 
-def _best_result(work: Search) -> _SearchResult:
-    found = work.best()
-    return _search_result(work, found, joint_noise_fit(found.likelihood_fit, work.parallel))
-
-
-def _search_result(work: Search, found: ScoredModel, ml_fit: LikelihoodFit, verdict: Verdict | None = None) -> _SearchResult:
-    """Return the final model of a search with its residual tests, its models for the file, and its verdict where not given."""
+def _search_result(work: Search) -> _SearchResult:
+    """Return the final model of a search with its residual tests, its models for the file, and its verdict."""
+    best = work.best()
+    found = work.tried[frozenset(best.names)] = work.reported(best)
+    ml_fit = work.tested_fit(found)
     base, ranked = work.base(), _leading(work, found)
     shown, beyond = ranked[:MAX_CANDIDATES], ranked[MAX_CANDIDATES:]
 
@@ -150,7 +136,7 @@ def _search_result(work: Search, found: ScoredModel, ml_fit: LikelihoodFit, verd
     done = work.parallel.map(lambda part: part(), parts)
     own, left, places = done[:3]
     leading, of_base = (*done[3 : 3 + len(shown)], *beyond), own if found is base else done[-1]
-    verdict = verdict or verdict_of(work, found, left, ml_fit)
+    verdict = verdict_of(work, found, left, ml_fit)
     return _SearchResult(work, found, ml_fit, left, verdict, (of_base, own), places, leading)
 
 

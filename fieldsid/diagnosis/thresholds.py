@@ -43,8 +43,6 @@ parameters are fitted too, so that a gain there alone proves nothing. An effect 
 MAX_ERROR_RATIO = 0.92
 """Error ratio that an addition must reach: a significant effect need not be important. Speed, trim and clock of a real vehicle
 always differ a little from the model's, which leaves a few percent of the noise."""
-MAX_FREE_RUN_ERROR_RATIO = 0.95
-"""Error ratio that each effect must reach in a log without noise, where no likelihood decides."""
 EQUAL_ERROR_RATIO = 1.03
 """Error ratio up to which two models predict equally well."""
 

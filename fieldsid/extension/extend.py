@@ -15,11 +15,9 @@ from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.diagnosis.data.holdout_split import holdout_split
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
 from fieldsid.diagnosis.evidence.acceptance import common_own_moment, is_accepted
-from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.records import FLOOR, Errors, Pair
 from fieldsid.diagnosis.report.final_model import final_model
-from fieldsid.diagnosis.search.noiseless_search import noiseless_line
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import MAX_ERROR_RATIO
 from fieldsid.display import Brief, Plotted
@@ -137,12 +135,13 @@ def extend_in_steps(
     parts = _with_signals((*(effect_held(n, parent.own) for n in parent.effects), *new), [*learned, *judged])
     notes = (*notes, *left_out([run for run, _ in (*fitted, *checked)], parent.axis))
     begin = partial(Search, axis=parent.axis, catalogue=parts, known=parent.effects, report=report, thorough=True, given=parent)
-    work, line = _refitted_line(partial(begin, learned, judged), new)
+    work = begin(learned, judged)
+    line = _refitted_line(work, new)
     steps = _extensions_of_line(work, line, new, notes)
     if not judged or whole_of(steps).pays or not is_accepted(line[0], line[-1]):
         return steps
-    work, line = _refitted_line(partial(begin, (*learned, *judged), ()), new)
-    return _extensions_of_line(work, line, new, (*notes, FITTED_TO_ALL))
+    work = begin((*learned, *judged), ())
+    return _extensions_of_line(work, _refitted_line(work, new), new, (*notes, FITTED_TO_ALL))
 
 
 def whole_of(steps: Sequence[Extension]) -> Extension:
@@ -153,14 +152,12 @@ def whole_of(steps: Sequence[Extension]) -> Extension:
     return replace(steps[-1], gain=gain, evidence=sum(s.evidence for s in steps), notes=notes)
 
 
-def _refitted_line(begin: Callable[[], Search], new: Sequence[Effect]) -> tuple[Search, list[ScoredModel]]:
-    """Return the refitted parent and the refitted models after each addition of the new effects in order, and their search.
+def _refitted_line(work: Search, new: Sequence[Effect]) -> list[ScoredModel]:
+    """Return the refitted parent and the refitted models after each addition of the new effects in order.
 
     The full set is built up from the best few sets of each size and from the first effects in their order. Then the search of
-    `diagnose` runs with these effects alone, and the better optimum of each set is kept. Without noise the line is also fitted as
-    in the search by the error, and the line that ends at the lower error is taken.
+    `diagnose` runs with these effects alone, and the better optimum of each set is kept.
     """
-    work = begin()
     work.base()
     line = [work.root | {e.name for e in new[:size]} for size in range(len(new) + 1)]
     front = {work.root}
@@ -168,11 +165,7 @@ def _refitted_line(begin: Callable[[], Search], new: Sequence[Effect]) -> tuple[
         children = {frozenset(c.names): c for key in front for c in work.grow(work.tried[key], forced=True)}
         front = set(sorted(children, key=lambda key: -children[key].log_evidence)[:BEAM_WIDTH]) | {ends}
     work.best()
-    likeliest = work, [work.tried[names] for names in line]
-    if not work.is_noiseless:
-        return likeliest
-    by_error = begin()
-    return min((likeliest, (by_error, noiseless_line(by_error, line))), key=lambda found: found[1][-1].selection_errors.mean)
+    return work.parallel.map(work.reported, [work.tried[names] for names in line])
 
 
 def _extensions_of_line(
@@ -191,9 +184,7 @@ def _extension(
     learned, judged = work.records, work.validation
     moment_std = common_own_moment(before, after)
     before, after = before.with_own_moment(moment_std), after.with_own_moment(moment_std)
-    # as in `diagnose`: the residual of runs without noise is not coloured sensor noise
-    ended_with = after.likelihood_fit if work.is_noiseless else joint_noise_fit(after.likelihood_fit, work.parallel)
-    noise = ended_with.noise
+    noise = work.tested_fit(after).noise
     gain = Gain(
         added=tuple(e.name for e in new),
         before=before.errors,

@@ -14,7 +14,7 @@ from fieldsid.noise.fisher_scoring import information, innovations_of
 from fieldsid.noise.innovations import kind_of
 from fieldsid.noise.noise_kinds import LOG_MEDIANS, LOG_PRECISIONS, NOISE_FIELDS, NOISE_KINDS, NOISE_PARAMETERS
 from fieldsid.noise.secant_information import with_secants
-from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S, white_noise_floor
+from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S, WhiteBounds, white_noise_floor
 from fieldsid.noise.whiten import base_dynamics, noise_vector, whiten
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.bounded_lm_step import bounded_step
@@ -25,9 +25,6 @@ MAX_SCORING_ITERATIONS, MIN_DAMPING, MIN_DAMPING_AFTER_REFUSAL = 30, 1e-3, 0.1
 """Most iterations, least damping of a step, and the least damping from which a refused step raises it."""
 MAX_LOG_STEP = 1.5
 """Longest step of the logarithm of a noise parameter: the Fisher information is valid only locally."""
-MIN_WHITE_SHARE = 0.1
-"""Least white noise, as a share of the noise floor from third differences: an AR(1) noise that is correlated over many samples
-has no white part, but the floor contains half of its increments."""
 BELOW_ANY_BOUND = 1e-12
 """A value below the lower bound of every noise parameter, so that its logarithm exists."""
 MIN_SCORING_GAIN = 0.02
@@ -70,7 +67,7 @@ def estimate_noise(
     noise_kind: str,
     start: Noise,
     likelihood: Callable[[FloatArray], float] | None = None,
-    floor: Noise | None = None,
+    white: WhiteBounds | None = None,
     *,
     reinitialise: bool = True,
     has_prior: bool = False,
@@ -79,8 +76,8 @@ def estimate_noise(
     """Return the noise of a kind with the highest likelihood, and that log likelihood.
 
     `dynamics` are (damping, stiffness) of each run's base model. `start` is where the search begins. `likelihood` is a function
-    of a noise vector (7,), by default the likelihood of the residuals. `floor` is the white noise, near which the estimate of it
-    is bounded, by default that of the signals' third differences. With `reinitialise`, components that are nearly zero in `start`
+    of a noise vector (7,), by default the likelihood of the residuals. `white` are the bounds of the white noise, by default near
+    the floor of the signals' third differences. With `reinitialise`, components that are nearly zero in `start`
     begin at a share of their rough size. With `has_prior` the prior density is part of the objective, see `log_prior`.
     `evaluations` counts the runs filtered. The method is Fisher scoring on the logarithms of the noise parameters (Harvey 1989,
     section 3.4.5). Where a `likelihood` is given, its gradient is by differences and the information is still that of the
@@ -89,9 +86,9 @@ def estimate_noise(
     if not all(np.isfinite(e).all() for e in residuals):
         return start, -np.inf
     names = NOISE_KINDS[noise_kind].fields
-    floor = floor or white_noise_floor(records)
-    initial, near_zero = _reinitialised(records, dynamics, residuals, floor, start) if reinitialise else ({}, ())
-    low, high = _bounds(names, floor, _least_white_noise(records))
+    white = white or WhiteBounds.near(white_noise_floor(records))
+    initial, near_zero = _reinitialised(records, dynamics, residuals, white.floor, start) if reinitialise else ({}, ())
+    low, high = _bounds(names, white, _least_white_noise(records))
     place = np.array([NOISE_FIELDS.index(n) for n in names])
     known = np.array([p.absent for p in NOISE_PARAMETERS.values()])
     counted = evaluations or EvaluationCounter()
@@ -174,13 +171,15 @@ class _LogNoiseLikelihood:
         return (total, score, fisher) if known else (-np.inf, np.zeros(count), np.eye(count))
 
 
-def _bounds(names: tuple[str, ...], floor: Noise, least: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """Return the bounds of the logarithms of noise parameters; white sensor noise stays near the noise floor.
+def _bounds(names: tuple[str, ...], white: WhiteBounds, least: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """Return the bounds of the logarithms of noise parameters, with those of the white sensor noise given.
 
     Where the floor is below `least` (angle, rate), that is the lower bound.
     """
+    floor = white.floor
     least_white = (
-        MIN_WHITE_SHARE * seen if seen > bound else bound for seen, bound in zip((floor.angle, floor.rate), least, strict=True)
+        low if seen > bound else bound
+        for low, seen, bound in zip((white.least.angle, white.least.rate), (floor.angle, floor.rate), least, strict=True)
     )
     low = {n: p.low for n, p in NOISE_PARAMETERS.items()} | dict(zip(("angle", "rate"), least_white, strict=True))
     high = {n: p.high for n, p in NOISE_PARAMETERS.items()} | {

@@ -21,6 +21,7 @@ from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.noise.maximum_likelihood import estimate_noise, log_likelihood, log_prior
 from fieldsid.noise.moment_response import base_responses
+from fieldsid.noise.white_floor import WhiteBounds
 from fieldsid.noise.whiten import base_dynamics, whiten
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.gram_least_squares import solve_normal_equations
@@ -97,7 +98,7 @@ def likeliest_std(runs: Sequence[MomentInformation], most: float) -> float:
 
 def estimate_noise_of_runs(
     records: Sequence[Record], dynamics: Sequence[tuple[float, float]], residuals: Sequence[FloatArray], noise_kind: str,
-    start: Noise, floor: Noise, most: float, known: Sequence[MomentInformation] = (), *,
+    start: Noise, white: WhiteBounds, most: float, known: Sequence[MomentInformation] = (), *,
     reinitialise: bool = True, evaluations: EvaluationCounter | None = None,
 ) -> tuple[Noise, float]:  # fmt: skip
     """Return the noise of a kind, with `own_moment`, of the highest posterior density, and the log of that density.
@@ -115,7 +116,7 @@ def estimate_noise_of_runs(
             reduced,
             noise_kind,
             noise,
-            floor=floor,
+            white=white,
             reinitialise=again,
             has_prior=True,
             evaluations=evaluations,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import nan
 
 import numpy as np
@@ -15,6 +16,28 @@ from fieldsid.numerics.white_noise import white_noise_std
 MIN_ANGLE_NOISE_RAD = 1e-7
 
 MIN_RATE_NOISE_RAD_S = 1e-7
+
+MIN_WHITE_SHARE = 0.1
+"""Least white noise, as a share of the noise floor from third differences: an AR(1) noise that is correlated over many samples
+has no white part, but the floor contains half of its increments."""
+
+
+@dataclass(frozen=True, slots=True)
+class WhiteBounds:
+    """The bounds of the white noise that a fit may estimate: never less than `least`, and at most twice `floor`."""
+
+    floor: Noise
+    least: Noise
+
+    @classmethod
+    def near(cls, floor: Noise) -> WhiteBounds:
+        """Return the bounds about a floor from third differences."""
+        return cls(floor, Noise(MIN_WHITE_SHARE * floor.angle, MIN_WHITE_SHARE * floor.rate))
+
+    @classmethod
+    def above(cls, error: Noise) -> WhiteBounds:
+        """Return the bounds above an error below which no model follows the motion, whatever the sensors' noise."""
+        return cls(error, error)
 
 
 def white_noise_floor(records: Sequence[Record]) -> Noise:

@@ -206,7 +206,7 @@ def diagnosed(data):
     ml_fit, effect = h.likelihood_fit, effect_named(data.effect)
     problem = ml_fit.fitted.problem.with_effects([effect])
     _, x = from_truth(problem, data)
-    true = score_model(fit_maximum_likelihood(problem, x, ml_fit.noise, ml_fit.floor, ml_fit.noise_kind), work.validation)
+    true = score_model(fit_maximum_likelihood(problem, x, ml_fit.noise, ml_fit.white, ml_fit.noise_kind), work.validation)
     by_cost = (-ml_fit.log_likelihood, -true.likelihood_fit.log_likelihood)
     by_evidence = (-h.log_evidence, -true.log_evidence)
     reached, best = min(by_cost, by_evidence, key=lambda pair: pair[0] - pair[1])

@@ -34,7 +34,6 @@ NUMBERS = {
     "share of the excess below which a search looks further": thresholds.MIN_EXPLAINED_SHARE,
     "share of the excess that counts as most of it": thresholds.MAIN_EXPLAINED_SHARE,
     "error that right effects leave, as a share of the base's": thresholds.MISFIT_SHARE,
-    "share that the error of a log without noise must fall to": thresholds.MAX_FREE_RUN_ERROR_RATIO,
     "log likelihood per number of a noise kind": reml.PENALTY_PER_PARAMETER,
     "p-value below which `auto` takes no residual for a disturbance": auto_method.MIN_P_VALUE,
     "free-run error of `pem` over that of output error, for `auto`, where a test rejects": auto_method.MAX_FREE_RUN_RATIO,

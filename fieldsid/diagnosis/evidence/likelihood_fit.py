@@ -25,6 +25,7 @@ from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.noise.own_moment import FIN_REPEATABILITY_RAD, MomentInformation, estimate_noise_of_runs, moment_information
+from fieldsid.noise.white_floor import WhiteBounds
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.rounding import nine_digits
 
@@ -78,7 +79,7 @@ class LikelihoodFit:
     noise: Noise
     log_likelihood: float
     noise_kind: str
-    floor: Noise
+    white: WhiteBounds
 
     @cached_property
     def information(self) -> Information:
@@ -109,31 +110,31 @@ def fit_output_error(
 
 
 def fit_maximum_likelihood(
-    problem: Problem, x: FloatArray, start: Noise, floor: Noise, noise_kind: str, *, rival: float = -np.inf
+    problem: Problem, x: FloatArray, start: Noise, white: WhiteBounds, noise_kind: str, *, rival: float = -np.inf
 ) -> LikelihoodFit:  # fmt: skip
     """Return the maximum-likelihood fit that starts from x.
 
     Generalised least squares of the parameters and estimation of the noise alternate. The white part of
-    the noise is constrained to stay near `floor`. The fit stops early where it cannot reach the log likelihood `rival`.
+    the noise stays within `white`. The fit stops early where it cannot reach the log likelihood `rival`.
     """
-    noise, likelihood = _noise_at(problem, x, start, floor, noise_kind)
+    noise, likelihood = _noise_at(problem, x, start, white, noise_kind)
     for _ in range(MAX_ALTERNATIONS):
         found = levenberg_marquardt(problem, x, noise, max_iterations=MAX_GLS_ITERATIONS, tolerance=LIKELIHOOD_COST_TOLERANCE)
-        new_noise, new = _noise_at(problem, found.x, noise, floor, noise_kind, reinitialise=False)
+        new_noise, new = _noise_at(problem, found.x, noise, white, noise_kind, reinitialise=False)
         if not new > likelihood:
             break
         gained, x, noise, likelihood = new - likelihood, found.x, new_noise, new
         if gained < MIN_LIKELIHOOD_GAIN or likelihood + MAX_REMAINING_GAIN_RATIO * gained < rival:
             break
-    return LikelihoodFit(FittedProblem(problem, x, white_weights(problem, x)), noise, likelihood, noise_kind, floor)
+    return LikelihoodFit(FittedProblem(problem, x, white_weights(problem, x)), noise, likelihood, noise_kind, white)
 
 
 def _noise_at(
-    problem: Problem, x: FloatArray, start: Noise, floor: Noise, noise_kind: str, *, reinitialise: bool = True
+    problem: Problem, x: FloatArray, start: Noise, white: WhiteBounds, noise_kind: str, *, reinitialise: bool = True
 ) -> tuple[Noise, float]:  # fmt: skip
     residuals, dynamics = residuals_of(problem, x), dynamics_of(problem, x)
     return estimate_noise_of_runs(
-        problem.records, dynamics, residuals, noise_kind, start, floor, largest_own_moment(problem, x),
+        problem.records, dynamics, residuals, noise_kind, start, white, largest_own_moment(problem, x),
         reinitialise=reinitialise, evaluations=problem.evaluations,
     )  # fmt: skip
 

@@ -19,15 +19,16 @@ from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, MIN_COLOUR_RATIO
 from fieldsid.models.model import Noise
 from fieldsid.noise.noise_kinds import JOINT_NOISE, SINGLE_NOISE_KINDS
+from fieldsid.noise.white_floor import WhiteBounds
 
 
-def fit_base(fitted: FittedProblem, floor: Noise, resolution_floor: Noise, parallel: ParallelMap) -> LikelihoodFit:
+def fit_base(fitted: FittedProblem, floor: Noise, white: WhiteBounds, parallel: ParallelMap) -> LikelihoodFit:
     """Return the base model under the likeliest kind of noise, or both kinds together where that is so.
 
     White noise is a member of every kind: a later kind is taken only where it gains more than MIN_LIKELIHOOD_GAIN.
     """
     best, *others = parallel.map(
-        lambda f: fit_maximum_likelihood(fitted.problem, fitted.x, floor, resolution_floor, f),
+        lambda f: fit_maximum_likelihood(fitted.problem, fitted.x, floor, white, f),
         SINGLE_NOISE_KINDS,
     )
     for other in others:
@@ -44,14 +45,14 @@ def joint_noise_fit(own: LikelihoodFit, parallel: ParallelMap) -> LikelihoodFit:
         return own
     problem = own.fitted.problem
     other = fit_maximum_likelihood(
-        problem, own.fitted.x, own.noise, own.floor, next(f for f in SINGLE_NOISE_KINDS if f != own.noise_kind)
+        problem, own.fitted.x, own.noise, own.white, next(f for f in SINGLE_NOISE_KINDS if f != own.noise_kind)
     )
     if not (has_sensor_colour(own) or has_sensor_colour(other)):
         return own
     # start from both fits: an optimum under one kind may be a local minimum under the joint noise
     least = own.log_likelihood + ALTERNATIVE_LOG_ODDS
     ends = parallel.map(
-        lambda j: fit_maximum_likelihood(problem, j.fitted.x, j.noise, own.floor, JOINT_NOISE, rival=least), (own, other)
+        lambda j: fit_maximum_likelihood(problem, j.fitted.x, j.noise, own.white, JOINT_NOISE, rival=least), (own, other)
     )
     both = max(ends, key=lambda j: j.log_likelihood)
     return both if both.log_likelihood > least else own
@@ -59,7 +60,7 @@ def joint_noise_fit(own: LikelihoodFit, parallel: ParallelMap) -> LikelihoodFit:
 
 def has_sensor_colour(ml_fit: LikelihoodFit) -> bool:
     """Whether the coloured sensor noise exceeds MIN_COLOUR_RATIO times the white one."""
-    noise, floor = ml_fit.noise, ml_fit.floor
+    noise, floor = ml_fit.noise, ml_fit.white.floor
     return noise.coloured_angle > MIN_COLOUR_RATIO * floor.angle or noise.coloured_rate > MIN_COLOUR_RATIO * floor.rate
 
 

@@ -76,10 +76,10 @@ def log_predictive_density(
     _, at_posterior_mean = _density_and_residuals(ml_fit.noise, runs, dynamics, known)
     found = []
     for residuals in (
-        (at_estimate, at_posterior_mean) if _differ(at_estimate, at_posterior_mean, ml_fit.floor) else (at_estimate,)
+        (at_estimate, at_posterior_mean) if _differ(at_estimate, at_posterior_mean, ml_fit.white.floor) else (at_estimate,)
     ):
         noise, _ = estimate_noise_of_runs(
-            records, dynamics, residuals, ml_fit.noise_kind, ml_fit.noise, ml_fit.floor,
+            records, dynamics, residuals, ml_fit.noise_kind, ml_fit.noise, ml_fit.white,
             largest_own_moment(ml_fit.fitted.problem, ml_fit.fitted.x), ml_fit.own_moments, evaluations=evaluations,
         )  # fmt: skip
         found.append((*_density_and_residuals(noise, runs, dynamics, known), noise.own_moment))

@@ -52,7 +52,7 @@ class ScoredModel:
     run to run: the mean of the disturbance in each. `settled_residuals` [(2, n)] are the residuals of the validation runs at the
     posterior mean of the parameters after all runs. `output_error_fit` is an output-error fit that is reported instead where its
     free run is nearer to the validation runs. It is computed for the base model, for models that are shown but were not found,
-    and for every model of a log without noise.
+    and in logs without noise for the one found.
     """
 
     likelihood_fit: LikelihoodFit

@@ -17,14 +17,16 @@ Names = frozenset[str]
 class Archive(MutableMapping[Names, ScoredModel]):
     """The model with the most evidence for each set of effects, over variants, speed laws and optima.
 
-    `known` are the effects of the base. `expanded` are the sets to which effects were added. `thinned` and `varied` hold the log
-    evidence of a set when it was last fitted without each of its effects, and with other variants of some of them.
+    `known` are the effects of the base. `expanded` are the sets to which effects were added. `thinned`, `refined` and
+    `varied` hold the log evidence of a set when it was last fitted without each of its effects, under other laws, and with other
+    variants of some of them.
     """
 
     known: Names
     models: dict[Names, ScoredModel] = field(default_factory=dict)
     expanded: set[Names] = field(default_factory=set)
     thinned: dict[Names, float] = field(default_factory=dict)
+    refined: dict[Names, float] = field(default_factory=dict)
     varied: dict[tuple[Names, Names], float] = field(default_factory=dict)
 
     def __getitem__(self, names: Names) -> ScoredModel:
@@ -65,10 +67,9 @@ class Archive(MutableMapping[Names, ScoredModel]):
         left = ((n, frozenset(h.names) - {n}) for n in h.names if n not in self.known)
         return [(n, self.models[k]) for n, k in left if k in self.models]
 
-    def is_varied(self, h: ScoredModel) -> bool:
-        """Return whether all effects of a model were tried in other variants, and its evidence has hardly increased since."""
-        names = frozenset(h.names)
-        return h.log_evidence <= self.varied.get((names, names), -np.inf) + MIN_LIKELIHOOD_GAIN
+    def is_refined(self, h: ScoredModel) -> bool:
+        """Return whether a model was tried under other laws and in other variants, at about its present evidence."""
+        return h.log_evidence <= self.refined.get(frozenset(h.names), -np.inf) + MIN_LIKELIHOOD_GAIN
 
     def is_thinned(self, h: ScoredModel) -> bool:
         """Return whether a model was fitted without each of its effects, and its evidence has hardly increased since."""

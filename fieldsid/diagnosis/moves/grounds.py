@@ -15,6 +15,7 @@ from fieldsid.diagnosis.thresholds import RIVAL_LOG_ODDS
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
+from fieldsid.noise.white_floor import WhiteBounds
 from fieldsid.numerics.arrays import FloatArray
 
 SAME_OPTIMUM = 1e-3
@@ -25,20 +26,19 @@ SAME_OPTIMUM = 1e-3
 class Grounds:
     """The common conditions under which models are compared, so that log evidences differ only because the effects differ.
 
-    `floor` is the sensors' noise, `resolution_floor` the value near which the white part of a fit's noise is constrained,
-    `noise_kind` the kind of noise of every fit.
+    `floor` is the sensors' noise, `white` the bounds of the white noise of every fit, `noise_kind` its kind of noise.
     """
 
     validation: tuple[Record, ...]
     floor: Noise
-    resolution_floor: Noise
+    white: WhiteBounds
     noise_kind: str
     parallel: ParallelMap
     report: Callable[[str], None]
 
     def fit(self, problem: Problem, x: FloatArray, noise: Noise, *, rival: float = -np.inf) -> LikelihoodFit:
         """Return the maximum-likelihood fit from x and a noise; it stops early if it cannot reach the log likelihood `rival`."""
-        return fit_maximum_likelihood(problem, x, noise, self.resolution_floor, self.noise_kind, rival=rival)
+        return fit_maximum_likelihood(problem, x, noise, self.white, self.noise_kind, rival=rival)
 
     def fit_from_the_free_run(self, h: ScoredModel) -> LikelihoodFit:
         """Return the maximum-likelihood fit of a model from its output-error fit.

@@ -26,7 +26,8 @@ from fieldsid.diagnosis.evidence.acceptance import (
     leaves_error,
     worst_error,
 )
-from fieldsid.diagnosis.evidence.noise_kind import fit_base, sensor_noise
+from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, LikelihoodFit
+from fieldsid.diagnosis.evidence.noise_kind import fit_base, joint_noise_fit, sensor_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, score_model, with_free_run
 from fieldsid.diagnosis.moves.archive import Archive, Names
 from fieldsid.diagnosis.moves.drop_effect import drop_each
@@ -45,7 +46,7 @@ from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.search.accepted_sets import AcceptedSets, core_of
 from fieldsid.diagnosis.search.budget import Budget
 from fieldsid.diagnosis.search.given_model import refitted_from
-from fieldsid.diagnosis.search.whole_hull import whole_hull
+from fieldsid.diagnosis.search.whole_hull import whole_hull, whole_hull_error
 from fieldsid.diagnosis.thresholds import MAX_ERROR_RATIO, MIN_EXPLAINED_SHARE, MISSING_ERROR_RATIO, SUFFICIENT_ERROR_RATIO
 from fieldsid.fitting.covariance.noise_selection import residuals_of
 from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
@@ -55,7 +56,7 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
-from fieldsid.noise.white_floor import lowered_noise_floor, white_noise_floor
+from fieldsid.noise.white_floor import WhiteBounds, lowered_noise_floor, white_noise_floor
 from fieldsid.numerics.arrays import FloatArray
 
 MAX_CANDIDATES = 8
@@ -69,7 +70,8 @@ class Search:
     `given` is the model with the known effects, where there is one: the base is also fitted from its values.
 
     `floor` is the lowest estimate of the sensors' noise so far. `is_noiseless` is whether every measured channel has less of it
-    than a fiftieth of the base's error, or than the error that a measured speed makes: `floor` includes that error then.
+    than a fiftieth of the base's error, or than the error that a measured speed makes: `floor` includes that error then. `white`
+    are the bounds of the white noise of every fit.
     """
 
     records: tuple[Record, ...]
@@ -81,7 +83,7 @@ class Search:
     thorough: bool = False
     given: Model | None = None
     floor: Noise = field(init=False)
-    resolution_floor: Noise = field(init=False)
+    white: WhiteBounds = field(init=False)
     noise_kind: str = field(default="", init=False)
     is_noiseless: bool = field(default=False, init=False)
     tried: Archive = field(init=False)
@@ -92,7 +94,8 @@ class Search:
     def __post_init__(self) -> None:
         """Set the resolution floor to the sensors' noise, until the error of the base model is known."""
         both = (*self.records, *self.validation)
-        self.resolution_floor = self.floor = white_noise_floor(both)
+        self.floor = white_noise_floor(both)
+        self.white = WhiteBounds.near(self.floor)
         self.tried = Archive(self.root)
         length = float(np.mean([len(r) for r in both]))
         self.budget = Budget(len(both), length, np.inf) if self.thorough else Budget(len(both), length)
@@ -144,11 +147,13 @@ class Search:
 
     def refined(self, h: ScoredModel) -> ScoredModel:
         """Return a model refitted from its output-error fit, under another law and in other variants, if each gains evidence."""
-        if not self.tried.is_varied(h):
-            h = self.tried[frozenset(h.names)] = self.grounds.better(h, self.grounds.fit_from_the_free_run(h))
+        names = frozenset(h.names)
+        if not self.tried.is_refined(h):
+            h = self.tried[names] = self.grounds.better(h, self.grounds.fit_from_the_free_run(h))
             under_other_law(h, self.tried, self.grounds)
-            try_variants([VariantRequest(self.tried[frozenset(h.names)])], self.tried, self.grounds)
-        return self.tried[frozenset(h.names)]
+            try_variants([VariantRequest(self.tried[names])], self.tried, self.grounds)
+            self.tried.refined[names] = self.tried[names].log_evidence
+        return self.tried[names]
 
     def grow(self, h: ScoredModel, *, forced: bool = False) -> list[ScoredModel]:
         """Return the models with one effect more, sorted by log evidence; `forced` fits every effect, not only those screened."""
@@ -197,13 +202,8 @@ class Search:
             )
             fitted = min(fits, key=lambda t: error_product(t, self.axis))
             refuse_unbounded_motion(fitted.problem, fitted.x, "diagnose", instead="leave effects out of the model it starts from")
-            with_speed = larger_of(self.floor, error_of_speed(fitted.problem, fitted.x))
-            self.is_noiseless = is_noiseless(self.floor, resolution_floor(with_speed, fitted.weights), self.records)
-            if self.is_noiseless:
-                self.floor = with_speed
-            self._lower_floor_by(fitted.problem, fitted.x)
-            self.resolution_floor = resolution_floor(self.floor, fitted.weights)
-            ml_fit = fit_base(fitted, self.floor, self.resolution_floor, self.parallel)
+            self._settle_noise(fitted)
+            ml_fit = fit_base(fitted, self.floor, self.white, self.parallel)
             self.noise_kind = ml_fit.noise_kind
             h = score_model(ml_fit, self.validation).evaluate_errors()
             own, other = with_free_run(h, fitted, self.floor), other_speed_law(h, self.grounds)
@@ -217,10 +217,28 @@ class Search:
 
     # ----- the conditions under which models are compared
 
+    def _settle_noise(self, fitted: FittedProblem) -> None:
+        """Set the noise floor and the bounds of the white noise, given the output-error fit of the base.
+
+        In a log without noise the likelihood would compare the smallest inconsistencies of the sensors. No model follows the
+        motion more closely than the measured speed lets it, nor is any expected to leave less than the whole hull leaves: models
+        are compared under at least that error.
+        """
+        with_speed = larger_of(self.floor, error_of_speed(fitted.problem, fitted.x))
+        least = resolution_floor(with_speed, fitted.weights)
+        self.is_noiseless = is_noiseless(self.floor, least, self.records)
+        if self.is_noiseless:
+            self.floor = with_speed
+            self.report("whole hull")
+            self.white = WhiteBounds.above(larger_of(least, whole_hull_error(fitted, self.catalogue, self.parallel)))
+        else:
+            self._lower_floor_by(fitted.problem, fitted.x)
+            self.white = WhiteBounds.near(resolution_floor(self.floor, fitted.weights))
+
     @property
     def grounds(self) -> Grounds:
         """The records, the noise floor and the kind of noise under which all models are compared."""
-        return Grounds(self.validation, self.floor, self.resolution_floor, self.noise_kind, self.parallel, self.report)
+        return Grounds(self.validation, self.floor, self.white, self.noise_kind, self.parallel, self.report)
 
     def lower_floor(self, h: ScoredModel) -> None:
         """Lower the noise floor to what the third differences of a model's residuals show."""
@@ -282,6 +300,19 @@ class Search:
     def best_admissible(self) -> ScoredModel:
         """Return the model of the accepted set with the highest log evidence."""
         return self.tried[self._accepted_sets().best]
+
+    def reported(self, h: ScoredModel) -> ScoredModel:
+        """Return a model with the fit to be reported: without noise that by output error, where it is nearer to unseen runs."""
+        if not self.is_noiseless or h.output_error_fit is not None:
+            return h.evaluate_errors()
+        return with_free_run(h, h.likelihood_fit.fitted.by_output_error(), self.floor).evaluate_errors()
+
+    def tested_fit(self, h: ScoredModel) -> LikelihoodFit:
+        """Return the fit of a model whose innovations are tested: with coloured sensor noise beside the disturbance if likelier.
+
+        Without noise, what a model leaves is not coloured sensor noise.
+        """
+        return h.likelihood_fit if self.is_noiseless else joint_noise_fit(h.likelihood_fit, self.parallel)
 
     def error_ratio(self, h: ScoredModel) -> float:
         """Return a model's selection error over the noise floor, with coloured sensor noise where the base has it."""

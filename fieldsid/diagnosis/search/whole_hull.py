@@ -9,16 +9,20 @@ fitted without each, which removes those that the data do not show.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
+from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, LikelihoodFit, fit_output_error
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.moves.add_effect import likelihood_linearisation
 from fieldsid.diagnosis.moves.archive import Archive
 from fieldsid.diagnosis.moves.grounds import Grounds
-from fieldsid.fitting.initial.effect_screen import ScreenResult, backtrack, screen_points
+from fieldsid.diagnosis.parallel_map import ParallelMap
+from fieldsid.fitting.initial.effect_screen import ScreenResult, backtrack, linearise_at, screen_points
+from fieldsid.fitting.initial.equation_error import equation_error_starts
 from fieldsid.models.effect import Effect
+from fieldsid.models.model import Noise
 
 ADDED = ("sway_coupling", "heave_coupling", "servo_lag", "quadratic_damping", "speed_varying")
 """The effects of the whole hull in the order of addition: the cross state changes the other parameters most."""
@@ -31,13 +35,30 @@ STARTS = 3
 def whole_hull(base: ScoredModel, effects: Sequence[Effect], tried: Archive, grounds: Grounds) -> ScoredModel:
     """Return the base with those of the given effects that are in ADDED; store every intermediate set in the archive."""
     h = base
-    hull_effects = (e for e in effects if e.name in ADDED and e.name not in base.names)
-    for effect in sorted(hull_effects, key=lambda e: ADDED.index(e.name)):
+    for effect in _of_hull(effects, base.names):
         fits = [fit for fit in _fits_with(h, effect, grounds) if np.isfinite(fit.log_likelihood)]
         if fits:
             key = frozenset((*h.names, effect.name))
             h = tried[key] = grounds.better(tried.get(key), max(fits, key=lambda fit: fit.log_likelihood))
     return h
+
+
+def whole_hull_error(base: FittedProblem, effects: Sequence[Effect], parallel: ParallelMap) -> Noise:
+    """Return the rms errors (rad, rad/s) of the whole hull fitted by output error: the base with those of `effects` in ADDED."""
+    best = base
+    for effect in _of_hull(effects, base.names):
+        at = linearise_at(best.problem, best.x, best.weights)
+        points = [backtrack(at, point) for point in screen_points(at, effect)[:STARTS]]
+        problem = points[0].problem
+        starts = (*(p.start for p in points), *equation_error_starts(problem.records, problem.layout))
+        fits = parallel.map(partial(fit_output_error, problem, weights=best.weights), starts)
+        best = min((best, *fits), key=lambda fit: fit.weights.angle * fit.weights.rate)
+    return best.weights
+
+
+def _of_hull(effects: Sequence[Effect], known: Sequence[str]) -> list[Effect]:
+    """Return those of the effects that are in ADDED and not known, in the order of addition."""
+    return sorted((e for e in effects if e.name in ADDED and e.name not in known), key=lambda e: ADDED.index(e.name))
 
 
 def _fits_with(h: ScoredModel, effect: Effect, grounds: Grounds) -> list[LikelihoodFit]:

@@ -11,6 +11,7 @@ from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.noise.moment_response import base_responses
 from fieldsid.noise.own_moment import disturbance_mean_std, estimate_noise_of_runs, likeliest_std, moment_information
+from fieldsid.noise.white_floor import WhiteBounds
 from fieldsid.numerics.jit import plain_of
 
 A, K = 1.1, 0.2
@@ -93,11 +94,11 @@ def test_disturbance_and_own_moments_are_told_apart():
     rng, truth = np.random.default_rng(6), Noise(0.003, 0.003, 4e-4, 1.0)
     records = [a_record(100.0) for _ in range(20)]
     residuals = moved(records, 3 * OWN * rng.standard_normal(20), rng, truth)
-    floor, start = Noise(0.003, 0.003), Noise(0.003, 0.003, 1e-3)
-    noise, likelihood = estimate_noise_of_runs(records, [(A, K)] * 20, residuals, "disturbance", start, floor, 0.01)
+    white, start = WhiteBounds.near(Noise(0.003, 0.003)), Noise(0.003, 0.003, 1e-3)
+    noise, likelihood = estimate_noise_of_runs(records, [(A, K)] * 20, residuals, "disturbance", start, white, 0.01)
     assert noise.own_moment == pytest.approx(3 * OWN, rel=0.5)
     assert noise.disturbance == pytest.approx(4e-4, rel=0.4)
-    plain, lower = estimate_noise_of_runs(records, [(A, K)] * 20, residuals, "disturbance", start, floor, 0.0)
+    plain, lower = estimate_noise_of_runs(records, [(A, K)] * 20, residuals, "disturbance", start, white, 0.0)
     assert plain.own_moment == 0.0
     assert likelihood > lower + 10.0
 
@@ -106,7 +107,9 @@ def test_a_motion_without_bound_has_no_noise():
     log = a_record()
     residual = np.full((2, len(log)), np.inf)
     start = Noise(0.003, 0.003, own_moment=OWN)
-    assert estimate_noise_of_runs([log, log], [(A, K)] * 2, [residual] * 2, "disturbance", start, start, 0.01) == (start, -np.inf)
+    white = WhiteBounds.near(start)
+    found = estimate_noise_of_runs([log, log], [(A, K)] * 2, [residual] * 2, "disturbance", start, white, 0.01)
+    assert found == (start, -np.inf)
 
 
 @pytest.mark.parametrize("time", [0.5, 5.0, 30.0])

@@ -22,6 +22,7 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.models.record import record_of
+from fieldsid.noise.white_floor import WhiteBounds
 
 CLOCK = Clock(0.05, 1200)
 BESIDE = ParallelMap((), ())
@@ -41,7 +42,7 @@ def base(wander, gust, family):
         records.append(record_of(Run(f"run{seed}", log.pop("time_s"), log), Axis.YAW))
     layout, floor = layout_of(tuple(records), Axis.YAW, ()), Noise(WHITE, WHITE)
     trial = fit_output_error(Problem(tuple(records), layout), equation_error_start(tuple(records), layout), floor)
-    return score_model(fit_maximum_likelihood(trial.problem, trial.x, floor, floor, family), ())
+    return score_model(fit_maximum_likelihood(trial.problem, trial.x, floor, WhiteBounds.near(floor), family), ())
 
 
 @pytest.mark.parametrize("family", ["coloured", "disturbance"])

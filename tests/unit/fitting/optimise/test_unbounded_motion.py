@@ -25,7 +25,7 @@ from fieldsid.models.model import Noise
 from fieldsid.models.record import record_of
 from fieldsid.noise.maximum_likelihood import estimate_noise, log_likelihood
 from fieldsid.noise.noise_kinds import NOISE_KINDS, SINGLE_NOISE_KINDS
-from fieldsid.noise.white_floor import white_noise_floor
+from fieldsid.noise.white_floor import WhiteBounds, white_noise_floor
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +112,7 @@ def test_the_noise_of_a_motion_without_bound_has_no_likelihood(away, family):
 def test_a_start_that_runs_away_is_given_up_where_others_are(away, well, family):
     problem, floor = problem_of(away), white_noise_floor([away])
     with in_time(20):
-        judged = fit_maximum_likelihood(problem, gone(problem), floor, floor, family)
+        judged = fit_maximum_likelihood(problem, gone(problem), floor, WhiteBounds.near(floor), family)
         given_up = score_model(judged, (well,))
     assert judged.log_likelihood == given_up.log_evidence == -np.inf
     assert np.isfinite([given_up.train.mean, given_up.selection_errors.mean]).all()
