@@ -20,7 +20,7 @@ from fieldsid.models.record import record_of
 from fieldsid.noise.maximum_likelihood import estimate_noise, log_likelihood, log_prior
 from fieldsid.noise.moment_response import base_responses
 from fieldsid.noise.noise_kinds import NOISE_FIELDS, NOISE_KINDS
-from fieldsid.noise.white_floor import lowered_noise_floor, white_noise_floor
+from fieldsid.noise.white_floor import WhiteBounds, lowered_noise_floor, white_noise_floor
 from fieldsid.noise.whiten import base_dynamics, noise_vector
 from fieldsid.numerics.white_noise import white_noise_std
 
@@ -199,3 +199,14 @@ def test_moving_a_number_moves_that_one_alone(family):
         at = NOISE_FIELDS.index(name)
         assert there[at] == pytest.approx(2 * vector[at])
         assert np.delete(there, at) == pytest.approx(np.delete(vector, at))
+
+
+def test_white_noise_stays_above_an_error_below_which_no_model_follows():
+    known, x = problem()
+    residual, dynamics, error = known.residual(x, 0)[0], [(TRUTH[0], 0.0)], Noise(3 * SIGMA, 2 * SIGMA)
+    start = Noise(SIGMA, SIGMA, 1e-3)
+    found, _ = estimate_noise(known.records, dynamics, [residual], "disturbance", start, white=WhiteBounds.above(error))
+    near, _ = estimate_noise(known.records, dynamics, [residual], "disturbance", start, white=WhiteBounds.near(error))
+    assert (found.angle, found.rate) == (pytest.approx(error.angle), pytest.approx(error.rate))
+    assert near.angle < 0.5 * error.angle
+    assert near.rate < 0.9 * error.rate
