@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from typing import Annotated
 
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
@@ -18,6 +19,7 @@ from fieldsid.diagnosis.evidence.acceptance import common_own_moment, is_accepte
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.records import FLOOR, Errors, Pair
 from fieldsid.diagnosis.report.final_model import final_model
+from fieldsid.diagnosis.search.given_model import refitted_from
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import MAX_ERROR_RATIO
 from fieldsid.display import Brief, Plotted
@@ -114,19 +116,21 @@ def extend_in_steps(
     training: Sequence[Run],
     validation: Sequence[Run] = (),
     *,
+    found: Model | None = None,
     report: Callable[[str], None] = lambda _text: None,
     unfit: Refused[Run] | None = None,
 ) -> tuple[Extension, ...]:
     """Return one extension for each effect added, each of the model of the step before.
 
     All steps come from one search, in which the base parameters and all effects are refitted to the training runs together. The
-    full set of effects is reached in the best of several orders; the order of the steps is one of them. Without validation runs,
-    a part of the training runs is held out for validation. Where the training runs do not determine the size of an addition, it
-    may be accepted though the error on the validation runs does not fall; then all runs are fitted together. `report` is called
-    with the name of each trial. `unfit` is called with each of several runs that cannot be fitted; without `unfit`, and where no
-    run of a group can be fitted, the error of the run is raised. Raises UsageError for an effect that is unknown, of the other
-    axis or in the model already, DataError for runs that cannot be used or lack a signal the effects need, EffectError for a
-    user's effect that fails, or has a coefficient of a name that another effect of the model has.
+    full set of effects is reached in the best of several orders; the order of the steps is one of them. `found` is a model with
+    all effects, as a diagnosis names it: the full set is also fitted from its values, and each step adds the effect that lowers
+    the error most. Without validation runs, a part of the training runs is held out for validation. Where the training runs do
+    not determine the size of an addition, it may be accepted though the error on the validation runs does not fall; then all runs
+    are fitted together. `report` is called with the name of each trial. `unfit` is called with each of several runs that cannot
+    be fitted; without `unfit`, and where no run of a group can be fitted, the error of the run is raised. Raises UsageError for
+    an effect that is unknown, of the other axis or in the model already, DataError for runs that cannot be used or lack a signal
+    the effects need, EffectError for a user's effect that fails, or whose coefficient has a name that another effect uses.
     """
     new = new_effects(parent, add)
     fitted, checked = records_of([training, validation], parent.axis, unfit)
@@ -136,12 +140,12 @@ def extend_in_steps(
     notes = (*notes, *left_out([run for run, _ in (*fitted, *checked)], parent.axis))
     begin = partial(Search, axis=parent.axis, catalogue=parts, known=parent.effects, report=report, thorough=True, given=parent)
     work = begin(learned, judged)
-    line = _refitted_line(work, new)
-    steps = _extensions_of_line(work, line, new, notes)
+    line = _refitted_line(work, new, found)
+    steps = _extensions_of_line(work, line, notes)
     if not judged or whole_of(steps).pays or not is_accepted(line[0], line[-1]):
         return steps
     work = begin((*learned, *judged), ())
-    return _extensions_of_line(work, _refitted_line(work, new), new, (*notes, FITTED_TO_ALL))
+    return _extensions_of_line(work, _refitted_line(work, new, found), (*notes, FITTED_TO_ALL))
 
 
 def whole_of(steps: Sequence[Extension]) -> Extension:
@@ -152,36 +156,44 @@ def whole_of(steps: Sequence[Extension]) -> Extension:
     return replace(steps[-1], gain=gain, evidence=sum(s.evidence for s in steps), notes=notes)
 
 
-def _refitted_line(work: Search, new: Sequence[Effect]) -> list[ScoredModel]:
-    """Return the refitted parent and the refitted models after each addition of the new effects in order.
+def _refitted_line(work: Search, new: Sequence[Effect], found: Model | None) -> list[ScoredModel]:
+    """Return the refitted parent and the refitted models after each addition: in order, or as the error falls most with `found`.
 
-    The full set is built up from the best few sets of each size and from the first effects in their order. Then the search of
-    `diagnose` runs with these effects alone, and the better optimum of each set is kept.
+    The full set is built up from the best few sets of each size and from the line's own. Then the search of `diagnose` runs with
+    these effects alone, and the better optimum of each set is kept, for the full set also from the values of `found`.
     """
     work.base()
-    line = [work.root | {e.name for e in new[:size]} for size in range(len(new) + 1)]
-    front = {work.root}
-    for ends in line[1:]:
+    line, front = [work.root], {work.root}
+    for effect in new:
         children = {frozenset(c.names): c for key in front for c in work.grow(work.tried[key], forced=True)}
-        front = set(sorted(children, key=lambda key: -children[key].log_evidence)[:BEAM_WIDTH]) | {ends}
+        longer = [c for names, c in children.items() if line[-1] < names]
+        line.append(line[-1] | {effect.name} if found is None else _nearest(longer, work.floor))
+        front = set(sorted(children, key=lambda key: -children[key].log_evidence)[:BEAM_WIDTH]) | {line[-1]}
+    if found is not None:
+        work.tried[line[-1]] = refitted_from(found, work.tried[line[-1]], work.grounds)
     work.best()
     return work.parallel.map(work.reported, [work.tried[names] for names in line])
 
 
+def _nearest(models: Sequence[ScoredModel], floor: Noise) -> frozenset[str]:
+    """Return the names of the effects of the model with the least error of all runs over a noise floor."""
+    return frozenset(min(models, key=lambda h: h.error_of_all_runs(floor)).names)
+
+
 def _extensions_of_line(
-    work: Search, line: Sequence[ScoredModel], new: Sequence[Effect], notes: tuple[Note, ...]
+    work: Search, line: Sequence[ScoredModel], notes: tuple[Note, ...]
 ) -> tuple[Extension, ...]:  # fmt: skip
     """Return the extensions from each model of a line to the next; the residual of the last defines the noise of all."""
     work.lower_floor(line[-1])
-    steps = zip(line[:-1], line[1:], new, strict=True)
-    return tuple(_extension(work, before, after, [effect], notes) for before, after, effect in steps)
+    return tuple(_extension(work, before, after, notes) for before, after in pairwise(line))
 
 
 def _extension(
-    work: Search, before: ScoredModel, after: ScoredModel, new: Sequence[Effect], notes: tuple[Note, ...]
+    work: Search, before: ScoredModel, after: ScoredModel, notes: tuple[Note, ...]
 ) -> Extension:  # fmt: skip
-    """Return the extension from a model without the new effects to one with them, both fitted by one search."""
+    """Return the extension from a model without an effect to one with it, both fitted by one search."""
     learned, judged = work.records, work.validation
+    new = [e for e in work.catalogue if e.name in {*after.names} - {*before.names}]
     moment_std = common_own_moment(before, after)
     before, after = before.with_own_moment(moment_std), after.with_own_moment(moment_std)
     noise = work.tested_fit(after).noise

@@ -42,6 +42,19 @@ def test_the_error_on_zigzags_falls_with_each_of_the_effects_that_are_there(run_
     assert errors[-1] < 0.75 * errors[0]
 
 
+@pytest.mark.slow
+def test_what_is_applied_ends_at_the_error_that_was_named_and_the_error_falls_on_the_way(run_cli, lauv, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    runs = [lauv / f"elevator_v{v}.csv.gz" for v in ("1.00", "1.50")]
+    asked = ("diagnose", *runs, "--axis", "pitch", "--validate", lauv / "elevator_v1.90.csv.gz", "--apply", "--json")
+    body = run_cli(*asked).json
+    steps = body["applied"]
+    assert {step["effect"] for step in steps} == set(body["effects"])
+    for channel in ("angle_rms_rad", "rate_rms_rad_s"):
+        assert steps[-1]["after"]["validation"][channel] < 1.1 * body["final"]["validation"][channel]
+    assert all(step["pays"] for step in steps)
+
+
 def test_zigzags_of_every_speed_are_predicted_down_to_the_noise_by_what_pulses_taught(run_cli, lauv, tmp_path):
     speeds = ("1.00", "1.25", "1.50", "1.70", "1.90")
     pulses, zigzags = ([lauv / f"{kind}_v{v}.csv.gz" for v in speeds] for kind in ("rudder", "zigzag"))

@@ -141,7 +141,7 @@ def _add_effects(
     from fieldsid.cli.commands.extend import step_files
     from fieldsid.cli.headlines.missing import MODELS
     from fieldsid.cli.inputs import files_of
-    from fieldsid.extension.extend import extend_in_steps
+    from fieldsid.extension.extend import extend_in_steps, whole_of
     from fieldsid.extension.lineage import save_steps
     from fieldsid.models.model import save_model
     from fieldsid.results.diagnoses import Applied
@@ -154,12 +154,13 @@ def _add_effects(
         known, path = found.base_model, Path(MODELS) / f"{stem}_{found.axis.value}.yaml"
         if not path.exists() or force:
             save_model(known, path, inputs=files_of(training), mapping=mapping, force=force)
-    targets = step_files(path, found.effects, force=force)
     with compiling_first(), trying("adding what was found") as report:
-        steps = extend_in_steps(known, found.effects, training, unseen, report=report)
+        steps = extend_in_steps(known, found.effects, training, unseen, found=found.model, report=report)
+    names = whole_of(steps).gain.added
+    targets = step_files(path, names, force=force)
     save_steps(steps, targets, path, (training, unseen), mapping=mapping, force=force)
     return tuple(
-        Applied(step.gain, name, str(target), step.pays) for name, step, target in zip(found.effects, steps, targets, strict=True)
+        Applied(step.gain, name, str(target), step.pays) for name, step, target in zip(names, steps, targets, strict=True)
     )
 
 

@@ -101,6 +101,16 @@ def test_a_base_is_refitted_from_the_parents_own_values_as_well(lagged, runs):
     assert not again.pays
 
 
+def test_the_steps_to_a_named_model_add_first_what_lowers_the_error_most_and_reach_its_values(runs):
+    train, unseen = runs
+    named = extend(PLAIN, ["quadratic_damping", "servo_lag"], train, [unseen]).model
+    first, last = extend_in_steps(PLAIN, named.effects, train, [unseen], found=named)
+    assert first.gain.added == ("servo_lag",)
+    assert first.gain.over_floor[1] < 0.5 * first.gain.over_floor[0]
+    assert last.gain.over_floor[1] == pytest.approx(1.0, abs=0.06)
+    assert last.model.values["lag"] == pytest.approx(named.values["lag"], rel=0.02)
+
+
 @pytest.mark.parametrize(
     ("model", "add", "says"),
     [
