@@ -14,24 +14,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.dynamics import integrate
-from fieldsid.dynamics.assemble import pieces_for
-from fieldsid.errors import DataError, DivergenceError
-from fieldsid.estimators.svf_ls import base_slots, finished, median_step, parameters_of, regress
+from fieldsid.errors import DataError
+from fieldsid.estimators.svf_ls import base_slots, feedback_notes, finished, median_step, parameters_of, regress
 from fieldsid.fitting.problem.estimator import Estimator, Options, Solution
 from fieldsid.fitting.problem.problem import Problem
-from fieldsid.fitting.regression.bias_compensation import Transfer, inverse_of_normal
+from fieldsid.fitting.regression.instruments import (
+    MIN_FILTER_DAMPING,
+    instrumental_variables,
+    refuse_unbounded_instruments,
+    through,
+)
+from fieldsid.fitting.regression.noise_transfer import Transfer
 from fieldsid.fitting.regression.residual_colour_covariance import Series, coloured_covariance
 from fieldsid.fitting.regression.svf_equation import RegressionParameters, measured_signals
 from fieldsid.logs.run import Note
-from fieldsid.models.hull import CONSTANTS, DAMPING, DRIVES, MOMENT_END, MOMENT_START, STIFFNESS
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
 MAX_SRIVC_ITERATIONS = 30
 CONVERGED_RELATIVE_CHANGE = 1e-7
-MIN_FILTER_DAMPING = 0.05
-"""Least damping (1/s) of the filter: an unstable estimate must not become an unstable filter."""
 MAX_SIMULATION_STEP_S = 0.0125
 """Longest step of the simulation between samples."""
 
@@ -56,7 +57,7 @@ def solve(problem: Problem, options: Options) -> Solution:
             found="a rate only",
             hint="use `--method output_error`",
         )
-    x, _, _ = regress(problem, options.bandwidth)
+    x = regress(problem, options.bandwidth).x
     slots = list(base_slots(problem).values())
     keep = [0, 1, 2, 3, 4, 5] if len(slots) == 4 else [0, 2, 3, 4, 5]
     use = measured_signals(record, options.bandwidth).use & record.angle_ok
@@ -66,10 +67,8 @@ def solve(problem: Problem, options: Options) -> Solution:
         theta, rounds = parameters_of(problem, x, 0), rounds + 1
         rows, instruments = filtered_rows(record, theta, state)
         phi, z = rows.columns[use][:, keep], instruments.columns[use][:, keep]
-        if not (np.isfinite(z).all() and np.isfinite(phi).all()):
-            raise _divergence_error(record, theta, rounds)
-        scale = 1.0 / np.maximum(np.linalg.norm(z, axis=0), 1e-300)
-        found = np.linalg.lstsq((z * scale).T @ (phi * scale), (z * scale).T @ rows.target[use], rcond=1e-13)[0] * scale
+        refuse_unbounded_instruments(record, theta, z, phi)
+        found, inverse = instrumental_variables(z, phi, rows.target[use])
         moved = float(np.max(np.abs(found[: len(slots)] - x[slots]) / (np.abs(x[slots]) + 1e-3)))
         x[slots] = found[: len(slots)]
         damping = max(theta.damping, MIN_FILTER_DAMPING)
@@ -77,8 +76,8 @@ def solve(problem: Problem, options: Options) -> Solution:
         state = np.array([found[-1], found[-2] - damping * found[-1]])
     residual = rows.target[use] - phi @ found
     series = Series(z, residual, Transfer(np.ones(1), np.ones(1)), median_step(record))
-    known = coloured_covariance([series], inverse_of_normal(z.T @ z, np.zeros((len(keep), len(keep)))))
-    return finished(problem, x, known, ESTIMATOR.name, notes_of(rounds, moved))
+    notes = (*feedback_notes(problem, [series]), *notes_of(rounds, moved))
+    return finished(problem, x, coloured_covariance([series], inverse), ESTIMATOR.name, notes)
 
 
 def filtered_rows(record: Record, theta: RegressionParameters, state: FloatArray) -> tuple[Rows, Rows]:
@@ -104,27 +103,6 @@ def filtered_rows(record: Record, theta: RegressionParameters, state: FloatArray
 def _rows(angle: FloatArray, out: FloatArray, inputs: list[FloatArray], impulse: FloatArray, a: float, k: float) -> Rows:
     columns = np.column_stack([-out[:, 1], -out[:, 0], *inputs, impulse[:, 0], impulse[:, 1]])
     return Rows(columns, angle - a * out[:, 1] - k * out[:, 0])
-
-
-def through(
-    steps: FloatArray, a: float, k: float, start: FloatArray, end: FloatArray, state: FloatArray | None = None
-) -> FloatArray:
-    """Return a signal, linear over each interval, filtered by 1/(s^2 + a s + k), and its derivative: (n, 2)."""
-    drive = np.zeros((steps.size, len(DRIVES)))
-    drive[:, DAMPING], drive[:, STIFFNESS], drive[:, MOMENT_START], drive[:, MOMENT_END] = a, k, start, end
-    first = np.zeros(3) if state is None else np.array([state[0], state[1], 0.0])
-    out = np.empty((steps.size + 1, 3))
-    pieces = pieces_for(float(steps.max()), a, k**0.5)
-    integrate.integrate_motion(steps, drive, np.zeros(len(CONSTANTS)), first, pieces, out)
-    return out[:, :2]
-
-
-def _divergence_error(record: Record, theta: RegressionParameters, rounds: int) -> DivergenceError:
-    return DivergenceError(
-        f"the instrumental variables of run {record.name!r} grow without bound",
-        found=f"round {rounds}: damping {theta.damping:.3g}, stiffness {theta.stiffness:.3g}, authority {theta.authority:.3g}",
-        hint="use `--method output_error`, which keeps to motions that stay bounded",
-    )
 
 
 def notes_of(rounds: int, moved: float) -> tuple[Note, ...]:

@@ -1,25 +1,29 @@
-"""State variable filter and block least squares: the paper's method on the whole record at once.
+"""State variable filter over the whole record at once: the paper's regression, solved by instrumental variables.
 
 Phi Theta = Q with Phi = [-p_f, -y_f, delta_f, 1_f] from the filter's states; the initial values have columns as well. The command
 is a zero-order hold. The measurement is linear between samples at first, then parabolic with the curvature of the last estimate.
-The speed law of a joint fit is a(u) ~ u. Source: the paper, estimator 2 (block least squares).
+The paper's least squares is the first estimate; a disturbance biases it, by a quarter in a sea, and the instruments take that
+out. The speed law of a joint fit is a(u) ~ u. Source: the paper, estimator 2 (block); Soederstroem and Stoica 1983.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fieldsid.errors import DataError
 from fieldsid.estimators.output_error import residual_noise
+from fieldsid.fitting.checks.closed_loop import closed_loop_note
 from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
 from fieldsid.fitting.predict.predict import refit_nuisances
 from fieldsid.fitting.problem.estimator import Estimator, History, Options, Solution
 from fieldsid.fitting.problem.parameters import group_name
 from fieldsid.fitting.problem.problem import Problem
-from fieldsid.fitting.regression.bias_compensation import inverse_of_normal, noise_can_go, noise_share, transfer_of
-from fieldsid.fitting.regression.residual_colour_covariance import Series, coloured_covariance
+from fieldsid.fitting.regression.instruments import instrumental_variables, moved_by_fin
+from fieldsid.fitting.regression.noise_transfer import transfer_of
+from fieldsid.fitting.regression.residual_colour_covariance import Series, coloured_covariance, noise_colour
 from fieldsid.fitting.regression.svf_equation import Equation, Measured, RegressionParameters, filtered_equation, measured_signals
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import NAMES
@@ -27,39 +31,71 @@ from fieldsid.models.record import Record
 from fieldsid.noise.white_floor import white_noise_floor
 from fieldsid.numerics.arrays import FloatArray
 
-BIAS_CORRECTION_PASSES = 3
-MAX_ANGLE_ONLY_BANDWIDTH_RAD_S = 4.0
-"""Filter bandwidth (rad/s) above which the noise of an angle alone biases the damping."""
+REFINEMENTS = 3
+"""Estimates in turn, each with the instruments of the one before; they start from that of least squares."""
 
 
 def solve(problem: Problem, options: Options) -> Solution:
-    """Return the block least-squares solution of a joint problem; raises DataError where the data do not determine it."""
-    x, covariance, signals = regress(problem, options.bandwidth)
-    return finished(problem, x, covariance, ESTIMATOR.name, bandwidth_notes(signals, options.bandwidth))
+    """Return the instrumental-variable solution of a joint problem; raises DataError where the data do not determine it."""
+    found = regress(problem, options.bandwidth)
+    series = found.series(problem, options.bandwidth)
+    covariance = coloured_covariance(series, found.inverse)
+    return finished(problem, found.x, covariance, ESTIMATOR.name, tuple(feedback_notes(problem, series)))
 
 
-def regress(problem: Problem, bandwidth: float) -> tuple[FloatArray, FloatArray, list[Measured]]:
-    """Return the parameter vector (N,), the covariance of base parameters and start terms, and the signals of each run."""
-    signals = [measured_signals(r, bandwidth) for r in problem.records]
-    slots = base_slots(problem)
-    theta: list[RegressionParameters] | None = None
-    for _ in range(BIAS_CORRECTION_PASSES):
-        blocks = [
-            filtered_equation(r, s, bandwidth, None if theta is None else theta[i])
-            for i, (r, s) in enumerate(zip(problem.records, signals, strict=True))
+@dataclass(frozen=True, slots=True)
+class Regression:
+    """The estimate x (N,), and theta (P,) of base parameters and start terms with its rows and instruments (m, P).
+
+    `inverse` (P, P) is that of rows times instruments, `signals` and `own` are the signals and base parameters of each run.
+    """
+
+    x: FloatArray
+    theta: FloatArray
+    rows: Stacked
+    instruments: FloatArray
+    inverse: FloatArray
+    signals: list[Measured]
+    own: list[RegressionParameters]
+
+    def series(self, problem: Problem, bandwidth: float) -> list[Series]:
+        """Return the instruments and residuals of each run."""
+        residual = self.rows.target - self.rows.matrix @ self.theta
+        return [
+            Series(self.instruments[part], residual[part], transfer_of(s.order, bandwidth, median_step(r), t), median_step(r))
+            for part, s, r, t in zip(self.rows.parts, self.signals, problem.records, self.own, strict=True)
         ]
-        rows = Stacked.of(problem, blocks, slots)
-        found = least_squares(rows, len(slots))
-        found, inverse = without_noise_bias(problem, rows, found, signals, bandwidth)
-        x = problem.start()
-        x[list(slots.values())] = found[: len(slots)]
-        theta = [parameters_of(problem, x, run) for run in range(len(problem.records))]
-    residual = rows.target - rows.matrix @ found
-    series = [
-        Series(rows.matrix[part], residual[part], transfer_of(s.order, bandwidth, median_step(r), t), median_step(r))
-        for part, s, r, t in zip(rows.parts, signals, problem.records, theta or [], strict=True)
-    ]
-    return x, coloured_covariance(series, inverse), signals
+
+    @classmethod
+    def of(cls, problem: Problem, signals: list[Measured], rows: Stacked, instruments: FloatArray) -> Regression:
+        """Return the estimate of rows by instruments (m, P)."""
+        slots, x = list(base_slots(problem).values()), problem.start()
+        theta, inverse = instrumental_variables(instruments, rows.matrix, rows.target)
+        x[slots] = theta[: len(slots)]
+        own = [parameters_of(problem, x, run) for run in range(len(problem.records))]
+        return cls(x, theta, rows, instruments, inverse, signals, own)
+
+
+def regress(problem: Problem, bandwidth: float) -> Regression:
+    """Return the estimate by instrumental variables; raises DataError where the data do not determine it."""
+    signals = [measured_signals(r, bandwidth) for r in problem.records]
+    rows = stacked(problem, signals, bandwidth)
+    refuse_empty(rows, len(base_slots(problem)))
+    found = Regression.of(problem, signals, rows, rows.matrix)
+    for _ in range(REFINEMENTS):
+        by_fin = [moved_by_fin(*run) for run in zip(problem.records, signals, found.own, strict=True)]
+        rows, instruments = (stacked(problem, given, bandwidth, found.own) for given in (signals, by_fin))
+        found = Regression.of(problem, signals, rows, instruments.matrix)
+    return found
+
+
+def stacked(
+    problem: Problem, signals: list[Measured], bandwidth: float, own: list[RegressionParameters] | None = None
+) -> Stacked:
+    """Return the rows of signals of each run; `own`, where known, gives the curvature between samples."""
+    known: Sequence[RegressionParameters | None] = own or [None] * len(signals)
+    blocks = [filtered_equation(r, s, bandwidth, t) for r, s, t in zip(problem.records, signals, known, strict=True)]
+    return Stacked.of(problem, blocks, base_slots(problem))
 
 
 def median_step(record: Record) -> float:
@@ -69,31 +105,27 @@ def median_step(record: Record) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Stacked:
-    """The regression rows of all runs: matrix (m, P) of base parameters and start terms, target (m,), rows of each run.
-
-    `maps`, one (4, P) for each run, express the four base parameters of the run by those of the stack.
-    """
+    """The regression rows of all runs: matrix (m, P) of base parameters and start terms, target and time (m,), parts by run."""
 
     matrix: FloatArray
     target: FloatArray
+    time: FloatArray
     parts: tuple[slice, ...]
-    maps: tuple[FloatArray, ...]
 
     @classmethod
     def of(cls, problem: Problem, blocks: list[Equation], slots: dict[str, int]) -> Stacked:
         """Stack the regressions of a joint problem's runs."""
         width = len(slots) + sum(b.start.shape[1] for b in blocks)
         matrix = np.zeros((sum(b.target.size for b in blocks), width))
-        parts, maps, top, left = [], [], 0, len(slots)
+        parts, top, left = [], 0, len(slots)
         for run, block in enumerate(blocks):
             part = slice(top, top + block.target.size)
-            own = column_map(problem, run, slots, width)
-            matrix[part] = block.columns @ own
+            matrix[part] = block.columns @ column_map(problem, run, slots, width)
             matrix[part, left : left + block.start.shape[1]] = block.start
             parts.append(part)
-            maps.append(own)
             top, left = part.stop, left + block.start.shape[1]
-        return cls(matrix, np.concatenate([b.target for b in blocks]), tuple(parts), tuple(maps))
+        target, time = np.concatenate([b.target for b in blocks]), np.concatenate([b.time for b in blocks])
+        return cls(matrix, target, time, tuple(parts))
 
 
 def column_map(problem: Problem, run: int, slots: dict[str, int], width: int) -> FloatArray:
@@ -111,25 +143,6 @@ def column_map(problem: Problem, run: int, slots: dict[str, int], width: int) ->
     return out
 
 
-def without_noise_bias(
-    problem: Problem, rows: Stacked, found: FloatArray, signals: list[Measured], bandwidth: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return the estimate (P,) corrected for the bias of white sensor noise, and its inverse normal matrix (P, P).
-
-    Where noise makes up more than half of the information in a direction, the estimate is returned uncorrected.
-    """
-    normal = rows.matrix.T @ rows.matrix
-    gram, cross = np.zeros_like(normal), np.zeros(normal.shape[0])
-    for record, s, part, own in zip(problem.records, signals, rows.parts, rows.maps, strict=True):
-        floor = white_noise_floor([record])
-        share = noise_share(s.order, bandwidth, median_step(record), floor.angle, floor.rate)
-        count = part.stop - part.start
-        gram += count * own.T @ share.gram @ own
-        cross += count * own.T @ share.cross
-    inverse = inverse_of_normal(normal, gram)
-    return np.asarray(found + inverse @ (gram @ found - cross)) if noise_can_go(normal, gram) else found, inverse
-
-
 def base_slots(problem: Problem) -> dict[str, int]:
     """Return the position of every base parameter that is estimated, in the order of the regression's columns."""
     names, layout = NAMES[problem.layout.axis], problem.layout
@@ -138,19 +151,15 @@ def base_slots(problem: Problem) -> dict[str, int]:
     return {n: layout.names.index(n) for n in wanted}
 
 
-def least_squares(rows: Stacked, wanted: int) -> FloatArray:
-    """Return the solution (P,); raises DataError where one of the first `wanted` columns is zero or there are too few rows."""
-    matrix, target = rows.matrix, rows.target
-    scale = np.linalg.norm(matrix, axis=0)
-    dead = np.flatnonzero(scale[:wanted] == 0.0)
-    if target.size < matrix.shape[1] or dead.size:
+def refuse_empty(rows: Stacked, wanted: int) -> None:
+    """Raise DataError where one of the first `wanted` columns is zero or there are too few rows."""
+    dead = np.flatnonzero(~rows.matrix[:, :wanted].any(axis=0))
+    if rows.target.size < rows.matrix.shape[1] or dead.size:
         raise DataError(
             "the filtered data cannot carry a least squares",
-            found=f"{target.size} usable samples, {dead.size} parameters without any signal",
+            found=f"{rows.target.size} usable samples, {dead.size} parameters without any signal",
             hint="take a run, or a part of one, in which the fin moves",
         )
-    solution: FloatArray = np.linalg.lstsq(matrix / np.maximum(scale, 1e-300), target, rcond=1e-12)[0]
-    return np.asarray(solution / np.maximum(scale, 1e-300))
 
 
 def parameters_of(problem: Problem, x: FloatArray, run: int) -> RegressionParameters:
@@ -184,21 +193,22 @@ def finished(
     return Solution(x, covariance, noise, method, notes, history=history)
 
 
-def bandwidth_notes(signals: list[Measured], bandwidth: float) -> tuple[Note, ...]:
-    """Return the note on a filter bandwidth that is too large for a log without a rate."""
-    if bandwidth <= MAX_ANGLE_ONLY_BANDWIDTH_RAD_S or all(s.order == 1 for s in signals):
-        return ()
-    message = (
-        f"no rate was measured and the filter is wide (lambda = {bandwidth:g}, limit {MAX_ANGLE_ONLY_BANDWIDTH_RAD_S:g} rad/s): "
-        "noise of the angle biases the damping; use `--method srivc` or a smaller lambda"
-    )
-    return (Note("wide_filter_angle_only", message, {"lambda": bandwidth, "limit": MAX_ANGLE_ONLY_BANDWIDTH_RAD_S}),)
+def feedback_notes(problem: Problem, series: Sequence[Series]) -> Iterator[Note]:
+    """Yield the note on runs whose fin follows a disturbance: under a controller, with more than a sensor's white noise."""
+    flown = [run for run, record in enumerate(problem.records) if any(closed_loop_note(record))]
+    runs = [problem.records[run].name for run in flown if noise_colour([series[run]]).denominator.size > 1]
+    if runs:
+        message = (
+            f"run {', '.join(map(repr, runs))}: a controller moves the fin, and the residual is not the sensor's white noise: of "
+            "what disturbs the hull the instruments then have a part, which biases the estimate; use `--method pem`"
+        )
+        yield Note("instruments_follow_disturbance", message, {"runs": runs})
 
 
 ESTIMATOR = Estimator(
     name="svf_ls",
-    says="the paper's state variable filter with least squares over the whole record; no simulation, biased by a disturbance",
-    source="the paper, state variable filter and block least squares; Garnier and Wang 2008, chapter 1",
+    says="the paper's state variable filter over the whole record, by instruments that the fin makes; no search",
+    source="the paper, state variable filter; Soederstroem and Stoica 1983, Instrumental Variable Methods",
     solve=solve,
     takes_effects=False,
 )

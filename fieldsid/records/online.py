@@ -12,7 +12,7 @@ COUNT = number(0.0, 1e15)
 RECENT = 256
 GATE: Shape = {"recent": times(RECENT, NOT_MEASURED), "seen": whole_number, "limit": maybe(number(0.0)), "spikes": whole_number}
 FILTER: Shape = {
-    "memory": times(27, ANY),
+    "memory": times(24, ANY),
     "packed": times(14, ANY),
     "late": [(ANY, NOT_MEASURED, flag, LINE)],
     "moves": [(ANY, ANY, LINE)],

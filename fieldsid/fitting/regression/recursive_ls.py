@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.fitting.regression.bias_compensation import NoiseShare
 from fieldsid.fitting.regression.state_variable_filter import advance, hold_weights
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
@@ -19,15 +18,13 @@ INITIAL_VARIANCE = 1e6
 """Start value of P (the paper: 100): with filtered rates near 0.1 rad/s a start of 100 biases the estimate by up to 2 %."""
 CURVATURE_REFRESH_SAMPLES = 16
 """Samples after which the curvature between samples is computed from the new estimate."""
-MAX_NOISE_SHARE = 0.3
-"""Share of noise in the normal equations above which their bias is not compensated: noise and signal cannot be separated."""
 MAX_VARIANCE_SHARE = 1e-2
 """Share of INITIAL_VARIANCE below which all variances in P must be before the estimate is used for the curvature."""
 EQUAL_STEP_SHARE = 1e-9
 """Relative difference of two sampling intervals up to which the same filter weights are used."""
-MEMORY = 27
+MEMORY = 24
 (
-    SAMPLES, TIME, FIRST_TIME, ANGLE, RATE, P1, P2, Y1, Y2, D1, D2, DECAY, START, SQUARES, WEIGHT, WEIGHT2,
+    SAMPLES, TIME, FIRST_TIME, ANGLE, RATE, P1, P2, Y1, Y2, D1, D2, DECAY, START,
     H, W0, W1, W2, W3, W4, A, K, B, C, NEXT_REFRESH,
 ) = range(MEMORY)  # fmt: skip
 
@@ -46,8 +43,8 @@ def row_of(m: FloatArray, order: int, lam: float, angle: float, rate: float) -> 
 
 
 @jit
-def update(s: FloatArray, row: tuple[float, float, float, float, float], beta: float) -> tuple[float, float]:
-    """Update Theta and P, packed in s (14,), by one row; return the error before the update, and the share of it left after.
+def update(s: FloatArray, row: tuple[float, float, float, float, float], beta: float) -> None:
+    """Update Theta and P, packed in s (14,), by one row.
 
     Written out for four parameters: a loop over matrices takes four times as long. A parameter whose row of P is
     zero stays at zero.
@@ -70,24 +67,6 @@ def update(s: FloatArray, row: tuple[float, float, float, float, float], beta: f
     s[4], s[5], s[6] = p00 * raised, (p01 - h0 * g1) * raised, (p02 - h0 * g2) * raised
     s[7], s[8], s[9] = (p03 - h0 * g3) * raised, p11 * raised, (p12 - h1 * g2) * raised
     s[10], s[11], s[12], s[13] = (p13 - h1 * g3) * raised, p22 * raised, (p23 - h2 * g3) * raised, p33 * raised
-    return error, beta * share
-
-
-@jit
-def corrected(m: FloatArray, s: FloatArray, noise: FloatArray) -> tuple[float, float, float, float]:
-    """Return Theta corrected for the bias of white sensor noise; uncorrected where the share of noise is too large.
-
-    noise (5,) is its share of one row's products: gram of damping and stiffness (3), cross with the target (2).
-    """
-    weight = m[WEIGHT]
-    if weight * (s[4] * noise[0] + s[8] * noise[2]) > MAX_NOISE_SHARE:
-        return s[0], s[1], s[2], s[3]
-    a, k, u, v = s[0], s[1], 0.0, 0.0
-    for _ in range(3):
-        u = weight * (noise[0] * a + noise[1] * k - noise[3])
-        v = weight * (noise[1] * a + noise[2] * k - noise[4])
-        a, k = s[0] + s[4] * u + s[5] * v, s[1] + s[5] * u + s[8] * v
-    return a, k, s[2] + s[6] * u + s[9] * v, s[3] + s[7] * u + s[10] * v
 
 
 @jit
@@ -141,37 +120,10 @@ def step(
         return False
     phi = row_of(m, order, lam, angle, rate)
     rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4] = phi
-    error, left = update(s, phi, beta)
-    m[SQUARES] = beta * m[SQUARES] + error * error * left
-    m[WEIGHT], m[WEIGHT2] = beta * m[WEIGHT] + 1.0, beta * beta * m[WEIGHT2] + 1.0
+    update(s, phi, beta)
     if m[SAMPLES] >= m[NEXT_REFRESH]:
         refresh_curvature(m, s)
     return True
-
-
-@jit
-def variance_scale(m: FloatArray, size: int) -> float:
-    """Return the factor from P to the covariance under a white residual, NaN before there are enough rows."""
-    free = m[WEIGHT] - size
-    return float(m[SQUARES] / free * m[WEIGHT2] / m[WEIGHT]) if free > 0.0 else np.nan
-
-
-@jit
-def sweep(
-    m: FloatArray, s: FloatArray, lam: float, beta: float, order: int, size: int, noise: FloatArray, samples: FloatArray,
-    values: FloatArray, spread: FloatArray, rows: FloatArray,
-) -> None:  # fmt: skip
-    """Run `step` over samples (n, 6) and store the results.
-
-    Fills values and uncorrected standard errors (n, 4), and rows (n, 5) of phi and target, NaN where unused.
-    """
-    for i in range(samples.shape[0]):
-        if not step(m, s, lam, beta, order, samples, rows, i):
-            rows[i, 4] = np.nan
-        scale = variance_scale(m, size)
-        values[i, 0], values[i, 1], values[i, 2], values[i, 3] = corrected(m, s, noise)
-        spread[i, 0], spread[i, 1] = np.sqrt(s[4] * scale), np.sqrt(s[8] * scale)
-        spread[i, 2], spread[i, 3] = np.sqrt(s[11] * scale), np.sqrt(s[13] * scale)
 
 
 def initial_memory(*, stiff: bool) -> FloatArray:
@@ -184,10 +136,5 @@ def initial_memory(*, stiff: bool) -> FloatArray:
 
 def forget_filter(m: FloatArray) -> None:
     """Restart the filter at the next sample, as after a gap; the estimate, its weight and its errors are kept."""
-    m[:SQUARES] = 0.0
+    m[:H] = 0.0
     m[[H, NEXT_REFRESH]] = 0.0
-
-
-def noise_of(share: NoiseShare) -> FloatArray:
-    """Return the contribution of white noise to the products of one row as the vector (5,) that `corrected` takes."""
-    return np.array([share.gram[0, 0], share.gram[0, 1], share.gram[1, 1], share.cross[0], share.cross[1]])

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.fitting.regression.bias_compensation import Transfer, inverse_of
+from fieldsid.fitting.regression.noise_transfer import Transfer, inverse_of
 from fieldsid.numerics.arrays import FloatArray
 
 MAX_AR_ORDER = 30
@@ -74,18 +74,24 @@ class Series:
     step: float
 
 
-def coloured_covariance(series: Sequence[Series], inverse: FloatArray) -> FloatArray:
-    """Return the covariance (p, p) of an estimate with inverse normal matrix (p, p), allowing for colour.
+def noise_colour(series: Sequence[Series]) -> ResidualColour:
+    """Return the autoregression of the samples' noise, which the residuals tell: white without a disturbance of the hull."""
+    from scipy.signal import lfilter
 
+    back = [inverse_of(s.transfer, s.step) for s in series]
+    return colour_of([lfilter(b.numerator, b.denominator, s.residual) for b, s in zip(back, series, strict=True)])
+
+
+def coloured_covariance(series: Sequence[Series], inverse: FloatArray) -> FloatArray:
+    """Return the covariance (p, p) of an estimate with an inverse normal matrix (p, p), allowing for colour.
+
+    Of instrumental variables the columns are the instruments Z, and the inverse is that of Phi' Z.
     The residual is first taken back to the samples' noise through the inverse transfer, where it is white or
     nearly so; an autoregression holds what colour is left.
     """
     from scipy.signal import lfilter
 
-    count, size = sum(s.residual.size for s in series), inverse.shape[0]
-    back = [inverse_of(s.transfer, s.step) for s in series]
-    noise = [lfilter(b.numerator, b.denominator, s.residual) for b, s in zip(back, series, strict=True)]
-    colour = colour_of(noise)
+    count, size, colour = sum(s.residual.size for s in series), inverse.shape[0], noise_colour(series)
     total = np.zeros_like(inverse)
     for s in series:
         seen = lfilter(s.transfer.numerator, s.transfer.denominator, s.columns[::-1], axis=0)

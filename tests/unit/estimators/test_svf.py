@@ -7,7 +7,7 @@ import pytest
 from truth.paper import PITCH, YAW, paper_run
 
 from fieldsid.errors import DataError
-from fieldsid.estimators.svf_ls import bandwidth_notes, base_slots, regress
+from fieldsid.estimators.svf_ls import base_slots, regress
 from fieldsid.estimators.svf_rls import settle_time
 from fieldsid.fitting.fit import fit
 from fieldsid.fitting.problem.estimator import Options
@@ -47,22 +47,55 @@ def test_straight_lines_between_samples_bias_by_less_than_six_thousandths_at_20_
 
 @pytest.mark.parametrize("by_rate", [True, False])
 def test_the_curvature_of_the_model_takes_that_bias_away(by_rate):
-    x, _, _ = regress(problem(record(by_rate=by_rate)), 4.0)
+    x = regress(problem(record(by_rate=by_rate)), 4.0).x
     assert x[0] == pytest.approx(YAW[0].a22, rel=2e-5)
 
 
 @pytest.mark.parametrize("bandwidth", [2.0, 8.0])
 def test_the_bandwidth_does_not_move_the_answer_without_noise(bandwidth):
-    x, _, _ = regress(problem(record(PITCH[0], Axis.PITCH)), bandwidth)
+    x = regress(problem(record(PITCH[0], Axis.PITCH)), bandwidth).x
     np.testing.assert_allclose(x[:4], [PITCH[0].c22, PITCH[0].c23, PITCH[0].d2, PITCH[0].Cb], rtol=1e-3)
 
 
-def test_a_wide_filter_on_an_angle_alone_is_remarked():
-    alone, both = record(by_rate=False, noise=NOISE), record(noise=NOISE)
-    codes = [n.code for n in fit([alone], Axis.YAW, method="svf_ls", options=Options(bandwidth=6.0)).notes]
-    assert "wide_filter_angle_only" in codes
-    assert bandwidth_notes([measured_signals(alone, 4.0)], 4.0) == ()
-    assert bandwidth_notes([measured_signals(both, 6.0)], 6.0) == ()
+def at_sea(seed: int, *, gain: float = 0.0, sea: float = 0.03) -> Record:
+    """Yaw of a22 1.2, b2 -0.8 for 120 s: a sea of 6 s and `sea` rad/s^2, pulses, or headings that a controller steers to."""
+    rng, n, h, sub = np.random.default_rng(seed), 2400, 0.05, 5
+    levels = np.repeat(np.resize([1.0, -1.0, 0.0, -1.0, 1.0, 0.0], 60), 60 if gain == 0.0 else 180)[:n] * np.deg2rad(10.0)
+    angle, rate, fin, state = np.empty(n), np.empty(n), np.empty(n), np.zeros(2)
+    wave, w, damp, step = np.array([sea, 0.0]) * rng.standard_normal(), 2.0 * np.pi / 6.0, 0.15, h / sub
+    for i in range(n):
+        angle[i], rate[i] = state[0] + 0.002 * rng.standard_normal(), state[1] + 0.004 * rng.standard_normal()
+        fin[i] = levels[i] if gain == 0.0 else np.clip(-gain * (2.0 * levels[i] - angle[i] - 0.8 * rate[i]), -0.35, 0.35)
+        for _ in range(sub):
+            push = sea * np.sqrt(4.0 * damp * w**3 / step) * rng.standard_normal()
+            wave = wave + step * np.array([wave[1], -2.0 * damp * w * wave[1] - w * w * wave[0] + push])
+            state = state + step * np.array([state[1], -1.2 * state[1] - 0.8 * fin[i] + 0.01 + wave[0]])
+    return record_of(Run("sea", h * np.arange(n), {"yaw_rad": angle, "yaw_rate_rad_s": rate, "rudder_rad": fin}), Axis.YAW)
+
+
+@pytest.mark.parametrize("seeds", [8, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("method", ["svf_ls", "svf_rls"])
+def test_a_sea_does_not_bias_it(method, seeds):
+    models = [fit([at_sea(seed)], Axis.YAW, method=method).model for seed in range(seeds)]
+    # least squares has the damping 18 % and the authority 13 % too small, and its intervals hold the truth in a fifth
+    held = []
+    for name, truth in (("a22", 1.2), ("b2", -0.8)):
+        assert np.mean([m.values[name] for m in models]) == pytest.approx(truth, rel=0.07)
+        held.append(np.mean([abs(m.values[name] - truth) < 1.96 * m.std_error(name) for m in models]))
+    assert min(held) >= 0.6, held
+
+
+@pytest.mark.parametrize(("gain", "sea", "says"), [(0.0, 0.03, False), (1.0, 0.0, False), (1.0, 0.03, True)])
+def test_that_a_controller_answers_the_disturbance_is_said_where_it_does(gain, sea, says):
+    codes = [n.code for n in fit([at_sea(3, gain=gain, sea=sea)], Axis.YAW, method="svf_ls").notes]
+    assert ("instruments_follow_disturbance" in codes) is says
+
+
+def test_noise_of_an_angle_alone_does_not_bias_a_wide_filter():
+    logs = [record(by_rate=False, noise=NOISE, seed=seed) for seed in range(8)]
+    models = [fit([log], Axis.YAW, method="svf_ls", options=Options(bandwidth=8.0)).model for log in logs]
+    held = [abs(m.values["a22"] - YAW[0].a22) < 1.96 * m.std_error("a22") for m in models]
+    assert sum(held) >= 6
 
 
 def test_a_history_ends_at_the_model_and_says_when_each_parameter_settled():
@@ -70,6 +103,7 @@ def test_a_history_ends_at_the_model_and_says_when_each_parameter_settled():
     history = found.history
     assert history.names == ("a22", "b2", "C0")
     assert history.values.shape == history.std_errors.shape == (history.time.size, 3)
+    assert np.isnan(history.values[0]).all()
     np.testing.assert_allclose(history.values[-1], [found.model.values[n] for n in history.names])
     np.testing.assert_allclose(history.std_errors[-1], [found.model.std_error(n) for n in history.names], rtol=1e-4)
     assert 2.0 < history.settled_s["b2"] < 33.0
@@ -95,13 +129,6 @@ def test_a_parameter_is_settled_from_where_it_stays_within_its_band():
 def test_a_forgetting_factor_out_of_range_is_refused(beta):
     with pytest.raises(DataError, match=r"must be in \(0, 1\]"):
         fit([record()], Axis.YAW, method="svf_rls", options=Options(forgetting=beta))
-
-
-def test_a_record_too_short_for_the_filter_is_refused():
-    log = record(noise=NOISE, by_rate=False)
-    short = record_of(Run("short", log.time[:45], {"yaw_rad": log.angle[60:105], "rudder_rad": log.fin[60:105]}), Axis.YAW)
-    with pytest.raises(DataError, match="too short for the recursion"):
-        fit([short], Axis.YAW, method="svf_rls", options=Options(bandwidth=3.0))
 
 
 def test_angle_only_pitch_knows_all_four_parameters():

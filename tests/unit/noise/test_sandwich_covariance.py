@@ -11,7 +11,8 @@ from truth.paper import DEG, YAW, physics_of
 
 from fieldsid.fitting.fit import Fit, fit
 from fieldsid.fitting.optimise.levenberg_marquardt import covariance, sandwich
-from fieldsid.fitting.regression.bias_compensation import Transfer, inverse_of_normal
+from fieldsid.fitting.regression.instruments import instrumental_variables
+from fieldsid.fitting.regression.noise_transfer import Transfer
 from fieldsid.fitting.regression.residual_colour_covariance import Series, coloured_covariance
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
@@ -82,7 +83,7 @@ def test_least_squares_of_filtered_signals_has_a_covariance_too(spread):
     j = _sensitivities(spread)
     residual = np.random.default_rng(2).standard_normal(j.shape[0]).cumsum()
     plain = Transfer(np.ones(1), np.ones(1))
-    inverse = inverse_of_normal(j.T @ j, np.zeros((3, 3)))
+    _, inverse = instrumental_variables(j, j, residual)
     found = coloured_covariance([Series(j, residual, plain, 0.05)], inverse)
     sigma = np.sqrt(np.diag(found))
     assert np.all(sigma > 0.0)

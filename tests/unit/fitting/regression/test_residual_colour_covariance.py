@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from fieldsid.fitting.regression.bias_compensation import Transfer, filter_polynomials, inverse_of, noise_share, transfer_of
+from fieldsid.fitting.regression.noise_transfer import Transfer, inverse_of, transfer_of
 from fieldsid.fitting.regression.residual_colour_covariance import Series, colour_of, coloured_covariance
 from fieldsid.fitting.regression.state_variable_filter import filtered
 from fieldsid.fitting.regression.svf_equation import RegressionParameters
@@ -60,20 +60,3 @@ def test_the_transfer_is_what_the_filter_does_to_noise_of_the_samples(order):
 def test_an_inverse_of_an_unstable_transfer_is_stable():
     back = inverse_of(transfer_of(2, 4.0, 0.05, RegressionParameters(-0.5, 0.0, 0.0, 0.0)), 0.05)
     assert np.abs(np.roots(back.denominator)).max() < 1.0
-
-
-@pytest.mark.parametrize("order", [1, 2])
-def test_the_share_of_noise_in_the_products_is_what_many_samples_give(order):
-    rng, lam, h, n = np.random.default_rng(9), 4.0, 0.05, 400000
-    e = rng.standard_normal(n)
-    one, two, pole = filter_polynomials(lam, h)
-    x1, x2 = lfilter(one, pole, e), lfilter(two, pole, e)
-    share = noise_share(order, lam, h, angle=0.0 if order == 1 else 1.0, rate=1.0)
-    if order == 1:
-        column, target = -lam * x1, lam * (e - lam * x1)
-        assert share.gram[1, 1] == 0.0
-    else:
-        column, target = -(lam**2) * (x1 - lam * x2), lam**2 * (e - 2 * lam * x1 + lam**2 * x2)
-        assert share.gram[1, 1] == pytest.approx(np.mean((lam**2 * x2) ** 2), rel=0.03)
-    assert share.gram[0, 0] == pytest.approx(np.mean(column**2), rel=0.03)
-    assert share.cross[0] == pytest.approx(np.mean(column * target), rel=0.03, abs=0.02 * np.std(column) * np.std(target))
