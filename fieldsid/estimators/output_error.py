@@ -23,14 +23,14 @@ from fieldsid.fitting.initial.effect_screen import backtrack, carry_parameters, 
 from fieldsid.fitting.initial.forward_build import forward_build
 from fieldsid.fitting.initial.other_event_times import starts_at_other_times
 from fieldsid.fitting.optimise.levenberg_marquardt import Minimum, covariance, levenberg_marquardt, normal_equations
-from fieldsid.fitting.optimise.residual_weights import negative_log_likelihood, squares_of
+from fieldsid.fitting.optimise.residual_weights import negative_log_likelihood, residual_noise
 from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
 from fieldsid.fitting.predict.predict import refit_nuisances
 from fieldsid.fitting.problem.estimator import Estimator, Options, Solution, shared_covariance
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
-from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S, white_noise_floor
+from fieldsid.noise.white_floor import white_noise_floor
 from fieldsid.noise.whiten import noise_vector
 from fieldsid.numerics.arrays import FloatArray
 
@@ -56,19 +56,6 @@ INITIAL_DAMPING = 1e-9
 """Marquardt's damping of the first step on a long record: a larger one would end farther from the minimum than one error."""
 FIRST_PART_SAMPLES = (5_000, 50_000)
 """Lengths, in samples, of the first parts on which the minimum of a long record is computed beforehand."""
-
-
-def residual_noise(problem: Problem, x: FloatArray, parameters: int) -> Noise:
-    """Return the residual standard deviation of both channels, corrected for the number of parameters estimated.
-
-    It has a lower bound: in a log without noise, a channel that the model follows exactly would otherwise have all the weight.
-    """
-    squares, counts = squares_of(problem, x)
-    used_up = parameters * counts / max(float(counts.sum()), 1.0)
-    sigma = np.sqrt(squares / np.maximum(counts - used_up, 1.0))
-    floor, least = white_noise_floor(problem.records), (MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S)
-    angle, rate = (max(float(v), low) for v, low in zip(sigma, least, strict=True))
-    return Noise(angle if sigma[0] > 0 else floor.angle, rate if sigma[1] > 0 else floor.rate)
 
 
 def minimise(problem: Problem, start: FloatArray, noise: Noise) -> tuple[Minimum, Noise]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.estimators.output_error import found_minimum, residual_noise
+from fieldsid.estimators.output_error import found_minimum
 from fieldsid.fitting.covariance.kenward_roger import KNOWN_NOISE_SAMPLES, kenward_roger, noise_covariance
 from fieldsid.fitting.covariance.reml import (
     MAX_NOISE_SAMPLES,
@@ -19,6 +19,7 @@ from fieldsid.fitting.covariance.reml import (
     select_noise,
 )
 from fieldsid.fitting.optimise.levenberg_marquardt import Minimum, covariance, levenberg_marquardt
+from fieldsid.fitting.optimise.residual_weights import residual_noise
 from fieldsid.fitting.problem.estimator import Estimator, Options, Solution, shared_covariance
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.logs.run import Note

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.errors import DataError
-from fieldsid.estimators.output_error import residual_noise
 from fieldsid.fitting.checks.closed_loop import closed_loop_note
+from fieldsid.fitting.optimise.residual_weights import residual_noise
 from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
 from fieldsid.fitting.predict.predict import refit_nuisances
 from fieldsid.fitting.problem.estimator import Estimator, History, Options, Solution

@@ -16,6 +16,7 @@ from fieldsid.fitting.auto_method import best_start, choose
 from fieldsid.fitting.checks.parameter_checks import parameter_checks
 from fieldsid.fitting.checks.record_checks import record_checks
 from fieldsid.fitting.checks.score_tests import score_tests
+from fieldsid.fitting.covariance.input_errors import with_input_errors
 from fieldsid.fitting.covariance.noise_selection import residual_whiteness
 from fieldsid.fitting.estimates import estimates
 from fieldsid.fitting.fin_sense import fin_sense
@@ -111,7 +112,7 @@ def _solve(problem: Problem, method: str, options: Options) -> Solution:
         for run, record in enumerate(problem.records):
             x = refit_nuisances(problem, x, run, white_noise_floor([record]))
         solution = replace(solution, x=x, nuisances_fitted=True)
-    return solution
+    return with_input_errors(problem, solution)
 
 
 def check(records: Sequence[Record], axis: Axis) -> None:

@@ -21,7 +21,7 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.fin_path import FinPath
 from fieldsid.models.helpers.surge import causes_of, smoothed_surge
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.numerics.gcv_smoother import gcv_smooth
+from fieldsid.numerics.gcv_smoother import Smoother, gcv_smooth
 from fieldsid.rounding import number_against
 
 SPEED_LIMITS_M_S = (0.05, 50.0)
@@ -68,6 +68,8 @@ class Record(Brief):
     """Why signals that the log has are not used, by role."""
     goal: FloatArray | None = None
     """The autopilot's reference for the angle, (n,) rad, where the log has it."""
+    smoothers: Mapping[str, Smoother] = field(default_factory=dict)
+    """How the inputs that have noise were smoothed, by role."""
     steps: FloatArray = field(init=False)
     """Length of each interval, (n-1,) s."""
     longest: float = field(init=False)
@@ -228,14 +230,18 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
     fin_angle = _without_gaps(run.signals[column])
     thrust_column = next((c for c in THRUST_COLUMNS if run.has(c)), "")
     columns = {**ROLES, "thrust": thrust_column}
-    signals = {
+    smoothed = {
         role: gcv_smooth(run.time, run.signals[c], fastest_s=SHORTEST_TIME_CONSTANT_S.get(role, 0.0))
         for role, c in columns.items()
         if run.has(c) and role != "surge"
     }
     if knows_speed(run):
-        causes, fastest_s = causes_of(signals.get("thrust"), fin_angle), SHORTEST_TIME_CONSTANT_S["surge"]
-        signals["surge"] = smoothed_surge(run.time, run.signals[ROLES["surge"]], causes, fastest_s=fastest_s)
+        causes, fastest_s = (
+            causes_of(smoothed["thrust"][0] if thrust_column else None, fin_angle),
+            SHORTEST_TIME_CONSTANT_S["surge"],
+        )
+        smoothed["surge"] = smoothed_surge(run.time, run.signals[ROLES["surge"]], causes, fastest_s=fastest_s)
+    signals = {role: values for role, (values, _) in smoothed.items()}
     return Record(
         name=run.name,
         axis=axis,
@@ -250,6 +256,7 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
         cross=np.where(cross_ok, cross, 0.0),
         cross_ok=cross_ok,
         signals=MappingProxyType(signals),
+        smoothers=MappingProxyType({role: by for role, (_, by) in smoothed.items() if by is not None}),
         refused=MappingProxyType({"surge": why} if (why := speed_refused(run)) else {}),
         thrust_column=thrust_column,
         fin_line=np.stack([run[line] for line in STEP_LINES[column]]) if run.has(STEP_LINES[column][0]) else None,

@@ -11,12 +11,13 @@ addition to a smoother).
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.linalg import solveh_banded
+from scipy.linalg import cholesky_banded, solve_banded, solveh_banded
 
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.white_noise import MEDIAN_OF_NORMAL
@@ -37,13 +38,34 @@ MAX_SELECTION_SAMPLES = 20_000
 """Number of first samples from which T and the columns of a longer signal are selected."""
 
 
+@dataclass(frozen=True, slots=True)
+class Smoother:
+    """The smoother of a signal: its stiffness (T/h)^4, the share of samples with a value, and the noise of these values."""
+
+    stiffness: float
+    share: float
+    noise: float
+
+    def errors(self, samples: int, count: int) -> Iterator[FloatArray]:
+        """Yield `count` random errors (samples,) of a smoothed signal, of fixed seed: noise passed, and swings taken away.
+
+        The penalty is a prior of the signal, under which its error has the covariance noise^2 (W + stiffness D'D)^-1. Source:
+        Wahba 1983, Journal of the Royal Statistical Society B 45 (intervals that hold the truth on average over the samples).
+        """
+        rng = np.random.default_rng(0)
+        root = cholesky_banded(_bands(np.full(samples, self.share), self.stiffness), check_finite=False)
+        for _ in range(count):
+            yield self.noise * solve_banded((0, 2), root, rng.standard_normal(samples), check_finite=False)
+
+
 def gcv_smooth(
     time: FloatArray, values: FloatArray, *, fastest_s: float = 0.0, regressors: Iterable[FloatArray] | None = None
-) -> FloatArray:  # fmt: skip
+) -> tuple[FloatArray, Smoother | None]:  # fmt: skip
     """Return a signal (n,) at times (n,) s smoothed and with its gaps (NaN) filled; T is at least `fastest_s` s.
 
     Values that a log repeats until the next one of the sensor count once, and outliers not at all. `regressors` are alternative
-    sets of columns (n, k), evaluated lazily: the signal may be a linear combination of one set plus a smooth residual.
+    sets of columns (n, k), evaluated lazily: the signal may be a linear combination of one set plus a smooth residual. The
+    smoother is None where the signal is returned as it is.
     """
     ok = np.isfinite(values)
     full = np.interp(time, time[ok], values[ok])
@@ -51,11 +73,11 @@ def gcv_smooth(
     seen = _is_new_value(full, ok, step)
     seen[np.flatnonzero(seen)[_is_outlier(full[seen])]] = False
     if seen.sum() < FEWEST_SAMPLES or not step > 0.0:
-        return full
+        return full, None
     straight = np.column_stack([np.ones(time.size), (time - time[0]) / float(np.ptp(time))])
     line = _least_squares_fit(straight, full, seen)
     if float(np.max(np.abs(full - line)[seen])) <= ROUNDING_SHARE * float(np.max(np.abs(full[seen]))):
-        return full
+        return full, None
     weight, part = seen.astype(np.float64), slice(0, MAX_SELECTION_SAMPLES)
     trends = [(line, 0)]
     if regressors is not None:
@@ -67,10 +89,12 @@ def gcv_smooth(
         trends.append((_least_squares_fit(np.column_stack([straight, best]), full, seen), best.shape[1]))
     stiffnesses, found = _stiffnesses(step, fastest_s), []
     for trend, spent in trends:
-        stiffness, error = _best_stiffness((full - trend)[part], weight[part], stiffnesses, spent)
-        found.append((error * (1.0 if spent else 1.0 + CHANCE_GAIN_SAMPLES / float(weight[part].sum())), stiffness, trend))
-    _, stiffness, trend = min(found, key=lambda of: of[0])
-    return np.asarray(trend + _solve_penalised(weight, stiffness, (weight * (full - trend))[:, None])[:, 0])
+        stiffness, error, variance = _best_stiffness((full - trend)[part], weight[part], stiffnesses, spent)
+        chance = 1.0 if spent else 1.0 + CHANCE_GAIN_SAMPLES / float(weight[part].sum())
+        found.append((error * chance, trend, Smoother(stiffness, float(weight.mean()), variance**0.5)))
+    _, trend, smoother = min(found, key=lambda of: of[0])
+    smooth = _solve_penalised(weight, smoother.stiffness, (weight * (full - trend))[:, None])[:, 0]
+    return np.asarray(trend + smooth), smoother
 
 
 def _least_squares_fit(columns: FloatArray, values: FloatArray, seen: npt.NDArray[np.bool_]) -> FloatArray:
@@ -115,24 +139,29 @@ def _stiffnesses(step: float, fastest_s: float) -> FloatArray:
 
 def _best_stiffness(
     values: FloatArray, weight: FloatArray, stiffnesses: FloatArray, spent: int
-) -> tuple[float, float]:  # fmt: skip
-    """Return the stiffness of least generalised cross-validation error, and that error.
+) -> tuple[float, float, float]:  # fmt: skip
+    """Return the stiffness of least generalised cross-validation error, that error, and the variance of the noise.
 
     `spent` is the number of columns fitted before, without those of the straight line, which the smoother passes anyway.
     """
     probe = np.random.default_rng(0).choice([-1.0, 1.0], values.size)
     sides = np.column_stack([weight * values, weight * probe])
-    count, errors = float(weight.sum()), []
+    count, found = float(weight.sum()), []
     for stiffness in stiffnesses:
         z = _solve_penalised(weight, float(stiffness), sides)
-        free = count - float(probe @ (weight * z[:, 1])) - spent
-        errors.append(float(np.sum(weight * (values - z[:, 0]) ** 2)) / max(free, 1e-9 * count) ** 2)
-    best = int(np.argmin(errors))
-    return float(stiffnesses[best]), errors[best]
+        free = max(count - float(probe @ (weight * z[:, 1])) - spent, 1e-9 * count)
+        squares = float(np.sum(weight * (values - z[:, 0]) ** 2))
+        found.append((float(stiffness), squares / free**2, squares / free))
+    return min(found, key=lambda of: of[1])
 
 
 def _solve_penalised(weight: FloatArray, stiffness: float, sides: FloatArray) -> FloatArray:
     """Return the solution (n, m) of (W + stiffness D'D) z = sides, D the second differences."""
+    return np.asarray(solveh_banded(_bands(weight, stiffness), sides, check_finite=False))
+
+
+def _bands(weight: FloatArray, stiffness: float) -> FloatArray:
+    """Return the upper bands (3, n) of W + stiffness D'D."""
     n = weight.size
     bands = np.zeros((3, n))
     bands[0, 2:] = 1.0
@@ -142,4 +171,4 @@ def _solve_penalised(weight: FloatArray, stiffness: float, sides: FloatArray) ->
     bands[2, [1, -2]], bands[2, [0, -1]] = 5.0, 1.0
     bands *= stiffness
     bands[2] += weight
-    return np.asarray(solveh_banded(bands, sides, check_finite=False))
+    return bands

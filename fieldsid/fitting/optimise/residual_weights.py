@@ -7,6 +7,7 @@ import numpy as np
 from fieldsid.errors import EffectError
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.model import Noise
+from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S, white_noise_floor
 from fieldsid.numerics.arrays import FloatArray
 
 
@@ -18,6 +19,19 @@ def squares_of(problem: Problem, x: FloatArray) -> tuple[FloatArray, FloatArray]
         squares += np.einsum("ij,ij->i", residual, residual)
         counts += (record.angle_ok.sum(), record.rate_ok.sum())
     return squares, counts
+
+
+def residual_noise(problem: Problem, x: FloatArray, parameters: int) -> Noise:
+    """Return the residual standard deviation of both channels, corrected for the number of parameters estimated.
+
+    It has a lower bound: in a log without noise, a channel that the model follows exactly would otherwise have all the weight.
+    """
+    squares, counts = squares_of(problem, x)
+    used_up = parameters * counts / max(float(counts.sum()), 1.0)
+    sigma = np.sqrt(squares / np.maximum(counts - used_up, 1.0))
+    floor, least = white_noise_floor(problem.records), (MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S)
+    angle, rate = (max(float(v), low) for v, low in zip(sigma, least, strict=True))
+    return Noise(angle if sigma[0] > 0 else floor.angle, rate if sigma[1] > 0 else floor.rate)
 
 
 def white_weights(problem: Problem, x: FloatArray) -> Noise:

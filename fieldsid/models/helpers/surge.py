@@ -16,13 +16,15 @@ import numpy as np
 
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.first_order_lag import first_order_lag
-from fieldsid.numerics.gcv_smoother import gcv_smooth
+from fieldsid.numerics.gcv_smoother import Smoother, gcv_smooth
 
 TIME_CONSTANTS_S = np.geomspace(0.5, 20.0, 12)
 
 
-def smoothed_surge(time: FloatArray, surge: FloatArray, causes: Sequence[FloatArray], *, fastest_s: float) -> FloatArray:
-    """Return the surge (n,) m/s at times (n,) s without its noise.
+def smoothed_surge(
+    time: FloatArray, surge: FloatArray, causes: Sequence[FloatArray], *, fastest_s: float
+) -> tuple[FloatArray, Smoother | None]:  # fmt: skip
+    """Return the surge (n,) m/s at times (n,) s without its noise, and the smoother.
 
     `causes`, (n,) each, drive the surge through a first-order lag. The time constant of the smoother is at least `fastest_s` s.
     """
