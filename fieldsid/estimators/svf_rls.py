@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.errors import DataError
-from fieldsid.estimators.svf_ls import Regression, base_slots, feedback_notes, finished, regress
+from fieldsid.estimators.svf_ls import Regression, bandwidth_notes, base_slots, feedback_notes, finished, regress
 from fieldsid.fitting.problem.estimator import Estimator, History, Options, Solution
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.fitting.regression.recursive_iv import recursive_iv
@@ -35,7 +35,8 @@ def solve(problem: Problem, options: Options) -> Solution:
     covariance, history = recursion(problem, block, series[0], options.forgetting)
     x = problem.start()
     x[list(base_slots(problem).values())] = history.values[-1]
-    notes = (*feedback_notes(problem, series), *settle_notes(problem.records[0], history))
+    notes = (*bandwidth_notes(block.signals, options.bandwidth), *feedback_notes(problem, series))
+    notes = (*notes, *settle_notes(problem.records[0], history))
     return finished(problem, x, covariance, ESTIMATOR.name, notes, history)
 
 
