@@ -9,6 +9,8 @@ from __future__ import annotations
 import warnings
 from io import BytesIO
 from pathlib import Path
+from textwrap import fill
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
@@ -34,8 +36,6 @@ SERIES = (SIMULATED, SECOND, THIRD, FOURTH, WARM, "#56B4E9", "0.2")
 DPI = 120
 LETTERS_PER_INCH = 11.5
 """Letters of a title in an inch of the sheet."""
-TWO_SIDED_99 = 2.576
-"""Quantile 0.995 of the normal distribution: bands are those of 99 %."""
 MOST_DOTS = 4000
 
 
@@ -73,19 +73,24 @@ def dress(ax: Axes, *, x: str = "", y: str = "", title: str = "") -> Axes:
     return ax
 
 
-def band(ax: Axes, half: float, label: str = "_") -> None:
-    """Draw the two edges of a band about zero, without covering the grid and the data inside."""
-    for edge in (-half, half):
-        ax.axhline(edge, color="0.55", linewidth=0.9, linestyle="--", label=label if edge > 0.0 else "_")
+def note(ax: Axes, text: str, place: tuple[float, float], off: tuple[float, float] = (4.0, 0.0), **how: Any) -> None:
+    """Write words beside a point of the data; off: from there to the words, in points."""
+    ax.annotate(text, place, xytext=off, textcoords="offset points", **{"fontsize": 9, **how})
 
 
-def legend_above(ax: Axes, columns: int = 4) -> None:
-    """Put the legend above the plot, at its right, where it hides no data; the plot's title goes above it."""
-    rows = -(-len(ax.get_legend_handles_labels()[1]) // columns)
+def legend_above(ax: Axes, width: int = 80) -> None:
+    """Put the legend above the plot, at its right, where it hides no data; the plot's title goes above it.
+
+    width: letters in a line of it.
+    """
+    handles, names = ax.get_legend_handles_labels()
+    folds = [fill(name, width) for name in names]
+    columns = max(1, min(4, width // (4 + max(map(len, names)))))
+    rows = -(-sum(1 + fold.count("\n") for fold in folds) // columns)
     if title := ax.get_title(loc="left"):
         ax.set_title(title, loc="left", fontsize=10, pad=6.0 + 14.0 * rows)
     ax.legend(
-        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, frameon=False, fontsize=9, handlelength=1.6,
+        handles, folds, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, frameon=False, fontsize=9, handlelength=1.6,
         borderaxespad=0.2, columnspacing=1.2,
     )  # fmt: skip
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from math import isfinite
 
-from matplotlib.figure import Figure
-
 from fieldsid.figures import correlation, motion, rls
+from fieldsid.figures.panel import Picture
 from fieldsid.fitting.fit import Fit
 from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
 from fieldsid.fitting.predict.predict import Prediction
@@ -16,26 +15,22 @@ from fieldsid.models.model import Model
 from fieldsid.rounding import with_error
 
 
-def figure(fit: Fit, index: int = 0) -> Figure:
+def figure(fit: Fit, index: int = 0) -> Picture:
     """Return the figure of one of the fit's runs."""
     shown = fit.predictions[index]
-    return motion.panels(view_of(shown, fit), heading(fit.model, shown.record.name), facts(fit, shown))
+    title = f"{heading(fit.model, shown.record.name)}\n{facts(fit, shown)}"
+    return Picture(title, (9.0, 8.2), (motion.panels([("simulated", "simulated", shown)], fit.floor),))
 
 
-def residual_figure(fit: Fit, index: int = 0) -> Figure:
+def residual_figure(fit: Fit, index: int = 0) -> Picture:
     """Return the correlations of the residuals of one of the fit's runs."""
     shown = fit.predictions[index]
-    return correlation.figure(view_of(shown, fit), f"{shown.record.name}, {fit.model.axis.value}: what the model leaves")
+    return correlation.figure(shown, f"{shown.record.name}, {fit.model.axis.value}: what the model leaves")
 
 
-def history_figure(fit: Fit, history: History) -> Figure:
+def history_figure(fit: Fit, history: History) -> Picture:
     """Return the recursive estimates over time."""
-    return rls.panels(history, fit.model.units, f"{', '.join(fit.model.runs)}, {fit.model.axis.value}: {fit.model.method}")
-
-
-def view_of(shown: Prediction, fit: Fit) -> motion.MotionView:
-    """Return the panels' view of a run: residuals are shown over the noise floor of the fit."""
-    return motion.MotionView(shown.record, shown.angle, shown.rate, shown.fin, fit.floor.angle, fit.floor.rate)
+    return rls.figure(history, fit.model.units, f"{', '.join(fit.model.runs)}, {fit.model.axis.value}: {fit.model.method}")
 
 
 def heading(model: Model, run: str) -> str:

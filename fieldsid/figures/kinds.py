@@ -1,12 +1,10 @@
-"""The kinds of files a figure is written as, by the suffix, and figures by their names. It imports nothing heavy."""
+"""The kinds of files a figure is written as, by the suffix. It imports nothing heavy."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from importlib import import_module
+from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 from fieldsid.errors import UsageError
 
@@ -19,11 +17,6 @@ KINDS: Mapping[str, Mapping[str, str | None]] = MappingProxyType(
     }
 )
 """Metadata of each kind of file; without a date, so that the same figure gives the same file."""
-
-
-def sketch(module: str, *of: Any, draw: str = "figure") -> Callable[[], Any]:
-    """Return a function that draws a figure by a module of `fieldsid.figures`; it loads the module and matplotlib when called."""
-    return lambda: getattr(import_module(f"fieldsid.figures.{module}"), draw)(*of)
 
 
 def is_figure(path: Path) -> bool:

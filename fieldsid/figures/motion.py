@@ -3,102 +3,77 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from fieldsid.figures import canvas
+from fieldsid.figures.panel import Panel, Series
 from fieldsid.models.axis import Axis
-from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
+if TYPE_CHECKING:
+    from fieldsid.fitting.predict.predict import Prediction
+    from fieldsid.models.model import Noise
+    from fieldsid.models.record import Record
+
 SYMBOLS = {Axis.YAW: ("yaw", "yaw rate", "rudder"), Axis.PITCH: ("pitch", "pitch rate", "elevator")}
+UNITS = ("deg", "deg/s")
+TWO_SIDED_99 = 2.576
+"""Quantile 0.995 of the normal distribution: bands are those of 99 %."""
+Shown: TypeAlias = "Sequence[tuple[str, str, Prediction]]"
+"""Free runs over one record: of each its name, the kind of its lines, and the motion."""
 
 
-@dataclass(frozen=True, slots=True)
-class MotionView:
-    """What the panels show of one run.
+def panels(shown: Shown, floor: Noise, spans: Sequence[tuple[float, float]] = ()) -> tuple[Panel, ...]:
+    """Return the measured channels, the fin, and what is left of them over the noise floor; spans (s) are shaded."""
+    record = shown[0][2].record
+    channels = [channel(shown, i, spans) for i in (0, 1) if record.ok[i].any()]
+    return (*channels, fin(shown[0][2], spans), residual(shown, floor, spans))
 
-    A record, the simulated angle and rate (n,) in rad and rad/s, the fin angle (n,) in rad
-    after the actuator, and the noise of both sensors (rad, rad/s). `spans` are (start, end) s to be shaded.
+
+def channel(shown: Shown, index: int, spans: Sequence[tuple[float, float]] = (), title: str = "", x: str = "") -> Panel:
+    """Return a channel, 0 the angle in deg, 1 the rate in deg/s, measured and by each model."""
+    record = shown[0][2].record
+    models = [Series(record.time, np.degrees((p.angle, p.rate)[index]), kind, name) for name, kind, p in shown]
+    dots = Series(record.time, measured(record, index), "measured", "measured", "dots")
+    return Panel(f"{SYMBOLS[record.axis][index]}, {UNITS[index]}", (dots, *models), height=125, spans=spans, x=x, title=title)
+
+
+def measured(record: Record, index: int) -> FloatArray:
+    """Return a measured channel (n,) in deg or deg/s, NaN where nothing was measured."""
+    return np.degrees(np.where(record.ok[index], record.both[index], np.nan))
+
+
+def fin(shown: Prediction, spans: Sequence[tuple[float, float]] = ()) -> Panel:
+    """Return the logged fin in deg, and the fin angle that the model makes of it where the two differ."""
+    record = shown.record
+    name, form = "measured fin" if record.fin_is_measured else "command", "steps" if record.fin_is_held else "line"
+    series = [Series(record.time, np.degrees(record.fin), "fin", name, form)]
+    if np.max(np.abs(shown.fin[:-1] - record.fin[:-1])) > 1e-6:  # the last sample begins no interval
+        series.append(Series(record.time, np.degrees(shown.fin), "second", "fin in the model"))
+    return Panel(f"{SYMBOLS[record.axis][2]}, deg", series, height=80, spans=spans)
+
+
+def residual(shown: Shown, floor: Noise, spans: Sequence[tuple[float, float]] = ()) -> Panel:
+    """Return measured less simulated over the sensor's noise, with the 99 % band of the noise.
+
+    Of one model that of angle and rate; of several that of each in the rate, or in the angle where no rate was measured.
     """
-
-    record: Record
-    angle: FloatArray
-    rate: FloatArray
-    fin: FloatArray
-    noise_angle: float
-    noise_rate: float
-    spans: Sequence[tuple[float, float]] = ()
-
-    @property
-    def measured_angle(self) -> FloatArray:
-        """The measured angle (n,) in deg, NaN where nothing was measured."""
-        return np.degrees(np.where(self.record.angle_ok, self.record.angle, np.nan))
-
-    @property
-    def measured_rate(self) -> FloatArray:
-        """The measured rate (n,) in deg/s, NaN where nothing was measured."""
-        return np.degrees(np.where(self.record.rate_ok, self.record.rate, np.nan))
+    record = shown[0][2].record
+    known = [i for i in (0, 1) if record.ok[i].any() and (floor.angle, floor.rate)[i] > 0.0]
+    lines = [(("angle", "rate")[i], ("third", "second")[i], i, shown[0][2]) for i in known]
+    if len(shown) > 1:
+        lines = [(name, kind, known[-1], p) for name, kind, p in shown if known]
+    left = [
+        (name, kind, (measured(record, i) - np.degrees((p.angle, p.rate)[i])) / np.degrees((floor.angle, floor.rate)[i]))
+        for name, kind, i, p in lines
+    ]
+    series = [Series(record.time, values, kind, name, thin=True) for name, kind, values in left]
+    of = "" if len(shown) == 1 or not known else f"{('angle', 'rate')[known[-1]]} "
+    edges = level(record.time, TWO_SIDED_99, "99 % of the noise"), level(record.time, -TWO_SIDED_99)
+    return Panel(f"{of}residual / noise", (*series, *edges), height=100, spans=spans, x="time, s")
 
 
-def draw(view: MotionView, axes: Sequence[Axes]) -> None:
-    """Draw the four panels, top to bottom: angle, rate, fin, residual."""
-    for channel in (0, 1):
-        draw_channel(view, channel, axes[channel])
-    canvas.legend_above(axes[0])
-    draw_fin(view, axes[2])
-    draw_residual(view, axes[3])
-    for ax in axes:
-        for start, end in view.spans:
-            ax.axvspan(start, end, color=canvas.WARM, alpha=0.18, linewidth=0)
-        ax.set_xlim(view.record.time[0], view.record.time[-1])
-    for ax in axes[:-1]:
-        ax.tick_params(labelbottom=False)
-    axes[-1].set_xlabel("time, s")
-
-
-def draw_channel(view: MotionView, channel: int, ax: Axes) -> None:
-    """Draw a channel, 0 the angle in deg, 1 the rate in deg/s, measured and simulated."""
-    unit, measured, simulated = (("deg", view.measured_angle, view.angle), ("deg/s", view.measured_rate, view.rate))[channel]
-    canvas.dress(ax, y=f"{SYMBOLS[view.record.axis][channel]}, {unit}")
-    canvas.dots(ax, view.record.time, measured)
-    ax.plot(view.record.time, np.degrees(simulated), color=canvas.SIMULATED, linewidth=1.3, label="simulated")
-
-
-def draw_fin(view: MotionView, ax: Axes) -> None:
-    """Draw the logged fin in deg, and the fin angle that the model makes of it where the two differ."""
-    record, logged = view.record, np.degrees(view.record.fin)
-    canvas.dress(ax, y=f"{SYMBOLS[record.axis][2]}, deg")
-    name = "measured fin" if record.fin_is_measured else "command"
-    style = "steps-post" if record.fin_is_held else "default"
-    ax.plot(record.time, logged, color="0.2", linewidth=1.1, drawstyle=style, label=name)
-    if np.max(np.abs(view.fin[:-1] - record.fin[:-1])) > 1e-6:  # the last sample begins no interval
-        ax.plot(record.time, np.degrees(view.fin), color=canvas.SECOND, linewidth=1.1, label="fin in the model")
-    canvas.legend_above(ax)
-
-
-def draw_residual(view: MotionView, ax: Axes) -> None:
-    """Draw measured less simulated over the sensor's noise, angle and rate, with the 99 % band of the noise."""
-    time = view.record.time
-    canvas.dress(ax, y="residual / noise")
-    parts = (
-        ("angle", view.measured_angle - np.degrees(view.angle), view.noise_angle, canvas.THIRD),
-        ("rate", view.measured_rate - np.degrees(view.rate), view.noise_rate, canvas.SECOND),
-    )
-    for name, residual, noise, colour in parts:
-        if np.isfinite(residual).any() and noise > 0:
-            ax.plot(time, residual / np.degrees(noise), color=colour, linewidth=0.7, label=name, alpha=0.6)
-    canvas.band(ax, canvas.TWO_SIDED_99, "99 % of the noise")
-    canvas.legend_above(ax)
-
-
-def panels(view: MotionView, title: str, facts: str = "") -> Figure:
-    """Return a sheet with the four panels, a title and a line of facts under it."""
-    figure = canvas.sheet(9.0, 8.2, title + (f"\n{facts}" if facts else ""))
-    axes = figure.subplots(4, 1, sharex=True, height_ratios=(1.25, 1.25, 0.9, 1.0))
-    draw(view, list(axes))
-    figure.align_ylabels(list(axes))
-    return figure
+def level(x: FloatArray, value: float, name: str = "", kind: str = "quiet") -> Series:
+    """Return a dashed line at a value over the whole of an axis x (n,)."""
+    return Series(np.array([np.min(x), np.max(x)]), np.full(2, value), kind, name, dashed=True)

@@ -3,53 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from fieldsid.figures import canvas
+from fieldsid.figures.motion import level
+from fieldsid.figures.panel import Band, Panel, Picture, Series
 from fieldsid.fitting.problem.estimator import History
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.rounding import TWO_SIDED_95
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 START_UP = 0.15
 """First share of the record, whose inaccurate estimates do not determine the scale of a panel."""
 
 
-def draw(view: History, ax: Axes, index: int, unit: str) -> None:
-    """Draw one parameter (by its place in `names`) over time."""
+def figure(view: History, units: Mapping[str, str], of: str) -> Picture:
+    """Return one panel per parameter; the title says when each settled, and what the estimates are of."""
+    cells = [partial(draw, view, i, units.get(name, "")) for i, name in enumerate(view.names)]
+    return Picture(f"{of}: {settling(view)}", (9.0, 1.2 + 1.9 * len(cells)), (cells,))
+
+
+def draw(view: History, index: int, unit: str, ax: Axes) -> None:
+    """Draw one parameter (by its place in `names`) over time, and when it settled."""
+    from fieldsid.figures import canvas, drawn
+
     name = view.names[index]
     value, band = view.values[:, index], TWO_SIDED_95 * view.std_errors[:, index]
-    canvas.dress(ax, y=f"{name}, {unit}" if unit else name)
-    ax.fill_between(view.time, value - band, value + band, color=canvas.SECOND, alpha=0.2, linewidth=0, label="95 % band")
-    ax.plot(view.time, value, color=canvas.SECOND, linewidth=1.3, label="estimate")
-    ax.axhline(float(value[-1]), color="0.3", linewidth=0.8, linestyle=":", label="last value")
+    area = Band(view.time, value - band, value + band, "second", "95 % band")
+    lines = Series(view.time, value, "second", "estimate"), level(view.time, float(value[-1]), "last value")
+    x = "time, s" if name == view.names[-1] else ""
+    drawn.draw_panel(Panel(f"{name}, {unit}" if unit else name, lines, (area,), limits=_scale(value, band), x=x), ax)
     at = view.settled_s.get(name, float("nan"))
     if np.isfinite(at):
         when = float(view.time[0]) + at
         ax.axvline(when, color=canvas.SIMULATED, linewidth=1.1, linestyle="--", label="settled")
-        ax.annotate(
-            f"after {at:.1f} s", (when, 1.0), xycoords=("data", "axes fraction"), xytext=(4, -11),
-            textcoords="offset points", color=canvas.SIMULATED, fontsize=9,
-        )  # fmt: skip
+        canvas.note(ax, f"after {at:.1f} s", (when, 1.0), (4, -11), xycoords=("data", "axes fraction"), color=canvas.SIMULATED)
     elif view.settled_s:
         ax.annotate("not settled", (0.99, 0.04), xycoords="axes fraction", ha="right", color=canvas.SIMULATED, fontsize=9)
-    ax.set_xlim(view.time[0], view.time[-1])
-    ax.set_ylim(*_scale(value, band))
-
-
-def panels(view: History, units: Mapping[str, str], of: str) -> Figure:
-    """Return a sheet with one panel per parameter; its title says when each settled, and what the estimates are of."""
-    count = len(view.names)
-    figure = canvas.sheet(9.0, 1.2 + 1.9 * count, f"{of}: {settling(view)}")
-    axes = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
-    for i, ax in enumerate(axes):
-        draw(view, ax, i, units.get(view.names[i], ""))
-    canvas.legend_above(axes[0])
-    axes[-1].set_xlabel("time, s")
-    figure.align_ylabels(list(axes))
-    return figure
 
 
 def settling(view: History) -> str:

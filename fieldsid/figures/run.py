@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from fieldsid.errors import DataError
-from fieldsid.figures import canvas
+from fieldsid.figures.panel import Panel, Picture, Series
+from fieldsid.figures.several import KINDS
 from fieldsid.logs.run import Run
 
 PANELS = (
@@ -23,32 +22,27 @@ PANELS = (
 """The signals that share a panel; where its unit is degrees the signals are in rad."""
 
 
-def figure(run: Run) -> Figure:
-    """Return a sheet with a panel for each kind of signal that was measured; raises DataError where none was."""
+def figure(run: Run) -> Picture:
+    """Return a panel for each kind of signal that was measured; raises DataError where none was."""
     shown = [(y, present) for y, names in PANELS if (present := [n for n in names if run.has(n)])]
     if not shown:
         raise DataError(f"run {run.name!r} has nothing to draw", found=", ".join(run.signals) or "no signals")
-    sheet = canvas.sheet(9.0, 1.0 + 1.7 * len(shown), _title(run))
-    axes = sheet.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
-    for (y, names), ax in zip(shown, axes, strict=True):
-        draw(run, names, y, ax)
-    axes[-1].set_xlabel("time, s")
-    sheet.align_ylabels(list(axes))
-    return sheet
-
-
-def _title(run: Run) -> str:
+    panels = [panel(run, names, y, "time, s" if y == shown[-1][0] else "") for y, names in shown]
     speed = f", {np.nanmedian(run['surge_m_s']):.2f} m/s" if run.has("surge_m_s") else ""
-    return f"{run.name}: {run.time[-1] - run.time[0]:.1f} s, {len(run)} samples{speed}"
+    title = f"{run.name}: {run.time[-1] - run.time[0]:.1f} s, {len(run)} samples{speed}"
+    return Picture(title, (9.0, 1.0 + 1.7 * len(shown)), (panels,))
 
 
-def draw(run: Run, names: list[str], y: str, ax: Axes) -> None:
-    """Draw signals of one kind over time: a command in steps, all else from sample to sample."""
-    canvas.dress(ax, y=y)
-    for i, name in enumerate(names):
-        values = np.degrees(run[name]) if "deg" in y else run[name]
-        style = "steps-post" if name in ("rudder_rad", "elevator_rad") else "default"
-        ax.plot(
-            run.time, values, color=canvas.SERIES[i], linewidth=1.1, drawstyle=style, label=name.rpartition("_rad")[0] or name
+def panel(run: Run, names: list[str], y: str, x: str) -> Panel:
+    """Return signals of one kind over time: a command in steps, all else from sample to sample."""
+    series = [
+        Series(
+            run.time,
+            np.degrees(run[name]) if "deg" in y else run[name],
+            kind,
+            name.rpartition("_rad")[0] or name,
+            "steps" if name in ("rudder_rad", "elevator_rad") else "line",
         )
-    canvas.legend_above(ax)
+        for name, kind in zip(names, KINDS, strict=False)
+    ]
+    return Panel(y, series, x=x)

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from functools import partial
 from importlib import import_module
 from math import isfinite
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from fieldsid.batch.trend import Trend
 from fieldsid.figures import canvas
+from fieldsid.figures.panel import Picture
 from fieldsid.rounding import TWO_SIDED_95
 
 DATES: Any = import_module("matplotlib.dates")  # its functions have no types
@@ -23,19 +24,10 @@ OF_FIRST = ("", "%b\n%Y", "%b\n%Y", "%d %b\n%Y", "%H:%M", "%H:%M")
 """The same for the first of each: no tick beyond the axis is needed to know the year."""
 
 
-def figure(trends: Sequence[Trend], name: str) -> Figure:
-    """Return a sheet with a panel for each parameter, which share the time."""
-    sheet = canvas.sheet(10.0, 1.2 + 2.1 * len(trends), f"{name}: {summary(trends)}")
-    axes = sheet.subplots(len(trends), 1, squeeze=False, sharex=True)[:, 0]
-    for ax, trend in zip(axes, trends, strict=True):
-        draw(trend, ax)
-    locator = DATES.AutoDateLocator()
-    axes[-1].xaxis.set_major_locator(locator)
-    axes[-1].xaxis.set_major_formatter(
-        DATES.ConciseDateFormatter(locator, formats=FORMATS, zero_formats=OF_FIRST, show_offset=False)
-    )
-    axes[-1].set_xlabel("start of the run, UTC")
-    return sheet
+def figure(trends: Sequence[Trend], name: str) -> Picture:
+    """Return a part for each parameter, one below the other."""
+    cells = [partial(draw, trend) for trend in trends]
+    return Picture(f"{name}: {summary(trends)}", (10.0, 1.2 + 2.3 * len(trends)), (cells,))
 
 
 def summary(trends: Sequence[Trend]) -> str:
@@ -60,13 +52,12 @@ def draw(trend: Trend, ax: Axes) -> None:
     for i, (cut, change) in enumerate(zip(cuts.tolist(), trend.changes, strict=True)):
         at = 0.5 * (dates[cut - 1] + dates[cut])
         ax.axvline(at, color=canvas.SIMULATED, linestyle="--", linewidth=1.2, label="_" if i else "change")
-        ax.annotate(
-            _by(change.share), (at, 0.5), xycoords=("data", "axes fraction"), xytext=(4, 0), textcoords="offset points",
-            fontsize=9, color=canvas.SIMULATED,
-        )  # fmt: skip
+        canvas.note(ax, _by(change.share), (at, 0.5), xycoords=("data", "axes fraction"), color=canvas.SIMULATED)
     at_speed = f" at {trend.speed:.2f} m/s" if isfinite(trend.speed) else ""
-    canvas.dress(ax, y=f"{trend.name}{at_speed}")
-    canvas.legend_above(ax, 3)
+    canvas.dress(ax, x="start of the run, UTC", y=f"{trend.name}{at_speed}")
+    locator = DATES.AutoDateLocator()
+    ax.xaxis.set_major_locator(locator)
+    ax.xaxis.set_major_formatter(DATES.ConciseDateFormatter(locator, formats=FORMATS, zero_formats=OF_FIRST, show_offset=False))
 
 
 def _by(share: float) -> str:

@@ -7,12 +7,13 @@ of the drawing; the attributes of the panel have its data range, from which the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from html import escape
 from math import ceil, floor, isfinite, log10
 
 import numpy as np
 
+from fieldsid.figures.panel import Band, Bars, Panel, Series
 from fieldsid.numerics.arrays import FloatArray
 
 WIDTH, LEFT, RIGHT, TOP, BOTTOM, GAP = 480, 56, 10, 18, 36, 22
@@ -21,50 +22,16 @@ SMALLEST_PLAIN = 1e-3
 MOST_POINTS = 700
 """Most points of one line, which is the resolution of a wide screen."""
 TICKS_X, TICKS_Y = 6, 4
+POINTS = ("points", "rings")
+"""The forms of series with a mark at each point."""
 SAME = 2e-4
 """Relative range of values that are drawn level: with the four digits of the tables they are equal."""
 
 
-@dataclass(frozen=True, slots=True)
-class Series:
-    """One line: x and y (n,), its class (`measured`, `simulated`, `second`, `quiet`), name, and how it is drawn.
-
-    `form` is line, dots, steps or points with error bars, of which `error` (n,) is the half length.
-    """
-
-    x: FloatArray
-    y: FloatArray
-    kind: str
-    name: str = ""
-    form: str = "line"
-    error: FloatArray | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Band:
-    """An area between low (n,) and high (n,) over x (n,)."""
-
-    x: FloatArray
-    low: FloatArray
-    high: FloatArray
-    kind: str
-
-
-@dataclass(frozen=True, slots=True)
-class Panel:
-    """One plot: the words of its y axis, its lines and areas, its height, and spans of x that are shaded."""
-
-    label: str
-    series: Sequence[Series]
-    bands: Sequence[Band] = ()
-    height: int = 120
-    spans: Sequence[tuple[float, float]] = field(default_factory=tuple)
-    from_zero: bool = False
-
-
-def chart(panels: Sequence[Panel], x_label: str, title: str) -> str:
-    """Return panels over one x axis as an SVG element with a title for screen readers."""
-    has_points = any(s.form == "points" for p in panels for s in p.series)
+def chart(panels: Sequence[Panel], title: str) -> str:
+    """Return panels over the x axis of the last one as an SVG element with a title for screen readers."""
+    x_label = panels[-1].x
+    has_points = any(s.form in POINTS for p in panels for s in p.series)
     x0, x1 = _range([s.x for p in panels for s in p.series], pad=0.03 if has_points else 0.0)
     height = TOP + sum(p.height + GAP for p in panels) - GAP + BOTTOM
     head = (
@@ -80,32 +47,32 @@ def chart(panels: Sequence[Panel], x_label: str, title: str) -> str:
     return "".join([*parts, "</svg>"])
 
 
-def bars(rows: Sequence[tuple[str, float, str]], title: str, *, mark: tuple[float, str] | None = None) -> str:
-    """Return horizontal bars, each with its name and a label, from zero; `mark` is a value drawn as a line with its name."""
+def bars(of: Bars, title: str) -> str:
+    """Return horizontal bars from zero, each with its name and its words, rings on them, and the line at 1 with its name."""
     left, step, right = 186, 24, 112
-    most = max([v for _, v, _ in rows] + ([mark[0]] if mark else []), default=1.0) or 1.0
-    scale = (WIDTH - left - right) / most
-    height = step * len(rows) + 8 + (18 if mark else 0)
+    scale = (WIDTH - left - right) / of.end
+    height = step * len(of.rows) + 8 + (18 if of.mark else 0)
     parts = [f'<svg class="bars" viewBox="0 0 {WIDTH} {height}" role="img"><title>{escape(title)}</title>']
-    for i, (name, value, label) in enumerate(rows):
-        y = 4 + step * i
+    for i, bar in enumerate(of.rows):
+        y, long = 4 + step * i, min(bar.value, of.end) * scale
+        ring = f'<circle class="ring" cx="{left + min(bar.ring, of.end) * scale:.1f}" cy="{y + step - 6}" r="3.5"/>'
         parts.append(
-            f'<text x="{left - 8}" y="{y + 15}" text-anchor="end">{escape(name)}</text>'
-            f'<rect class="bar" x="{left}" y="{y + 3}" width="{max(value * scale, 1):.1f}" height="{step - 8}"/>'
-            f'<text x="{left + value * scale + 6:.1f}" y="{y + 15}">{escape(label)}</text>'
+            f'<text x="{left - 8}" y="{y + 15}" text-anchor="end">{escape(bar.name)}</text>'
+            f'<rect class="bar{" out" * bar.stands_out}" x="{left}" y="{y + 3}" width="{max(long, 1):.1f}" height="{step - 8}"/>'
+            f'{ring if isfinite(bar.ring) else ""}<text x="{left + long + 6:.1f}" y="{y + 15}">{escape(bar.says)}</text>'
         )
-    if mark:
-        x = left + mark[0] * scale
+    if of.mark:
+        x = left + scale
         parts.append(
             f'<line class="mark" x1="{x:.1f}" x2="{x:.1f}" y1="2" y2="{height - 18}"/>'
-            f'<text class="quiet" x="{x:.1f}" y="{height - 4}" text-anchor="middle">{escape(mark[1])}</text>'
+            f'<text class="quiet" x="{x:.1f}" y="{height - 4}" text-anchor="middle">{escape(of.mark)}</text>'
         )
     return "".join([*parts, "</svg>"])
 
 
-def legend(series: Sequence[Series]) -> str:
-    """Return the names of lines with their colours, as HTML."""
-    named = {s.name: s.kind for s in series if s.name}
+def legend(panels: Sequence[Panel]) -> str:
+    """Return the names of the lines of panels with their colours, as HTML."""
+    named = {s.name: s.kind for p in panels for s in p.series if s.name}
     return "".join(f'<span class="key {kind}">{escape(name)}</span>' for name, kind in named.items())
 
 
@@ -139,8 +106,8 @@ def _range(values: Sequence[FloatArray], pad: float, *, from_zero: bool = False)
 
 def _panel(panel: Panel, top: float, x: tuple[float, float]) -> str:
     ends = [s.y for s in panel.series] + [e for b in panel.bands for e in (b.low, b.high)]
-    ends += [s.y + sign * s.error for s in panel.series if s.error is not None for sign in (-1.0, 1.0)]
-    y = _range(ends, 0.06, from_zero=panel.from_zero)
+    ends += [end for s in panel.series if s.error is not None for end in _ends(s)]
+    y = panel.limits or _range(ends, 0.06, from_zero=panel.from_zero)
     width = WIDTH - LEFT - RIGHT
     scale = _Scale(x, y, width, panel.height)
     head = (
@@ -188,25 +155,29 @@ def _band(band: Band, scale: _Scale) -> str:
     return f'<polygon class="band {band.kind}" points="{points}"/>'
 
 
+def _ends(series: Series) -> tuple[FloatArray, FloatArray]:
+    """Return the lower and the upper end (n,) of the error bars of a series."""
+    down, up = (0.0, 0.0) if series.error is None else np.broadcast_to(series.error, (2, series.y.size))
+    return series.y - down, series.y + up
+
+
 def _series(series: Series, scale: _Scale) -> str:
-    ok = np.isfinite(series.x) & np.isfinite(series.y)
-    points = [(scale.x(x), scale.y(y)) for x, y in zip(series.x[ok], series.y[ok], strict=True)]
-    name = f' data-name="{escape(series.name)}"' if series.name else ""
+    x, y, low, high = thinned(series.x, series.y, *_ends(series))
+    ok = np.isfinite(x) & np.isfinite(y)
+    points = [(scale.x(x), scale.y(y)) for x, y in zip(x[ok], y[ok], strict=True)]
+    kind = f"{series.kind}{' dashed' * series.dashed}{' thin' * series.thin}"
+    name = f' data-name="{escape(series.name)}"' if series.name and not series.dashed else ""
+    marks = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in points)
     if series.form == "dots":
-        path = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in points)
-        return f'<path class="dots {series.kind}"{name} d="{path}"/>'
-    if series.form == "points":
-        errors = np.zeros(series.y.size) if series.error is None else series.error
-        bars = [
-            f"M{scale.x(x):.1f} {scale.y(y - e):.1f}V{scale.y(y + e):.1f}"
-            for x, y, e in zip(series.x[ok], series.y[ok], errors[ok], strict=True)
-        ]
-        path = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in points)
-        return f'<path class="errors {series.kind}" d="{"".join(bars)}"/><path class="marks {series.kind}"{name} d="{path}"/>'
+        return f'<path class="dots {kind}"{name} d="{marks}"/>'
+    if series.form in POINTS:
+        errors = zip(x[ok], low[ok], high[ok], strict=True)
+        path = "".join(f"M{scale.x(x):.1f} {scale.y(low):.1f}V{scale.y(high):.1f}" for x, low, high in errors)
+        return f'<path class="errors {kind}" d="{path}"/><path class="{series.form} {kind}"{name} d="{marks}"/>'
     if series.form == "steps":
         points = [p for (x, y), (x1, _) in zip(points, [*points[1:], points[-1]], strict=True) for p in ((x, y), (x1, y))]
     drawn = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-    return f'<polyline class="line {series.kind}"{name} points="{drawn}"/>'
+    return f'<polyline class="line {kind}"{name} points="{drawn}"/>'
 
 
 def _x_axis(top: float, x: tuple[float, float], label: str) -> str:

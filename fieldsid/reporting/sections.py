@@ -12,9 +12,12 @@ from fieldsid.comparison.compare import Channel, Comparison, left_in_words
 from fieldsid.comparison.sufficient import is_noise, pooled
 from fieldsid.display import page_of, view_of
 from fieldsid.extension.lineage import Loop
+from fieldsid.figures import compare, law, loop, schedule, turn
+from fieldsid.figures.bars import places
 from fieldsid.logs import Run
+from fieldsid.models.axis import NAMES
 from fieldsid.page import Block, counted
-from fieldsid.reporting import figures
+from fieldsid.reporting.chart import bars, chart, legend
 from fieldsid.reporting.made_from import lineage
 from fieldsid.reporting.material import AxisMaterial, Material, Shown
 from fieldsid.rounding import DEGREES, MANY, number
@@ -119,7 +122,7 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
         "failures": [
             {
                 "title": f"{run}: the {_channel_error(channel)}",
-                "chart": figures.failures(channel.where, f"where the {channel.name} of {run} fails"),
+                "chart": bars(places(channel.where, most=8), f"where the {channel.name} of {run} fails"),
                 "moves": ", ".join(f"{m.signal} ({100 * m.explained:.0f} %)" for m in c.moves_with[:3]),
             }
             for run, channel, c in failing[:6]
@@ -134,16 +137,15 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _loop(loop: Loop) -> dict[str, Any]:
+def _loop(found: Loop) -> dict[str, Any]:
     """Return the loop in four charts: failure of the first model, its places, the last model, the error after each step."""
-    (before, before_key), (after, after_key) = (figures.loop_motion(loop, has_last=last) for last in (False, True))
+    before, where, after, errors = loop.panels(found)
     return {
-        "run": loop.run, "start": loop.start, "added": ", ".join(loop.added),
-        "before": before, "before_key": before_key, "before_left": loop.left_by(loop.before),
-        "after": after, "after_key": after_key, "after_left": loop.left_by(loop.after),
-        "where": figures.failures(loop.where, f"where the {loop.start} fails") if loop.where else "",
-        "most": DEGREES.words(loop.where[0].condition) if loop.where else "",
-        "steps": figures.loop_steps(loop),
+        "run": found.run, "start": found.start, "added": ", ".join(found.added),
+        "before": chart([before], before.title), "before_key": legend([before]), "before_left": found.left_by(found.before),
+        "after": chart([after], after.title), "after_key": legend([after]), "after_left": found.left_by(found.after),
+        "where": bars(where, where.title) if where.rows else "", "steps": bars(errors, errors.title),
+        "most": DEGREES.words(found.where[0].condition) if found.where else "",
     }  # fmt: skip
 
 
@@ -158,12 +160,12 @@ def _without_noise(judged: Sequence[Comparison], on: str) -> str:
 
 
 def _run_section(shown: Shown, found: Any, axis: AxisMaterial) -> dict[str, Any]:
-    title = f"{shown.path} on {found.run}"
-    drawn, key = figures.free_run(found, f"{title}: free run and measurement")
+    panels = compare.panels(found)
+    drawn = chart(panels, f"{shown.path} on {found.run}: free run and measurement")
     over = ", ".join(_channel_error(c) for c in found.channels)
     return {
-        "model": shown.path, "run": found.run, "chart": drawn, "legend": key, "over": over,
-        "fitted": shown.was_fitted_to(found.run), "first": shown is axis.shown[0],
+        "model": shown.path, "run": found.run, "chart": drawn, "legend": legend(panels),
+        "over": over, "fitted": shown.was_fitted_to(found.run), "first": shown is axis.shown[0],
     }  # fmt: skip
 
 
@@ -192,25 +194,30 @@ def _parameters(models: Sequence[Shown]) -> Block:
 
 
 def _laws(axis: AxisMaterial) -> list[dict[str, str]]:
+    """Return a chart of each parameter over speed: its law, or its points where all are of one speed."""
     if axis.source is None:
         return []
+    laws = {} if axis.source.laws is None else axis.source.laws.by_name
     out = []
-    for name, unit in figures.parameters_of(axis.axis):
-        drawn = figures.over_speed(axis.source, name, unit)
-        law = None if axis.source.laws is None else axis.source.laws.by_name.get(name)
-        growth = f"|{name}| grows as {law.exponent.says}" if law is not None and law.exponent else ""
-        if drawn:
-            out.append({"name": name, "chart": drawn, "says": growth})
+    for name in NAMES[axis.source.axis].base:
+        known, exponent = [p for p in axis.source.points if name in p.values], laws[name].exponent if name in laws else None
+        if known:
+            panel = law.panel(laws[name]) if name in laws else law.points(name, known)
+            says = "" if exponent is None else f"|{name}| grows as {exponent.says}"
+            out.append({"name": name, "chart": chart([panel], f"{name} over {panel.x}"), "key": legend([panel]), "says": says})
     return out
 
 
 def _radius(item: Item) -> dict[str, Any]:
-    drawn, key = figures.radius(item.body)
-    return {"chart": drawn, "legend": key, "blocks": turns_of(item.body, DEGREES), "path": item.path}
+    panels = turn.panels(item.body)
+    blocks = turns_of(item.body, DEGREES)
+    return {"chart": chart(panels, "turning radius over speed"), "legend": legend(panels), "blocks": blocks, "path": item.path}
 
 
 def _gains(gains: Schedule, path: str) -> dict[str, Any]:
-    return {"chart": figures.gains(gains), "blocks": tuple(blocks_of(gains, DEGREES)), "path": path}
+    panels = schedule.panels(gains)
+    drawn, key = chart(panels, "gains and phase margin over speed"), legend(panels)
+    return {"chart": drawn, "legend": key, "blocks": tuple(blocks_of(gains, DEGREES)), "path": path}
 
 
 def _vehicle(material: Material) -> list[tuple[str, str]]:

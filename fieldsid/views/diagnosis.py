@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import Figures, Frames, View
-from fieldsid.figures.kinds import sketch
+from fieldsid.figures.sketch import sketch
 from fieldsid.page import Block, Page, cut, paragraph
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import RADIANS, Angles

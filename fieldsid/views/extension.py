@@ -7,7 +7,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import Figures, Frames, View
-from fieldsid.figures.kinds import sketch
+from fieldsid.figures.sketch import sketch
 from fieldsid.page import Block, Page, facts, listed
 from fieldsid.rounding import RADIANS, Angles, noise_fall, number
 from fieldsid.views._words import parameter_block, parameter_rows, table, warned

@@ -7,7 +7,7 @@ from math import exp, isfinite, isnan
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import Figures, Frames, View
-from fieldsid.figures.kinds import sketch
+from fieldsid.figures.sketch import sketch
 from fieldsid.page import Block, Page, cut
 from fieldsid.rounding import number, with_error
 from fieldsid.views._words import joined, some, table, warned

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import Figures, Frames, View
-from fieldsid.figures.kinds import sketch
+from fieldsid.figures.sketch import sketch
 from fieldsid.page import Block, Page, cut, facts, listed
 from fieldsid.rounding import number
 from fieldsid.views._words import joined, some, speed_words, warned

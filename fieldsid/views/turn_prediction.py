@@ -7,7 +7,7 @@ from math import degrees
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import Figures, Frames, View
-from fieldsid.figures.kinds import sketch
+from fieldsid.figures.sketch import sketch
 from fieldsid.page import Block, Page, cut
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import RADIANS, Angles, number, with_error

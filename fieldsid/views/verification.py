@@ -7,7 +7,7 @@ from math import degrees, inf, isnan
 from typing import TYPE_CHECKING
 
 from fieldsid.display import Figures, Frames, View
-from fieldsid.figures.kinds import sketch
+from fieldsid.figures.sketch import sketch
 from fieldsid.page import Block, Page, Whole, facts
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import number

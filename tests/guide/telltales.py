@@ -16,7 +16,9 @@ from matplotlib.figure import Figure
 from fieldsid.demo.vehicle import BASE, LIMITS, NOISE, SPEED, UNITS, helpers, hidden_vehicle, training_maneuver
 from fieldsid.effects import pick_effect
 from fieldsid.figures import canvas, motion
+from fieldsid.figures.drawn import draw
 from fieldsid.fitting.identify import identify
+from fieldsid.fitting.predict.predict import Prediction
 from fieldsid.logs.run import Run
 from fieldsid.maneuvers import pick_maneuver
 from fieldsid.models.model import Model
@@ -66,13 +68,12 @@ class Telltale:
     maneuver: str
 
     @cached_property
-    def shown(self) -> motion.MotionView:
+    def shown(self) -> Prediction:
         """Its motion without noise, and that of the textbook's model fitted to its log."""
         run = _flown(self.model, self.maneuver)
         log = with_noise(run, self.model, SEED)
         fit = identify([log], self.model.axis, method="output_error", whole=True)[0].predictions[0]
-        record = record_of(run, self.model.axis)
-        return motion.MotionView(record, fit.angle, fit.rate, fit.fin, NOISE.angle, NOISE.rate)
+        return replace(fit, record=record_of(run, self.model.axis))
 
     @property
     def strength(self) -> dict[str, float]:
@@ -110,11 +111,10 @@ def figure(told: Telltale) -> Figure:
     view, time = told.shown, told.shown.record.time
     symbol = motion.SYMBOLS[told.model.axis][1]
     canvas.dress(axes[0], y=f"{symbol} [deg/s]")
-    axes[0].plot(time, view.measured_rate, color="0.25", linewidth=1.5, label="with the effect")
+    axes[0].plot(time, motion.measured(view.record, 1), color="0.25", linewidth=1.5, label="with the effect")
     axes[0].plot(time, np.degrees(view.rate), color=canvas.SIMULATED, linewidth=1.1, label="textbook's model, fitted to it")
     canvas.legend_above(axes[0])
-    motion.draw_fin(replace(view, fin=view.record.fin), axes[1])
-    axes[1].get_legend().remove()
+    draw(motion.fin(replace(view, fin=view.record.fin)), axes[1])
     for ax, role in zip(axes[2:], roles, strict=False):
         label, factor = HELPER[role]
         canvas.dress(ax, y=label)
@@ -126,13 +126,13 @@ def figure(told: Telltale) -> Figure:
     return sheet
 
 
-def _draw_residual(view: motion.MotionView, ax: Axes) -> None:
+def _draw_residual(view: Prediction, ax: Axes) -> None:
     """Draw what the textbook's model leaves of rate and angle, over the sensors' noise."""
     canvas.dress(ax, y="residual / noise")
     ax.axhspan(-2, 2, color="0.9", linewidth=0, label="two sigma of the noise")
-    rate, angle = view.measured_rate - np.degrees(view.rate), view.measured_angle - np.degrees(view.angle)
-    ax.plot(view.record.time, rate / np.degrees(view.noise_rate), color=canvas.SECOND, linewidth=1.4, label="rate")
-    ax.plot(view.record.time, angle / np.degrees(view.noise_angle), color=canvas.WARM, linewidth=1.4, label="angle")
+    angle, rate = (motion.measured(view.record, i) - np.degrees((view.angle, view.rate)[i]) for i in (0, 1))
+    ax.plot(view.record.time, rate / np.degrees(NOISE.rate), color=canvas.SECOND, linewidth=1.4, label="rate")
+    ax.plot(view.record.time, angle / np.degrees(NOISE.angle), color=canvas.WARM, linewidth=1.4, label="angle")
     canvas.legend_above(ax)
 
 

@@ -15,7 +15,7 @@ from fieldsid.cli.session import draw_figures
 from fieldsid.cli.voice import angles
 from fieldsid.comparison.sufficient import pooled
 from fieldsid.errors import UsageError
-from fieldsid.figures.kinds import sketch
+from fieldsid.figures.sketch import sketch
 from fieldsid.logs.several.run_names import short_names
 from fieldsid.page import Block, Page, Whole, written
 

@@ -13,7 +13,7 @@ from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import typed_with
 from fieldsid.cli.session import draw_figures
 from fieldsid.errors import UsageError
-from fieldsid.figures.kinds import sketch
+from fieldsid.figures.sketch import sketch
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import own_kind
 from fieldsid.page import Block, Page, Whole, counted, written

@@ -17,7 +17,7 @@ from fieldsid.cli.console import emit, progress, say
 from fieldsid.cli.exit_codes import GATE_FAILED
 from fieldsid.cli.options import AxisOption, FigureFile, Force, MappingFile, Method, VehicleFile, argument, flag, option
 from fieldsid.cli.session import draw_figure
-from fieldsid.figures.kinds import sketch
+from fieldsid.figures.sketch import sketch
 from fieldsid.page import Page, written
 from fieldsid.rounding import number, with_error
 

@@ -16,7 +16,7 @@ from fieldsid.cli.progress import get_ready, refuse_place
 from fieldsid.cli.session import draw_figures
 from fieldsid.cli.voice import angles
 from fieldsid.errors import UsageError
-from fieldsid.figures.kinds import sketch
+from fieldsid.figures.sketch import sketch
 from fieldsid.logs.several.run_names import short_names
 from fieldsid.page import Block, Page, Whole, written
 from fieldsid.rounding import number, number_against

@@ -11,7 +11,7 @@ from fieldsid.cli.options import FigureFile, Force, ModelFile
 from fieldsid.cli.progress import refuse_figure
 from fieldsid.cli.session import draw_figure
 from fieldsid.cli.voice import angles
-from fieldsid.figures.kinds import sketch
+from fieldsid.figures.sketch import sketch
 from fieldsid.logs.run import Note
 from fieldsid.page import Block, Page, Whole, paragraph, written
 from fieldsid.rounding import number

@@ -28,7 +28,7 @@ from fieldsid.cli.options import (
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_closed
 from fieldsid.cli.session import draw_figures
 from fieldsid.cli.voice import angles
-from fieldsid.figures.kinds import sketch
+from fieldsid.figures.sketch import sketch
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import ShortNames, short_names
 from fieldsid.page import Block, Page, Whole, paragraph, written

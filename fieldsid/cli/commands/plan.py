@@ -12,7 +12,7 @@ from fieldsid.cli.options import LIMITS, WRITTEN, Figures, Force, OutputDir, Veh
 from fieldsid.cli.progress import compiling, refuse_closed, refuse_existing
 from fieldsid.cli.session import draw_figure
 from fieldsid.cli.voice import angles
-from fieldsid.figures.kinds import sketch
+from fieldsid.figures.sketch import sketch
 from fieldsid.models.axis import Axis
 from fieldsid.page import Block, Page
 from fieldsid.rounding import number, with_error

@@ -21,7 +21,7 @@ from fieldsid.cli.options import LIMITS, Force, ModelFiles, OutputFile, OwnLaw, 
 from fieldsid.cli.progress import refuse_existing, refuse_figure
 from fieldsid.cli.session import draw_figure
 from fieldsid.cli.voice import angles
-from fieldsid.figures.kinds import sketch
+from fieldsid.figures.sketch import sketch
 from fieldsid.page import Page, written
 from fieldsid.views.schedule import blocks_of as design_blocks
 from fieldsid.views.verification import blocks_of as verify_blocks

@@ -14,7 +14,7 @@ from fieldsid.cli.session import draw_figures
 from fieldsid.cli.skipped_logs import Skips
 from fieldsid.cli.voice import angles
 from fieldsid.display import page_of
-from fieldsid.figures.kinds import sketch
+from fieldsid.figures.sketch import sketch
 from fieldsid.page import Page, written
 from fieldsid.records.keys import body_of
 

@@ -11,11 +11,12 @@ from fieldsid.comparison.compare import compare_one
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.extension.extend import Gain
 from fieldsid.extension.lineage import INTACT, Generation, Step, loop_of
-from fieldsid.figures.loop import figure
+from fieldsid.figures.drawn import rendered
+from fieldsid.figures.loop import figure, panels
 from fieldsid.logs import load_run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
-from fieldsid.reporting.figures import loop_steps
+from fieldsid.reporting.chart import bars
 
 LAG = {"lag": 0.35}
 FLOOR = Noise(0.005, 0.004)
@@ -52,18 +53,18 @@ def test_it_is_told_where_the_first_model_fails_and_the_last_is_the_noise(found)
 
 
 def test_no_panel_of_the_figure_is_empty_and_what_stands_out_is_the_longest(found):
-    top, places, bottom, fall = figure(found).axes
+    top, bottom, places, fall = rendered(figure(found)).axes
     assert all(ax.has_data() for ax in (top, places, bottom, fall))
     widths = {bar.get_facecolor(): bar.get_width() for bar in places.patches}
     assert len(widths) == 2
-    assert max(bar.get_width() for bar in places.patches) == places.patches[-1].get_width()
+    assert max(bar.get_width() for bar in places.patches) == places.patches[0].get_width()
     assert not any("rad" in label.get_text() for label in places.get_yticklabels())
 
 
-def test_the_report_has_a_bar_for_each_step_and_side(found):
-    drawn = loop_steps(found)
-    assert drawn.count('class="bar"') == 6
-    assert "+ deadband, unseen" in drawn
+def test_the_report_has_a_bar_and_a_ring_for_each_step(found):
+    drawn = bars(panels(found)[-1], "steps")
+    assert drawn.count("<rect") == drawn.count('class="ring"') == 3
+    assert "+ deadband" in drawn
 
 
 def test_a_line_that_nothing_was_added_to_has_none(found):

@@ -1,8 +1,8 @@
-"""The falling error: in degrees, one line per addition, channels that were not measured left out."""
+"""The falling error: a bar for each addition, channels that were not measured left out."""
 
 from __future__ import annotations
 
-from math import degrees, nan
+from math import nan
 from pathlib import Path
 
 import pytest
@@ -10,7 +10,8 @@ import pytest
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.extension.extend import Gain
 from fieldsid.extension.lineage import INTACT, Generation, Step
-from fieldsid.figures.history import falls_of, figure, summary
+from fieldsid.figures.bars import fall
+from fieldsid.figures.history import figure
 from fieldsid.models.model import Noise
 
 
@@ -24,25 +25,20 @@ def line(*gains):
     return [Generation(Path(f"{i}.yaml"), (), INTACT, s) for i, s in enumerate(steps)]
 
 
-def test_errors_are_shown_in_degrees_on_unseen_and_fitted_runs():
-    (fall,) = falls_of([gain(0.02, 0.005)], "rate")
-    assert fall.unseen == pytest.approx((degrees(0.024), degrees(0.006)))
-    assert fall.fitted == pytest.approx((degrees(0.02), degrees(0.005)))
-    assert fall.floor == pytest.approx(degrees(0.004))
+def test_every_addition_is_a_bar_over_the_noise_on_unseen_runs_with_a_ring_for_the_fitted_ones():
+    ((bars,),) = figure(line(gain(0.02, 0.01), gain(0.01, 0.005)), "m.yaml").columns
+    assert [b.name for b in bars.rows] == ["plain model", "+ servo_lag", "+ servo_lag"]
+    assert [b.value for b in bars.rows] == pytest.approx([6.0, 3.0, 1.5])
+    assert [b.ring for b in bars.rows] == pytest.approx([5.0, 2.5, 1.25])
+    assert bars.mark == "noise floor"
 
 
-def test_a_channel_that_was_not_measured_has_no_panel():
-    assert falls_of([gain(0.02, 0.005, angle=False)], "angle") == []
-    assert len(figure(line(gain(0.02, 0.005, angle=False)), "m.yaml").axes) == 1
-    assert len(figure(line(gain(0.02, 0.005)), "m.yaml").axes) == 2
-
-
-def test_every_addition_is_a_place_on_the_axis_and_the_floor_is_drawn():
-    (ax, _) = figure(line(gain(0.02, 0.01), gain(0.01, 0.005)), "m.yaml").axes
-    assert [t.get_text() for t in ax.get_xticklabels()] == ["plain model", "+servo_lag", "+servo_lag"]
-    assert ax.get_ylim()[0] == 0.0
-    assert ax.collections[0].get_segments()[0][0][1] == pytest.approx(degrees(0.004))
+def test_a_channel_that_was_not_measured_counts_for_nothing():
+    ((bars,),) = figure(line(gain(0.02, 0.005, angle=False)), "m.yaml").columns
+    assert [b.value for b in bars.rows] == pytest.approx([6.0, 1.5])
 
 
 def test_the_whole_fall_is_told_in_words():
-    assert summary([gain(0.02, 0.01), gain(0.01, 0.005)]) == "error on unseen runs from 6.00 to 1.50 x the noise floor"
+    gains = [gain(0.02, 0.01), gain(0.01, 0.005)]
+    assert fall(gains) == "the error on unseen data goes from 6.00 to 1.50 x the noise floor"
+    assert fall([gain(20.0, 0.01)]) == "the error on unseen data goes from 24 rad and 24 rad/s to 0.012 rad and 0.012 rad/s"

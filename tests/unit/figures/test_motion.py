@@ -11,7 +11,11 @@ from PIL import Image
 from fieldsid.dynamics.free_run import command_record
 from fieldsid.errors import ArtifactError
 from fieldsid.figures import canvas, motion
+from fieldsid.figures.drawn import rendered
+from fieldsid.figures.panel import Picture
+from fieldsid.fitting.predict.predict import Prediction
 from fieldsid.models.axis import Axis
+from fieldsid.models.model import Noise
 
 
 @pytest.fixture
@@ -23,7 +27,12 @@ def view():
     record = replace(
         command_record(Axis.YAW, time, fin, speed=1.5), angle=0.1 * time, angle_ok=seen, rate=0.1 + 0 * time, rate_ok=seen
     )
-    return motion.MotionView(record, 0.1 * time + 0.01, 0.1 + 0 * time, fin, 0.005, 0.004, spans=((2.0, 4.0),))
+    return Prediction(record, 0.1 * time + 0.01, 0.1 + 0 * time, fin, (0.0, 0.0, 0.0), {})
+
+
+def drawn(view):
+    panels = motion.panels([("simulated", "simulated", view)], Noise(0.005, 0.004), ((2.0, 4.0),))
+    return rendered(Picture("run7", (9.0, 8.2), (panels,)))
 
 
 def lines(ax):
@@ -31,7 +40,7 @@ def lines(ax):
 
 
 def test_panels_show_degrees_with_units_on_every_axis(view):
-    figure = motion.panels(view, "run7", "1.5 m/s")
+    figure = drawn(view)
     angle, rate, fin, residual = figure.axes
     assert [ax.get_ylabel() for ax in figure.axes] == ["yaw, deg", "yaw rate, deg/s", "rudder, deg", "residual / noise"]
     assert residual.get_xlabel() == "time, s"
@@ -41,15 +50,15 @@ def test_panels_show_degrees_with_units_on_every_axis(view):
 
 
 def test_residual_is_measured_less_simulated_over_the_noise_and_open_in_a_gap(view):
-    shown = lines(motion.panels(view, "run7").axes[3])["angle"].get_ydata()
+    shown = lines(drawn(view).axes[3])["angle"].get_ydata()
     np.testing.assert_allclose(shown[view.record.angle_ok], -0.01 / 0.005)
     assert np.isnan(shown[50:60]).all()
 
 
 def test_fin_of_the_model_is_drawn_only_where_it_differs_from_the_command(view):
-    assert "fin in the model" not in lines(motion.panels(view, "run7").axes[2])
+    assert "fin in the model" not in lines(drawn(view).axes[2])
     moved = replace(view, fin=view.fin + 0.01)
-    assert "fin in the model" in lines(motion.panels(moved, "run7").axes[2])
+    assert "fin in the model" in lines(drawn(moved).axes[2])
 
 
 def test_many_samples_are_thinned_to_what_the_eye_can_tell_apart():
@@ -59,11 +68,11 @@ def test_many_samples_are_thinned_to_what_the_eye_can_tell_apart():
 
 
 def test_a_figure_is_saved_whole_and_never_over_an_old_one(view, tmp_path):
-    path = canvas.save(motion.panels(view, "run7"), tmp_path / "a.png")
+    path = canvas.save(drawn(view), tmp_path / "a.png")
     with Image.open(path) as image:
         assert image.size[0] > 800
     before = path.read_bytes()
     with pytest.raises(ArtifactError, match="exists"):
-        canvas.save(motion.panels(view, "other"), path)
+        canvas.save(drawn(view), path)
     assert path.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir()] == ["a.png"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.figures import rls
+from fieldsid.figures.drawn import rendered
 from fieldsid.fitting.problem.estimator import History
 
 
@@ -16,15 +17,15 @@ def view():
 
 
 def test_each_parameter_has_a_panel_with_its_unit_and_settle_time():
-    first, second = rls.panels(view(), {"a22": "1/s", "b2": "1/s^2"}, "run7").axes
+    first, second = rendered(rls.figure(view(), {"a22": "1/s", "b2": "1/s^2"}, "run7")).axes
     assert (first.get_ylabel(), second.get_ylabel()) == ("a22, 1/s", "b2, 1/s^2")
     assert [t.get_text() for t in first.texts] == ["after 17.5 s"]
     assert [line.get_xdata()[0] for line in first.lines if line.get_label() == "settled"] == [117.5]
     assert [t.get_text() for t in second.texts] == ["not settled"]
-    assert first.figure.get_suptitle() == "run7: a22 settled after 17.5 s, b2 did not"
+    assert first.figure.figure.get_suptitle() == "run7: a22 settled after 17.5 s, b2 did not"
 
 
 def test_a_wild_start_does_not_set_the_scale():
-    low, high = rls.panels(view(), {"a22": "1/s", "b2": "1/s^2"}, "run7").axes[1].get_ylim()
+    low, high = rendered(rls.figure(view(), {"a22": "1/s", "b2": "1/s^2"}, "run7")).axes[1].get_ylim()
     assert -5 < low < -3
     assert high < 1

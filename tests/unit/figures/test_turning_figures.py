@@ -9,6 +9,7 @@ import pytest
 from truth.paper import YAW
 
 from fieldsid.figures import canvas, law, schedule, turn
+from fieldsid.figures.drawn import rendered
 from fieldsid.models.axis import Axis
 from fieldsid.plant.laws.axis_laws import fit_laws
 from fieldsid.plant.parameter_source import ParameterSource
@@ -31,7 +32,7 @@ def axes_of(figure):
 
 
 def test_law_figure_has_the_authority_against_u_squared_with_its_verdict(source, tmp_path):
-    figure = law.figure(source.laws)
+    figure = rendered(law.figure(source.laws))
     main, *others = axes_of(figure)
     assert main.get_xlabel() == "u², m²/s²"
     assert "not u^2" in main.get_title(loc="left").replace("\n", " ")
@@ -44,7 +45,7 @@ def test_law_figure_has_the_authority_against_u_squared_with_its_verdict(source,
 @pytest.mark.parametrize("count", [5, 40])
 def test_turn_figure_draws_both_sides_with_their_bands(source, count):
     prediction = turn_radius(source, list(np.linspace(1.1, 2.1, count)), 0.26, draws=40)
-    radius, time = axes_of(turn.figure(prediction))
+    radius, time = axes_of(rendered(turn.figure(prediction)))
     assert {"port, predicted", "starboard, predicted"} <= {t.get_text() for t in radius.get_legend().get_texts()}
     assert time.get_xlabel() == "speed before the turn, m/s"
     assert radius.get_ylim()[0] == 0.0
@@ -57,7 +58,7 @@ def test_track_figure_draws_the_circle_with_its_radius():
     x, y = 3.0 * np.cos(0.4 * time), 3.0 * np.sin(0.4 * time)
     circle = fit_circle(time, x, y, 0.4 * time + 0.5 * np.pi)
     measured = MeasuredTurn("run", "starboard", circle, -0.3, 1.5, 1.2, 0.0, 40.0, (x, y), (x, y))
-    top, bottom = axes_of(turn.track_figure(measured))
+    top, bottom = axes_of(rendered(turn.track_figure(measured)))
     assert any("R = 3.000" in t.get_text() for t in top.get_legend().get_texts())
     assert top.get_aspect() == 1.0
     assert bottom.get_ylabel() == "off the circle, m"
@@ -66,23 +67,21 @@ def test_track_figure_draws_the_circle_with_its_radius():
 def test_schedule_figure_has_hollow_rows_where_data_do_not_support_them(source):
     made = design_schedule(source, 0.26, speeds=[0.7, 1.4, 2.0])
     verified = verify_schedule(made, source, draws=5)
-    gains, forward, margins, small, usual, large, fin = axes_of(schedule.figure(made, verified))
-    faces = [line.get_markerfacecolor() for line in gains.lines if line.get_marker() == "o"]
-    assert faces[0] == "white"
-    assert "white" not in faces[1:]
-    assert forward.get_ylabel() == "feed-forward, deg"
-    assert margins.get_ylim()[0] == 0.0
-    assert [len(ax.lines) for ax in (small, usual, large)] == [10, 10, 10]
-    assert [ax.get_ylabel() for ax in (small, usual, large)] == [f"{d}° step, deg" for d in (5, 20, 90)]
-    leg = axes_of(schedule.figure(made, replace(verified, disturbance=0.01)))[3]  # none where the runs had no disturbance
-    assert len(leg.lines) == 5
-    assert "as the runs had, up to 0.01 rad/s²" in leg.get_title(loc="left")
-    assert "asked" in {t.get_text() for t in margins.get_legend().get_texts()}
-    assert {float(line.get_ydata()[0]) for line in margins.lines} >= {45.0, 22.5}
-    low, high = forward.get_ylim()
-    assert low <= -1.0
-    assert high >= 1.0
-    limits = [float(line.get_ydata()[0]) for line in fin.lines[-2:]]
-    assert limits == pytest.approx([-np.degrees(0.26), np.degrees(0.26)])
-    assert "at its limit for up to" in fin.get_title(loc="left")
-    assert gains.get_ylim()[1] >= 0.0
+    left, (small, usual, large, fin) = schedule.figure(made, verified).columns
+    gains, forward, margins = (next(p for p in left if p.label.startswith(name)) for name in ("kp", "feed", "phase"))
+    hollow, known = (next(s for s in gains.series if s.form == form) for form in ("rings", "points"))
+    assert list(hollow.x) == [0.7]
+    assert list(known.x) == [1.4, 2.0]
+    assert margins.from_zero
+    assert [len(p.series) for p in (small, usual, large)] == [10, 10, 10]
+    assert [p.label for p in (small, usual, large)] == [f"{d}° step, deg" for d in (5, 20, 90)]
+    leg = schedule.figure(made, replace(verified, disturbance=0.01)).columns[0][-1]  # none where the runs had no disturbance
+    assert len(leg.series) == 5
+    assert "as the runs had, up to 0.01 rad/s²" in leg.title
+    asked = {s.name: float(s.y[0]) for s in margins.series if s.dashed}
+    assert asked == {"asked": 45.0, "of 95 % of the draws": 22.5}
+    assert forward.limits[0] <= -1.0
+    assert forward.limits[1] >= 1.0
+    assert [float(s.y[0]) for s in fin.series if s.dashed] == pytest.approx([-np.degrees(0.26), np.degrees(0.26)])
+    assert "at its limit for up to" in fin.title
+    assert axes_of(rendered(schedule.figure(made, verified)))[0].get_ylim()[1] >= 0.0
