@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
 from fieldsid.errors import UsageError
 from fieldsid.page import Page, cut, html_of, text_of
-from fieldsid.registry import near, pick
+from fieldsid.registry import members, near
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -64,14 +64,19 @@ class View(Generic[T]):
 
 
 def view_of(kind: type) -> View[Any]:
-    """Return the view of a class of records; raises UsageError where there is none."""
-    view: View[Any] = pick("fieldsid.views", "VIEW", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind.__name__).lower())
-    return view
+    """Return the view of a class of records; where it has none of its own, that of a row of a table."""
+    views: Mapping[str, View[Any]] = members("fieldsid.views", "VIEW")
+    return views.get(re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind.__name__).lower(), views["row"])
 
 
 def page_of(record: Any, *more: Any) -> Page:
     """Return the page of a record; `more` are further arguments of its view, the unit of angles first."""
     return view_of(type(record)).page(record, *more)
+
+
+def line_of(record: Any) -> str:
+    """Return the main result of a record in one line."""
+    return view_of(type(record)).line(record)
 
 
 class Brief:
@@ -90,7 +95,7 @@ class Displayed(Brief):
     __slots__ = ()
 
     def __repr__(self) -> str:
-        return cut(f"<{type(self).__name__} {view_of(type(self)).line(self)}>", LONGEST)
+        return cut(f"<{type(self).__name__} {line_of(self)}>", LONGEST)
 
     def summary(self) -> str:
         """Return the whole record as text in fixed blocks: warnings first, then statistics, then its tables."""

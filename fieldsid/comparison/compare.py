@@ -74,15 +74,15 @@ class Comparison(Plotted):
     """One run: free run, merit, noise floor, its channels, the worst first, and the model."""
 
     shown: Prediction
-    merit: GoodnessOfFit
-    floor: Noise
+    merit: Annotated[GoodnessOfFit, INLINE]
+    floor: Annotated[Noise, Key("Noise of its sensors.", "noise_floor")]
     channels: tuple[Channel, ...]
     moves_with: tuple[Companion, ...]
     model: Model
 
     @property
-    def run(self) -> str:
-        """The run's name."""
+    def run(self) -> Annotated[str, Key()]:
+        """Its name."""
         return self.shown.record.name
 
     @property
@@ -91,8 +91,8 @@ class Comparison(Plotted):
         return self.channels[0]
 
     @property
-    def over_noise(self) -> float:
-        """The error over the noise floor, pooled over the measured channels: the measure of a diagnosis and an extension."""
+    def over_noise(self) -> Annotated[float, Key()]:
+        """Error over the noise floor, the measured channels pooled: what says whether the run fails."""
         return pooled(c.over_floor for c in self.channels)
 
     @property
@@ -101,8 +101,8 @@ class Comparison(Plotted):
         return badness(self.over_noise, self.worst_channel.fit)
 
     @property
-    def failing(self) -> tuple[Channel, ...]:
-        """The channels whose error exceeds their noise, the worst first; empty where the pooled error does not."""
+    def failing(self) -> Annotated[tuple[Channel, ...], Key()]:
+        """The channels that have more left than their noise, the worst first; none where the run as a whole has not."""
         return () if is_noise(self.over_noise) else tuple(c for c in self.channels if not is_noise(c.over_floor))
 
     @property

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import degrees, isfinite
+from typing import TYPE_CHECKING
 
-from fieldsid.comparison.localize import Place
-from fieldsid.diagnosis.records import Pair
-from fieldsid.extension.extend import Gain
 from fieldsid.figures.panel import Bar, Bars
-from fieldsid.models.model import Noise
 from fieldsid.rounding import DEGREES, MANY, RADIANS, Angles, noise_fall
+
+if TYPE_CHECKING:
+    from fieldsid.comparison.localize import Place
+    from fieldsid.diagnosis.records import Pair
+    from fieldsid.extension.extend import Gain
+    from fieldsid.models.model import Noise
 
 MOST_PLACES = 10
 LOOKS_AT = "beside a bar: rms there over that of the whole run"
@@ -29,6 +32,8 @@ def errors(models: Sequence[tuple[str, Pair, Noise, str]], named: str, *, noisel
     models: of each its name, errors, noise floor and further words. named: the one that stands out. In a log without noise the
     errors are over those of the first model.
     """
+    from fieldsid.models.model import Noise
+
     first = models[0][1]
     judged = any(isfinite(pair.validation.mean) for _, pair, _, _ in models)
     rows = []

@@ -8,9 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from fieldsid.numerics.arrays import FloatArray
+if TYPE_CHECKING:
+    from fieldsid.numerics.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True)

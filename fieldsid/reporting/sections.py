@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
 from fieldsid._version import __version__
-from fieldsid.comparison.compare import Channel, Comparison, left_in_words
+from fieldsid.comparison.compare import Channel, left_in_words
 from fieldsid.comparison.sufficient import is_noise, pooled
 from fieldsid.display import page_of, view_of
 from fieldsid.extension.lineage import Loop
@@ -26,11 +25,11 @@ from fieldsid.trial_folder.journal import Entry
 from fieldsid.trial_folder.next_step import REPORT, verification_of
 from fieldsid.trial_folder.patterns import shortened
 from fieldsid.trial_folder.state import DONE, FolderState, Item
-from fieldsid.turning.prediction import turn_words
 from fieldsid.views._candidates import candidates
 from fieldsid.views._words import merit_blocks, parameter_block
+from fieldsid.views.comparison import verdict
 from fieldsid.views.schedule import blocks_of
-from fieldsid.views.turn_prediction import turns_of
+from fieldsid.views.turn_prediction import tightest, turns_of
 
 
 def context_of(material: Material) -> dict[str, Any]:
@@ -61,13 +60,8 @@ def _verdicts(axis: AxisMaterial, state: FolderState) -> list[dict[str, str]]:
     if best.found:
         unseen = [c for c in best.found if not best.was_fitted_to(c.run)]
         judged = unseen or best.found
-        over = pooled(c.over_noise for c in judged)
-        on = f"{counted(len(judged), 'run')} {'it was not fitted to' if unseen else 'it was fitted to'}"
-        worst = max(judged, key=lambda c: c.badness)
-        good = is_noise(over)
-        tail = ": nothing is left but the sensors' noise" if good else ": more is left than the sensors' noise"
-        most = f", {worst.over_noise:.2f} x on {worst.run}" if len(judged) > 1 and not good else ""
-        says = f"error {over:.2f} x the noise on {on}{most}{tail}" if over < MANY else _without_noise(judged, on)
+        on = f"on {counted(len(judged), 'run')} {'it was not fitted to' if unseen else 'it was fitted to'}"
+        says, good = f"{on}: {verdict(judged, DEGREES)}", is_noise(pooled(c.over_noise for c in judged))
         effects = f" with {', '.join(best.model.effects)}" if best.model.effects else ""
         out.append({"what": f"{axis.axis} model{effects}", "says": says, "state": "good" if good else "warn"})
     if axis.diagnosis is not None:
@@ -83,9 +77,7 @@ def _verdicts(axis: AxisMaterial, state: FolderState) -> list[dict[str, str]]:
 
 def _turn_verdict(body: Mapping[str, Any]) -> dict[str, str]:
     row = min(body["rows"], key=lambda r: float(r["radius_m"]))
-    where = f"at {number(row['speed_m_s'], 3)} m/s to {row['side']}"
-    says = f"{turn_words(float(row['radius_m']), row['interval95'], where)}; {row['trust']}"
-    return {"what": "tightest turn", "says": says, "state": "warn" if row["extrapolated"] else "good"}
+    return {"what": "tightest turn", "says": tightest(row), "state": "warn" if row["extrapolated"] else "good"}
 
 
 FAILED = ("does not hold", "FAILED")
@@ -127,10 +119,10 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
             }
             for run, channel, c in failing[:6]
         ],
-        "candidates": _candidates(axis.diagnosis),
+        "candidates": None if axis.diagnosis is None else candidates(axis.diagnosis.body, DEGREES),
         "diagnosis": axis.diagnosis.body if axis.diagnosis is not None else None,
         "loop": None if axis.loop is None else _loop(axis.loop),
-        "parameters": _parameters(models),
+        "parameters": parameter_block(((s.path, s.model) for s in models), of="model"),
         "laws": _laws(axis),
         "radius": None if axis.turning is None else _radius(axis.turning),
         "gains": None if axis.schedule is None or axis.gains is None else _gains(axis.gains, axis.schedule.path),
@@ -154,11 +146,6 @@ def _channel_error(channel: Channel) -> str:
     return f"{channel.name} {left_in_words(channel.over_floor, channel.fit, 2)}"
 
 
-def _without_noise(judged: Sequence[Comparison], on: str) -> str:
-    worst = max(judged, key=lambda c: c.badness)
-    return f"{_channel_error(worst.worst_channel)} on {on}{', the worst' * (len(judged) > 1)}; the log has next to no noise"
-
-
 def _run_section(shown: Shown, found: Any, axis: AxisMaterial) -> dict[str, Any]:
     panels = compare.panels(found)
     drawn = chart(panels, f"{shown.path} on {found.run}: free run and measurement")
@@ -178,19 +165,6 @@ def _errors(shown: Shown) -> Block:
     )
     title = f"{shown.path}, effects: {', '.join(shown.model.effects) or 'none'}; {units}"
     return Block(title, rows, (merits.columns[0], "x noise", "fitted to", *merits.columns[1:]))
-
-
-def _candidates(item: Item | None) -> tuple[Block, str] | None:
-    return None if item is None else candidates(item.body, DEGREES)
-
-
-def _parameters(models: Sequence[Shown]) -> Block:
-    """Return the parameters of models in one table, with the model's file in a column where there are several."""
-    blocks = [parameter_block(s.model) for s in models]
-    if len(models) == 1:
-        return replace(blocks[0], title=f"{blocks[0].title}: {models[0].path}")
-    rows = tuple((*row, s.path) for s, b in zip(models, blocks, strict=True) for row in b.rows)
-    return Block("Parameters", rows, (*blocks[0].columns, "model"))
 
 
 def _laws(axis: AxisMaterial) -> list[dict[str, str]]:

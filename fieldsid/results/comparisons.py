@@ -8,16 +8,14 @@ from typing import Annotated, Literal, TypeVar
 
 from fieldsid.change.promise import KeptStep
 from fieldsid.change.record import Change
-from fieldsid.comparison.compare import Channel, Comparison, badness
+from fieldsid.comparison.compare import Comparison
 from fieldsid.comparison.localize import Place, Stretch
 from fieldsid.comparison.metrics import Metrics
 from fieldsid.comparison.residuals import Companion
 from fieldsid.diagnosis.records import Errors
 from fieldsid.extension.lineage import Loop
-from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis
-from fieldsid.models.model import Noise
 from fieldsid.records.keys import INLINE, Key, Number, Result
 from fieldsid.results.result import OfLogs
 
@@ -55,12 +53,10 @@ class OwnSpeed(AsFlown):
 class ComparedRun:
     """A run compared with the model's free run."""
 
-    merit: Annotated[GoodnessOfFit, INLINE]
+    comparison: Annotated[Comparison, INLINE]
     metrics: Annotated[Metrics, INLINE]
-    run: Annotated[str, Key("Its name.")]
     fitted_to: Annotated[bool, Key("Whether the model was fitted to it, which makes it no fair judge.")]
     speed_m_s: Annotated[Number, Key("Median speed through the water.")]
-    noise_floor: Annotated[Noise, Key("Noise of its sensors.")]
     command_times: Annotated[
         CommandTimes | None,
         Key("When the jumps of the command were made inside the sampling interval, where the motion tells; else null."),
@@ -73,26 +69,9 @@ class ComparedRun:
     ]
     where: Annotated[tuple[Place, ...], Key("Where it fails, the worst first.")]
     worst: Annotated[tuple[Stretch, ...], Key("The worst stretches of two seconds.")]
-    over_noise: Annotated[
-        float, Key("Error over the noise floor, the measured channels pooled: what says whether the run fails.")
-    ]
     over_floor: Annotated[Mapping[str, float], Key("By channel, rms over the noise floor.")]
-    failing: Annotated[
-        tuple[Channel, ...],
-        Key("The channels that have more left than their noise, the worst first; none where the run as a whole has not."),
-    ]
     moves_with: Annotated[tuple[Companion, ...], Key("What the missing moment moves with, the most first.")]
     figure: Annotated[str | None, Key("The figure that was drawn.")]
-
-    @property
-    def fit(self) -> float:
-        """The fit of the channel it is judged by, in per cent."""
-        return self.merit.angle_fit if self.judged_by == "angle" else self.merit.rate_fit
-
-    @property
-    def badness(self) -> tuple[float, float]:
-        """What runs are ordered by."""
-        return badness(self.over_noise, self.fit)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,20 +151,16 @@ def compared_run(c: Comparison, figure: str | None, fitted: Collection[str]) -> 
     worst_channel = c.worst_channel
     fails = worst_channel in c.failing
     return ComparedRun(
-        run=c.run,
+        comparison=c,
         fitted_to=c.run in fitted,
         speed_m_s=c.shown.record.speed,
-        merit=c.merit,
-        noise_floor=c.floor,
         command_times=_as_flown(CommandTimes, c, "command_between_samples"),
         own_speed=_as_flown(OwnSpeed, c, "own_speed"),
-        over_noise=c.over_noise,
         over_floor={channel.name: channel.over_floor for channel in c.channels},
         judged_by=worst_channel.name,
         metrics=worst_channel.metrics,
         where=worst_channel.where if fails else (),
         worst=worst_channel.worst if fails else (),
-        failing=c.failing,
         moves_with=c.moves_with if c.failing else (),
         figure=figure,
     )

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Annotated
 
 from fieldsid.comparison.sufficient import pooled_over_noise
-from fieldsid.dynamics.at_bound import at_bound
 from fieldsid.fitting.checks.warnings import METHOD_CHOSEN, is_warning
 from fieldsid.fitting.estimates import Estimate, estimates
 from fieldsid.fitting.fit import Fit
@@ -28,8 +27,6 @@ class Parameter:
 
     estimate: Annotated[Estimate, INLINE]
     shown: Annotated[str, Key("Its name as it is printed: that of several runs with the speed it belongs to.")]
-    at_bound: bool = False
-    """Whether it is on a bound, where no error is valid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +88,7 @@ def over_noise_of(merit: GoodnessOfFit, floor: Noise) -> float:
 
 def fitted_model(fit: Fit, path: Path | None, logs: Sequence[Run]) -> FittedModel:
     """Return a fit as the command tells it; path: its file, logs: what it was fitted to."""
-    model, law, bound = fit.model, fit.model.info.get("law_parameters", {}), at_bound(fit.model)
+    model, law = fit.model, fit.model.info.get("law_parameters", {})
     notes = (*fit.notes, *(n for run in logs for n in run.notes))
     return FittedModel(
         run="+".join(model.runs),
@@ -100,9 +97,7 @@ def fitted_model(fit: Fit, path: Path | None, logs: Sequence[Run]) -> FittedMode
         method=model.method,
         method_reason=next((n.message for n in fit.notes if n.code == METHOD_CHOSEN), None),
         effects=model.effects,
-        parameters={
-            e.name: Parameter(e, e.name if e.name in law else model.shown(e.name), e.name in bound) for e in estimates(model)
-        },
+        parameters={e.name: Parameter(e, e.name if e.name in law else model.shown(e.name)) for e in estimates(model)},
         merit=goodness_of_fit(fit.predictions),
         noise_floor=fit.floor,
         warnings=tuple(n for n in notes if is_warning(n, model.axis)),

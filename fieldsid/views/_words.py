@@ -7,7 +7,7 @@ from math import isfinite, nan
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.page import Block, counted, cut, facts
-from fieldsid.rounding import MANY, Angles, in_unit, interval, number, with_error
+from fieldsid.rounding import MANY, RADIANS, Angles, number, with_error
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit
     from fieldsid.logs import Note
     from fieldsid.models.model import Model, Noise
-
-BETWEEN = " +/- "
 
 
 def warned(notes: Iterable[Note]) -> tuple[str, ...]:
@@ -49,18 +47,23 @@ def base_words(model: Model) -> str:
     return ", ".join(f"{e.name} = {with_error(e.value, e.std_error)} {e.unit}".rstrip() for e in known)
 
 
-def parameter_block(model: Model) -> Block:
-    """Return the parameters of a model: value, standard error, 95 % interval, unit; one on a bound has no error."""
+def parameter_block(models: Iterable[tuple[str, Model]], angles: Angles = RADIANS, of: str = "run") -> Block:
+    """Return the parameters of models, each with what it is `of`: value and error, unit, 95 % interval.
+
+    A value on a bound has no error. A model without a name is the only one, and the title has its speed.
+    """
     from fieldsid.dynamics.at_bound import at_bound
     from fieldsid.fitting.estimates import estimates
 
-    rows, bound = [], at_bound(model)
-    for e in estimates(model):
-        value, _, error = with_error(e.value, e.std_error).partition(BETWEEN)
-        cells = (number(e.value), "at its bound", "-") if e.name in bound else (value, error or "-", interval(*e.interval95))
-        rows.append((e.name, *cells, in_unit(e.unit)))
-    at = f" at {model.law.reference:.2f} m/s" if isfinite(model.law.reference) else ""
-    return Block(f"Parameters{at}", tuple(rows), ("", "value", "std error", "95 % interval", "unit"))
+    rows: list[tuple[str, ...]] = []
+    title = ""
+    for name, model in models:
+        title = "" if name else f"Parameters at {speed_words(model.law.reference)}".removesuffix(" at ")
+        bound, law = at_bound(model), model.info.get("law_parameters", {})
+        for i, e in enumerate(estimates(model)):
+            cells = angles.estimate(e.value, e.std_error, e.interval95, e.unit, at_bound=e.name in bound)
+            rows.append(("" if i else name, e.name if e.name in law else model.shown(e.name), *cells))
+    return Block(title, tuple(rows), (of, "parameter", "value", "unit", "95 % interval"), left=2)
 
 
 def parameter_rows(model: Model) -> list[dict[str, Any]]:
@@ -126,14 +129,15 @@ def table(rows: Iterable[Mapping[str, Any]], index: str | None = None) -> DataFr
 
 def fact_block(title: str, row: Mapping[str, Any]) -> Block:
     """Return one row of a table as names and values."""
-    return facts(title, ((name.replace("_", " "), _cell(value)) for name, value in row.items()))
+    return facts(title, ((name.replace("_", " "), cell(value)) for name, value in row.items()))
 
 
-def _cell(value: Any) -> str:
+def cell(value: Any) -> str:
+    """Return a value of a row in words."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
         return number(value)
     if isinstance(value, (list, tuple)):
-        return " .. ".join(_cell(v) for v in value) if all(isinstance(v, float) for v in value) else "; ".join(map(str, value))
+        return " .. ".join(cell(v) for v in value) if all(isinstance(v, float) for v in value) else "; ".join(map(str, value))
     return cut(str(value), 200)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import Figures, Frames, View
 from fieldsid.figures.sketch import sketch
 from fieldsid.page import Block, Page, Whole, cut, facts
 from fieldsid.records.keys import body_of
-from fieldsid.rounding import RADIANS, Angles, number, p_value, times_noise
+from fieldsid.rounding import MANY, RADIANS, Angles, number, p_value
 from fieldsid.views._words import percent, speed_words, table, warned, where_block
 
 if TYPE_CHECKING:
@@ -19,10 +19,23 @@ MOST_PLACES = 6
 
 
 def line(found: Comparison) -> str:
-    """Return the run, fit and error of the channel furthest above its noise, and where that fails most."""
-    channel = found.worst_channel
-    worst = f", worst at {channel.where[0].condition}" if found.failing and channel.where else ""
-    return f"{cut(found.run, 60)}: {channel.name} fit {channel.fit:.1f} %, error {times_noise(found.over_noise)}{worst}"
+    """Return the run with its error and fit, and where the model fails most."""
+    return verdict([found])
+
+
+def verdict(found: Sequence[Comparison], angles: Angles = RADIANS) -> str:
+    """Return the error of the worst run and over all runs, and where the model fails most on the worst, or that none is left."""
+    from fieldsid.comparison.sufficient import is_noise, pooled
+
+    worst, over = max(found, key=lambda c: c.badness), pooled(c.over_noise for c in found)
+    channel = worst.worst_channel
+    error = f"error {worst.over_noise:.2f} x the noise, " if worst.over_noise < MANY else ""
+    says = f"{cut(worst.run, 60)}: {error}{channel.name} fit {channel.fit:.1f} %"
+    says += f"; over all {len(found)} runs {over:.2f} x" if len(found) > 1 and over < MANY else ""
+    if is_noise(over):
+        return f"{says}: nothing is left but the noise"
+    fails = channel in worst.failing and channel.where
+    return f"{says}; fails most at {angles.words(channel.where[0].condition)}" if fails else says
 
 
 def page(found: Comparison, angles: Angles = RADIANS) -> Page:

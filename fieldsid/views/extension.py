@@ -7,9 +7,10 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import Figures, Frames, View
+from fieldsid.figures.bars import fall
 from fieldsid.figures.sketch import sketch
 from fieldsid.page import Block, Page, facts, listed
-from fieldsid.rounding import RADIANS, Angles, noise_fall, number
+from fieldsid.rounding import RADIANS, Angles, number
 from fieldsid.views._words import parameter_block, parameter_rows, table, warned
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 def line(found: Extension) -> str:
     """Return the effects added, the error before and after, and whether the addition is kept."""
-    return f"{'+'.join(found.gain.added)}: {_fall(found)}, {_verdict(found)}"
+    return f"{'+'.join(found.gain.added)}: {fall([found.gain])}, {_verdict(found)}"
 
 
 def page(found: Extension, angles: Angles = RADIANS) -> Page:
@@ -33,8 +34,8 @@ def page(found: Extension, angles: Angles = RADIANS) -> Page:
             ("judged on", listed(gain.judged_on) + ("" if gain.unseen else ", which were fitted")),
         ),
     )
-    blocks = (known, errors(gain, angles), parameter_block(found.model))
-    title = f"Extension by {' and '.join(gain.added)}: {_fall(found)}, {_verdict(found)}"
+    blocks = (known, errors(gain, angles), parameter_block([("", found.model)], angles))
+    title = f"Extension by {' and '.join(gain.added)}: {fall([found.gain])}, {_verdict(found)}"
     return Page(title, warned(found.notes), blocks)
 
 
@@ -50,12 +51,6 @@ def figures(found: Extension) -> Figures:
     """Return the fall of the error towards the noise floor."""
     before = tuple(e for e in found.model.effects if e not in found.gain.added)
     return {"errors": sketch("history", [found.gain], before, "the extension", draw="fall_figure")}
-
-
-def _fall(found: Extension) -> str:
-    before, after = found.gain.over_floor
-    where = "unseen data" if found.gain.unseen else "the runs fitted to"
-    return f"the error on {where} goes from {noise_fall(before, after)}"
 
 
 def _verdict(found: Extension) -> str:

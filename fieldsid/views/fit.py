@@ -10,10 +10,11 @@ from fieldsid.display import Figures, Frames, View
 from fieldsid.figures.sketch import sketch
 from fieldsid.page import Block, Page, facts, listed
 from fieldsid.records.keys import body_of
-from fieldsid.rounding import RADIANS, number, p_value
+from fieldsid.rounding import RADIANS, p_value
 from fieldsid.views._words import (
     base_words,
     joined,
+    merit_blocks,
     parameter_block,
     parameter_rows,
     some,
@@ -62,7 +63,7 @@ def page(fit: Fit) -> Page:
             ("whiteness", "" if whiteness is None else p_value(whiteness)),
         ),
     )
-    blocks = (known, parameter_block(model), _correlations(fit), _runs(fit))
+    blocks = (known, parameter_block([("", model)]), _correlations(fit), *_runs(fit))
     return Page(f"Fit of the {model.axis.value} axis", warned(_warnings(fit)), blocks)
 
 
@@ -130,11 +131,12 @@ def _correlation(fit: Fit) -> DataFrame:
     return pd.DataFrame(fit.correlation, index=list(fit.model.free), columns=list(fit.model.free))
 
 
-def _runs(fit: Fit) -> Block:
+def _runs(fit: Fit) -> tuple[Block | str, ...]:
     """Return a row for each run, nothing where there is one."""
-    rows = [_run_row(p) for p in fit.predictions] if len(fit.predictions) > 1 else []
-    words = [(r["run"], *(number(r[k], 3) for k in list(r)[1:])) for r in rows]
-    return Block("Runs", tuple(words), ("", "m/s", "angle rms", "rate rms", "angle fit %", "rate fit %"))
+    from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
+
+    runs = [(p.record.name, p.record.speed, goodness_of_fit([p]), fit.floor) for p in fit.predictions]
+    return merit_blocks(runs, RADIANS) if len(runs) > 1 else ()
 
 
 def _run_row(p: Prediction) -> dict[str, Any]:

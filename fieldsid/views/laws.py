@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import Figures, Frames, View
 from fieldsid.figures.sketch import sketch
-from fieldsid.page import Block, Page, cut
+from fieldsid.page import Block, Page, counted, cut
 from fieldsid.rounding import number, with_error
-from fieldsid.views._words import joined, some, table, warned
+from fieldsid.views._words import table, warned
 
 if TYPE_CHECKING:
     from fieldsid.plant.laws.axis_laws import Laws
@@ -20,11 +20,10 @@ WORDS = {"through_zero": "through zero", "power": "power law"}
 
 
 def line(laws: Laws) -> str:
-    """Return axis, points, the law of each parameter and the exponent of the authority."""
-    kinds = ", ".join(f"{name} {law.chosen}" for name, law in laws.by_name.items())
-    exponent = laws.authority.exponent
-    says = "" if exponent is None else f"{laws.authority.name} goes with u^{number(exponent.value, 3)}"
-    return f"{laws.axis.value}, {some(len(laws.points), 'point')}: {joined(kinds, says)}"
+    """Return the exponent of speed by which each authority grows."""
+    exponents = ((name, law.exponent) for name, law in laws.by_name.items())
+    powers = [f"|{name}| as u^{with_error(e.value, e.std_error)}" for name, e in exponents if e is not None]
+    return ", ".join(powers) or f"{counted(len(laws.by_name), 'law')} over speed, too few speeds to test an exponent"
 
 
 def page(laws: Laws) -> Page:

@@ -32,7 +32,7 @@ def page(model: Model) -> Page:
             ("authority", "of its own at each speed" if model.law.points else f"goes with u^{model.law.authority_exponent:.3g}"),
         ),
     )
-    return Page(f"Model of the {model.axis.value} axis", (), (known, parameter_block(model)))
+    return Page(f"Model of the {model.axis.value} axis", (), (known, parameter_block([("", model)])))
 
 
 def frames(model: Model) -> Frames:

@@ -1,25 +1,28 @@
-"""The gains at one speed, in one line."""
+"""The view of a record without one of its own: its keys and values, as of one row of another record's table."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
-from fieldsid.rounding import number
-from fieldsid.views._row import row_view
-
-if TYPE_CHECKING:
-    from fieldsid.schedule.record import Row
-
-
-def line(row: Row) -> str:
-    """Return speed, gains, feed-forward, phase margin and whether data support the row."""
-    gains = ", ".join(
-        f"{name} = {number(value)}"
-        for name, value in (("kp", row.gains.kp), ("ki", row.gains.ki), ("kd", row.gains.kd))
-        if value != 0.0 or name == "kp"
-    )
-    margin = f"phase margin {row.phase_margin_deg:.0f} deg, {'supported' if row.supported else 'not supported'} by data"
-    return f"{row.speed:.2f} m/s: {gains}, feed-forward {number(row.feed_forward, 3)} rad, {margin}"
+from fieldsid.display import Frames, View
+from fieldsid.page import Page
+from fieldsid.records.keys import body_of
+from fieldsid.views._words import cell, fact_block, table
 
 
-VIEW = row_view("row", line)
+def line(row: Any) -> str:
+    """Return all names and values."""
+    return ", ".join(f"{name} {cell(value)}" for name, value in body_of(row).items())
+
+
+def page(row: Any) -> Page:
+    """Return all names and values, one below the other."""
+    return Page(type(row).__name__, (), (fact_block("Values", body_of(row)),))
+
+
+def frames(row: Any) -> Frames:
+    """Return the record in one row."""
+    return {"row": lambda: table([body_of(row)])}
+
+
+VIEW = View("row", line, page, frames, line)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from math import degrees, isfinite
+from math import degrees, inf, isfinite
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import Figures, Frames, View
@@ -21,12 +21,12 @@ SLOWED_SHARE = 0.995
 
 
 def line(schedule: Schedule) -> str:
-    """Return axis, controller, the span of speeds and gains, the least phase margin, and the rows without data."""
-    gains, unsupported = [r.gains.kp for r in schedule.rows], sum(not r.supported for r in schedule.rows)
-    span = f"kp {number(min(gains))} .. {number(max(gains))} at {schedule.speeds[0]:.2f} .. {schedule.speeds[-1]:.2f} m/s"
-    least = min(r.phase_margin_deg for r in schedule.rows)
-    rows = f"{len(schedule.rows)} rows" + (f", {unsupported} without data" if unsupported else "")
-    return f"{schedule.axis.value}, {schedule.kind}, {rows}: {span}, phase margin {least:.0f} deg or more"
+    """Return the range of the gain kp over speed, the controller, and the least phase margin."""
+    rows = schedule.rows
+    kp = " to ".join(f"{number(r.gains.kp, 3)} at {number(r.speed, 3)} m/s" for r in dict.fromkeys((rows[0], rows[-1])))
+    least = min((r.phase_margin_deg for r in rows if isfinite(r.phase_margin_deg)), default=inf)
+    margin = f"least phase margin {least:.0f} deg" if isfinite(least) else "no loop crosses unity"
+    return f"kp {kp}, {schedule.kind}; {margin}"
 
 
 def page(schedule: Schedule) -> Page:

@@ -11,22 +11,23 @@ from fieldsid.figures.sketch import sketch
 from fieldsid.page import Block, Page, cut
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import RADIANS, Angles, number, with_error
-from fieldsid.views._words import joined, some, table, warned
+from fieldsid.views._words import table, warned
 
 if TYPE_CHECKING:
     from fieldsid.turning.prediction import TurnPrediction
 
 
 def line(found: TurnPrediction) -> str:
-    """Return rudder, method, the span of the radii over that of the speeds, and what the rows rest on."""
-    ends = [r.interval95 if r.band_only else (r.radius, r.radius) for r in found.rows]
-    speeds = [r.speed for r in found.rows]
-    low, high = number(min(e[0] for e in ends), 3), number(max(e[1] for e in ends), 3)
-    radii = f"{'95 % in ' if any(r.band_only for r in found.rows) else ''}{low} .. {high} m"
-    span = f"{radii} at {min(speeds):.2f} .. {max(speeds):.2f} m/s"
-    trust = ", ".join(dict.fromkeys(r.trust for r in found.rows))
-    more = joined(trust, some(len(found.measured), "measured circle"), some(len(found.notes), "warning"))
-    return f"rudder {found.rudder_max:.4g} rad, {_methods(found)}: radius {span}, {more}"
+    """Return the tightest turn of both sides with its 95 % band, and what it rests on."""
+    return f"tightest turn {tightest(min(map(body_of, found.rows), key=lambda r: float(r['radius_m'])))}"
+
+
+def tightest(row: Mapping[str, Any]) -> str:
+    """Return a turn in words, of the JSON of its row."""
+    from fieldsid.turning.prediction import turn_words
+
+    where = f"to {row['side']} at {number(row['speed_m_s'], 3)} m/s"
+    return f"{turn_words(float(row['radius_m']), row['interval95'], where)}, {row['trust']}"
 
 
 def page(found: TurnPrediction, angles: Angles = RADIANS) -> Page:

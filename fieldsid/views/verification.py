@@ -19,11 +19,10 @@ if TYPE_CHECKING:
 
 
 def line(found: Verification) -> str:
-    """Return the least margins and the most overshoot over speeds and the set."""
-    worst = found.worst
-    margins = f"phase margin {worst['phase_margin_deg']:.0f} deg, gain margin {_decibels(worst['gain_margin_db'])}"
-    step = f"delay margin {number(worst['delay_margin_s'], 2)} s at least, overshoot {worst['overshoot_percent']:.0f} % at most"
-    return f"{found.schedule.axis.value}, {len(found.scheduled)} speeds: {margins}, {step}"
+    """Return the verdict with its numbers."""
+    from fieldsid.schedule.verdict import verdict_of
+
+    return ": ".join(verdict_of(found, found.schedule, ()))
 
 
 def page(found: Verification) -> Page:

@@ -117,7 +117,7 @@ def test_what_exists_is_not_replaced_and_json_says_what_is_in_it(run_cli, made, 
     assert body["models"] == ["models/joint_yaw.yaml"]
     assert body["bytes"] == (made / "report.html").stat().st_size
     assert body["verdicts"][0]["what"] == "yaw model"
-    assert re.match(r"error [\d.]+ x the noise on 1 run it was not fitted to", body["verdicts"][0]["says"])
+    assert re.match(r"on 1 run it was not fitted to: zigzag: error [\d.]+ x the noise, rate fit", body["verdicts"][0]["says"])
 
 
 def test_files_given_one_by_one_are_all_that_is_in_it(run_cli, made, tmp_path):

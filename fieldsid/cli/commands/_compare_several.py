@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.cli.console import emit
-from fieldsid.cli.inputs import fitted_to
-from fieldsid.cli.progress import get_ready
-from fieldsid.cli.session import draw_figures
 from fieldsid.cli.voice import angles
 from fieldsid.comparison.sufficient import pooled
-from fieldsid.errors import UsageError
 from fieldsid.figures.sketch import sketch
 from fieldsid.logs.several.run_names import short_names
 from fieldsid.page import Block, Page, Whole, written
 
 if TYPE_CHECKING:
+    from fieldsid.cli.headlines.headline import Headline
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.comparison.compare import Comparison
     from fieldsid.extension.lineage import Loop
@@ -28,68 +23,40 @@ if TYPE_CHECKING:
 MOST_PLACES = 3
 
 
-def compare_several(
+def several_models(
     paths: Sequence[Path],
-    runs: Sequence[Path],
+    found_of: Sequence[Sequence[Comparison]],
+    fitted_of: Sequence[Collection[str]],
     skips: Skips,
-    *,
-    reading: Mapping[str, Any],
-    output: Path | None,
-    force: bool,
-) -> Mapping[str, Any]:
-    """Compare several models of one axis with the same runs, print which follows them best, and return the JSON body.
-
-    reading: the keyword arguments of `read_runs` (mapping, start, end). Raises UsageError for models of several axes.
-    """
-    from fieldsid.cli.inputs import read_runs
-    from fieldsid.cli.user_effects import check_effects
-    from fieldsid.models.model import load_model
-    from fieldsid.models.record import left_out
-
-    models = [load_model(p) for p in paths]
-    if len({m.axis for m in models}) > 1:
-        found = ", ".join(f"{p.name}: {m.axis.value}" for p, m in zip(paths, models, strict=True))
-        raise UsageError("the models are not of one axis", found=found, hint="compare those of one axis")
-    effects = partial(check_effects, list(zip(paths, models, strict=True)))
-    ready = partial(get_ready, "fieldsid.comparison.compare")
-    logs = read_runs(runs, models=paths, check=effects, meanwhile=ready, refused=skips.skip, **reading)
-    from fieldsid.comparison.compare import compare
+    logs: Sequence[Path],
+    draw: Callable[[Mapping[str, Callable[[], Any]]], Sequence[str]],
+) -> tuple[ComparedSeveral, Page, Headline]:
+    """Return which of several models follows the runs best, from their comparisons and the runs each was fitted to."""
+    from fieldsid.cli.headlines.models import headline_of_several
+    from fieldsid.records.named_inputs import inputs_of
     from fieldsid.results.comparisons import ComparedSeveral, OneOfSeveral, compared_run
 
-    found_of = [compare(m, logs, unfit=skips.skip if i == 0 else None) for i, m in enumerate(models)]
-    names = _names(paths)
-    fitted_of = [fitted_to(p, m, logs) for p, m in zip(paths, models, strict=True)]
-    loop = _loop(paths, found_of)
+    names, loop = _names(paths), _loop(paths, found_of)
     plots = {} if loop is None else {"loop": sketch("loop", loop)}
-    of_runs = zip(*found_of, strict=True)
-    plots |= {f"models_on_{of_run[0].run}": sketch("several", of_run, names) for of_run in of_runs}
-    figures = tuple(draw_figures(output, plots, force=force))
-    least = min(range(len(paths)), key=lambda i: pooled(c.over_noise for c in found_of[i]))
+    plots |= {f"models_on_{one[0].run}": sketch("several", one, names) for one in zip(*found_of, strict=True)}
+    over = [pooled(c.over_noise for c in found) for found in found_of]
+    least = over.index(min(over))
     several = tuple(
         OneOfSeveral(
-            str(p),
-            pooled(c.over_noise for c in found),
-            tuple(c.run for c in found if c.run in fitted),
-            tuple(compared_run(c, None, fitted) for c in found),
+            str(p), error, tuple(c.run for c in found if c.run in fitted), tuple(compared_run(c, None, fitted) for c in found)
         )
-        for p, found, fitted in zip(paths, found_of, fitted_of, strict=True)
+        for p, error, found, fitted in zip(paths, over, found_of, fitted_of, strict=True)
     )
     result = ComparedSeveral(
-        axis=models[0].axis,
+        axis=found_of[0][0].model.axis,
         models=several,
         best=str(paths[least]),
         loop=loop,
-        figures=figures,
+        figures=tuple(draw(plots)),
         skipped_runs=tuple(skips.records),
     )
-    from fieldsid.cli.headlines.models import headline_of_several
-    from fieldsid.cli.inputs import files_of
-    from fieldsid.records.named_inputs import inputs_of
-
-    headline = headline_of_several(result, names, models[least], files_of(logs), inputs_of(paths[least]))
-    notes = left_out(logs, models[0].axis)
-    body = emit(result, render=_page(result, found_of, names), headline=headline, notes=notes)
-    return skips.end(body, len(found_of[0]))
+    headline = headline_of_several(result, names, found_of[least][0].model, logs, inputs_of(paths[least]))
+    return result, _page(result, found_of, names), headline
 
 
 def _loop(paths: Sequence[Path], found_of: Sequence[Sequence[Comparison]]) -> Loop | None:

@@ -78,41 +78,47 @@ def command(
                 "`--from`, `--to`, `--mapping` and `--min-fit` are for runs", found="two models and no run", hint="leave them out"
             )
         return compare_states(sides[0], sides[1], output, force=force)
-    from fieldsid.cli.inputs import model_first, read_runs
+    if len(sides) > 1 and (not others or any(p.is_dir() for p in sides)):
+        given = ", ".join(str(p) for p in (*sides, *others))
+        raise UsageError("several models are compared over runs", found=given, hint="sysid compare M1.yaml M2.yaml RUN")
+    from fieldsid.cli.inputs import files_of, model_first, read_runs
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.models.model import load_model
     from fieldsid.models.record import left_out
 
-    if len(sides) > 1:
-        if not others or any(p.is_dir() for p in sides):
-            given = ", ".join(str(p) for p in (*sides, *others))
-            raise UsageError("several models are compared over runs", found=given, hint="sysid compare M1.yaml M2.yaml RUN")
-        from fieldsid.cli.commands._compare_several import compare_several
-
-        several = compare_several(sides, others, Skips(), reading=reading, output=output, force=force)
-        _gate([run for m in several["models"] for run in m["runs"]], min_fit)
-        return several
     model, runs = model_first(model, runs)
-    known = load_model(model)
+    paths, runs = (sides, others) if len(sides) > 1 else ([model], runs)
+    models = [load_model(p) for p in paths]
+    if len({m.axis for m in models}) > 1:
+        present = ", ".join(f"{p.name}: {m.axis.value}" for p, m in zip(paths, models, strict=True))
+        raise UsageError("the models are not of one axis", found=present, hint="compare those of one axis")
     skips, ready = Skips(), partial(get_ready, "fieldsid.comparison.compare")
-    effects = partial(check_effects, [(model, known)])
-    logs = read_runs(runs, models=[model], check=effects, meanwhile=ready, refused=skips.skip, **reading)
+    effects = partial(check_effects, list(zip(paths, models, strict=True)))
+    logs = read_runs(runs, models=paths, check=effects, meanwhile=ready, refused=skips.skip, **reading)
     from fieldsid.comparison.compare import compare
+    from fieldsid.records.named_inputs import inputs_of
     from fieldsid.results.comparisons import Compared, compared_run
 
-    found = compare(known, logs, unfit=skips.skip)
-    plots = {f"{model.stem}_on_{c.run}": sketch("compare", c, known, model.name) for c in found}
-    drawn: Sequence[str | None] = draw_figures(output, plots, force=force) or [None] * len(found)
-    fitted = fitted_to(model, known, logs)
-    compared = tuple(compared_run(c, file, fitted) for c, file in zip(found, drawn, strict=True))
-    notes = left_out(logs, known.axis)
-    result = Compared(model=str(model), axis=known.axis, runs=compared, warnings=notes, skipped_runs=tuple(skips.records))
-    from fieldsid.cli.headlines.models import headline_of_compare
-    from fieldsid.cli.inputs import files_of
-    from fieldsid.records.named_inputs import inputs_of
+    notes, files = left_out(logs, models[0].axis), files_of(logs)
+    found, *more = (compare(m, logs, unfit=None if i else skips.skip) for i, m in enumerate(models))
+    fitted = [fitted_to(p, m, logs) for p, m in zip(paths, models, strict=True)]
+    if more:
+        from fieldsid.cli.commands._compare_several import several_models
 
-    headline = headline_of_compare(result, known, files_of(logs), inputs_of(model))
+        draw = partial(draw_figures, output, force=force)
+        several, page, headline = several_models(paths, [found, *more], fitted, skips, files, draw)
+        body = emit(several, render=page, headline=headline, notes=notes)
+        _gate([run for m in body["models"] for run in m["runs"]], min_fit)
+        return skips.end(body, len(found))
+    plots = {f"{model.stem}_on_{c.run}": sketch("compare", c, models[0], model.name) for c in found}
+    drawn: Sequence[str | None] = draw_figures(output, plots, force=force) or [None] * len(found)
+    compared = tuple(compared_run(c, file, fitted[0]) for c, file in zip(found, drawn, strict=True))
+    axis, skipped = models[0].axis, tuple(skips.records)
+    result = Compared(model=str(model), axis=axis, runs=compared, warnings=notes, skipped_runs=skipped)
+    from fieldsid.cli.headlines.models import headline_of_compare
+
+    headline = headline_of_compare(result, found, files, inputs_of(model))
     body = emit(result, render=_page(found, compared, top), headline=headline, notes=notes)
     _gate(body["runs"], min_fit)
     return skips.end(body, len(compared))
@@ -131,12 +137,11 @@ def _gate(entries: Sequence[Mapping[str, Any]], least: float | None) -> None:
 
 
 def _page(found: Sequence[Comparison], runs: Sequence[ComparedRun], top: int) -> Page:
-    units, short = angles(), short_names([r.run for r in runs])
-    followed = ((short.of(r.run), r.speed_m_s, r.merit, r.noise_floor) for r in runs)
+    units, short = angles(), short_names([c.run for c in found])
+    followed = ((short.of(c.run), c.shown.record.speed, c.merit, c.floor) for c in found)
     blocks: list[Block | str] = [*merit_blocks(followed, units), Whole(short.says)]
-    for r in runs:
-        for flown in filter(None, (r.command_times, r.own_speed)):
-            angle, rate = (number(units.factor * v, 2) for v in (flown.as_logged.angle_rms_rad, flown.as_logged.rate_rms_rad_s))
-            blocks.append(Whole(f"{flown.says}; angle rms {angle}, rate rms {rate} as logged"))
+    for flown in (f for r in runs for f in (r.command_times, r.own_speed) if f is not None):
+        angle, rate = (number(units.factor * v, 2) for v in (flown.as_logged.angle_rms_rad, flown.as_logged.rate_rms_rad_s))
+        blocks.append(Whole(f"{flown.says}; angle rms {angle}, rate rms {rate} as logged"))
     blocks += [block for c in found for block in blocks_of(c, units, top)]
     return Page("", blocks=tuple(blocks), closing=written(figure=[r.figure for r in runs if r.figure]))

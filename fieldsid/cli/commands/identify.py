@@ -32,7 +32,7 @@ from fieldsid.figures.sketch import sketch
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import ShortNames, short_names
 from fieldsid.page import Block, Page, Whole, paragraph, written
-from fieldsid.views._words import merit_blocks
+from fieldsid.views._words import merit_blocks, parameter_block
 
 if TYPE_CHECKING:
     from fieldsid.fitting.fit import Fit
@@ -104,7 +104,7 @@ def command(
     result = Identified(axis=axis, fits=entries, skipped_runs=tuple(skips.records))
     from fieldsid.cli.headlines.models import headline_of_identify
 
-    page, headline = _page(entries, figures=figures), headline_of_identify(result, files)
+    page, headline = _page(fits, entries, figures=figures), headline_of_identify(result, files)
     return skips.end(emit(result, render=page, headline=headline, notes=_warnings(entries)), len(used))
 
 
@@ -169,22 +169,12 @@ def _label(entry: FittedModel, short: ShortNames | None = None) -> str:
     return name if len(entry.runs) == 1 else f"{len(entry.runs)} runs"
 
 
-def _page(entries: Sequence[FittedModel], *, figures: bool) -> Page:
+def _page(fits: Sequence[Fit], entries: Sequence[FittedModel], *, figures: bool) -> Page:
     short = short_names([r.run for e in entries for r in e.runs])
-    rows = tuple(
-        (
-            _label(e, short) if i == 0 else "",
-            p.shown,
-            *angles().estimate(v.value, v.std_error, v.interval95, v.unit, at_bound=p.at_bound),
-        )
-        for e in entries
-        for i, (p, v) in enumerate((p, p.estimate) for p in e.parameters.values())
-    )
+    parameters = parameter_block(((_label(e, short), fit.model) for e, fit in zip(entries, fits, strict=True)), angles())
     runs = ((short.of(r.run), r.speed_m_s, r.merit, e.noise_floor) for e in entries for r in e.runs)
     merits, units = merit_blocks(runs, angles())
-    methods = ", ".join(sorted({e.method for e in entries}))
-    parameters = Block("", rows, ("run", "parameter", "value", "unit", "95 % interval"), left=2)
-    said = paragraph([f"method: {methods}; {units}"])
+    said = paragraph([f"method: {', '.join(sorted({e.method for e in entries}))}; {units}"])
     blocks: tuple[Block | str, ...] = (parameters, merits, *said, Whole(short.says), *_reasons(entries))
     closing: list[str] = []
     for e in (e for e in entries if e.model):

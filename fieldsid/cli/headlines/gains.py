@@ -11,8 +11,9 @@ from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, typed_with
 from fieldsid.cli.headlines.words import first_names, next_use
 from fieldsid.cli.voice import angles
+from fieldsid.display import line_of
 from fieldsid.page import counted
-from fieldsid.rounding import MANY, number, with_error
+from fieldsid.rounding import MANY, number
 from fieldsid.schedule.wish import QUICKEST, STEP_ANGLE_RAD
 from fieldsid.trial_folder.journal import is_trial
 from fieldsid.views._words import times
@@ -32,10 +33,8 @@ WIDE_MARGIN = 60.0
 def headline_of_fit(result: FittedLaws) -> Headline:
     """Return the exponent of speed by which each authority grows, and the points that do not fit its law."""
     laws, by_name = result.laws, result.laws.by_name
-    exponents = ((name, law.exponent) for name, law in by_name.items())
-    powers = [f"|{name}| as u^{with_error(e.value, e.std_error)}" for name, e in exponents if e is not None]
     outliers = [p.name for law in by_name.values() for p in law.points if not p.belongs]
-    says = ", ".join(powers) or f"{counted(len(by_name), 'law')} over speed, too few speeds to test an exponent"
+    says = line_of(laws)
     rests = f"{counted(len(laws.points), 'point')}, {number(laws.speed_low, 3)} .. {number(laws.speed_high, 3)} m/s"
     rests += f"; does not belong: {first_names(list(dict.fromkeys(outliers)))}" if outliers else ""
     if result.file is None:
@@ -69,11 +68,9 @@ def caveat_of_loops(models: Sequence[Model], files: Sequence[Path]) -> str:
 
 def headline_of_turn(found: TurnPrediction, models: Sequence[Path], caveat: str = "") -> Headline:
     """Return the tightest turn of both sides with its 95 % band; where only the band is known, how to measure the radius."""
-    from fieldsid.turning.prediction import found_by, turn_words
+    from fieldsid.turning.prediction import found_by
 
     rows, tightest = found.rows, min(found.rows, key=lambda r: r.radius)
-    where = f"to {tightest.side} at {number(tightest.speed, 3)} m/s"
-    says = f"tightest turn {turn_words(tightest.radius, tightest.interval95, where)}, {tightest.trust}"
     methods = [r.method for r in rows]
     use = f"taken for {methods.count('measured')} of {len(rows)} turns" if "measured" in methods else "of none of these turns"
     of = counted(len(found.measured), "measured circle")
@@ -81,22 +78,19 @@ def headline_of_turn(found: TurnPrediction, models: Sequence[Path], caveat: str 
     factor, unit = angles().of("rad")
     rudder, speeds = f"rudder {number(factor * found.rudder_max, 3)} {unit}", counted(len({r.speed for r in rows}), "speed")
     rests = f"{first_names([str(m) for m in models])}, {rudder}; {found_by(methods)}, {speeds}; {circles}"
-    says += ": one and a half circles tell it" if tightest.band_only else ""
-    return Headline(caveat + says, rests, pasted("schedule", "design", models, "-o", "gains.yaml"))
+    says = f"{caveat}{line_of(found)}" + (": one and a half circles tell it" if tightest.band_only else "")
+    return Headline(says, rests, pasted("schedule", "design", models, "-o", "gains.yaml"))
 
 
 def headline_of_design(result: Design, models: Sequence[Path], caveat: str = "") -> Headline:
     """Return the range of the gain kp over speed, and the least phase margin."""
     schedule, rows = result.schedule, result.schedule.rows
-    kp = " to ".join(f"{number(r.gains.kp, 3)} at {number(r.speed, 3)} m/s" for r in dict.fromkeys((rows[0], rows[-1])))
-    least = min((r.phase_margin_deg for r in rows if isfinite(r.phase_margin_deg)), default=float("inf"))
-    margin = f"least phase margin {least:.0f} deg" if isfinite(least) else "no loop crosses unity"
     beyond, known = sum(not r.supported for r in rows), schedule.provenance
     drawn = f"{counted(int(known['draws']), 'draw')} of {known['draws_of']}"
     without_data = f"; {beyond} of {len(rows)} rows without data" if beyond else ""
     rests = f"{first_names([str(m) for m in models])}, {drawn}{without_data}"
     next_ = pasted("schedule", "verify", result.file) if result.file else typed_with("-o", "gains.yaml")
-    return Headline(f"{caveat}kp {kp}, {schedule.kind}; {margin}", rests, next_)
+    return Headline(caveat + line_of(schedule), rests, next_)
 
 
 def headline_of_verification(

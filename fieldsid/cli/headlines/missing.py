@@ -12,12 +12,12 @@ from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
 from fieldsid.cli.headlines.words import first_names, next_use
 from fieldsid.cli.voice import angles
+from fieldsid.figures.bars import fall
 from fieldsid.page import counted
-from fieldsid.rounding import MANY, noise_fall, times_noise
+from fieldsid.rounding import times_noise
 
 if TYPE_CHECKING:
     from fieldsid.diagnosis import Diagnosis
-    from fieldsid.extension.extend import Gain
     from fieldsid.models.effect import Effect
     from fieldsid.results.diagnoses import Diagnosed
     from fieldsid.results.effects import NewEffect
@@ -143,21 +143,11 @@ def headline_of_extension(result: Extended) -> Headline:
     """Return whether the addition is kept, and how the error fell."""
     gain = result.gain
     word = "kept" if result.pays else "kept because of --keep" if result.kept else "not kept"
-    where = "unseen data" if gain.unseen else "the runs fitted to"
-    says = f"{'+'.join(gain.added)} {word}: the error on {where} goes from {_before_to_after(gain)}"
+    says = f"{'+'.join(gain.added)} {word}: {fall([gain], angles())}"
     fitted = f"{counted(len(gain.learned_on), 'run')} fitted to ({first_names(gain.learned_on)})"
     is_split = gain.unseen and set(gain.judged_on) <= set(gain.learned_on)
     judged = "what was held back of them" if is_split else first_names(gain.judged_on) if gain.unseen else "the same"
     return Headline(says, f"{fitted}, judged by {judged}", result.next)
-
-
-def _before_to_after(gain: Gain) -> str:
-    """Return the error before and after, over the noise floor; in its own units where the log has no noise but rounding."""
-    before, after = gain.over_floor
-    if before < MANY:
-        return noise_fall(before, after)
-    factor, angle = angles().of("rad")
-    return " to ".join(errors.sized(angle, factor) for errors in gain.judged)
 
 
 def headline_of_undoing(result: Undone) -> Headline:

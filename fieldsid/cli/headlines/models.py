@@ -16,8 +16,10 @@ from fieldsid.comparison.sufficient import is_noise, pooled
 from fieldsid.page import counted
 from fieldsid.records.named_inputs import is_there
 from fieldsid.rounding import MANY, noise_fall, number, times_noise
+from fieldsid.views.comparison import verdict
 
 if TYPE_CHECKING:
+    from fieldsid.comparison.compare import Comparison
     from fieldsid.models.model import Model
     from fieldsid.results.comparisons import Compared, ComparedSeveral
     from fieldsid.results.extensions import History
@@ -83,28 +85,14 @@ def _next_command(result: Identified, over: Sequence[float], files: Sequence[Seq
     return next_use(axis, written[0])
 
 
-def headline_of_compare(result: Compared, model: Model, runs: Sequence[Path], inputs: Sequence[Path]) -> Headline:
+def headline_of_compare(result: Compared, found: Sequence[Comparison], runs: Sequence[Path], inputs: Sequence[Path]) -> Headline:
     """Return the error of the worst run and over all runs; inputs: the logs that the model was fitted to."""
-    entries, worst = result.runs, max(result.runs, key=lambda r: r.badness)
-    over = pooled(r.over_noise for r in entries)
-    error = f"error {worst.over_noise:.2f} x the noise, " if worst.over_noise < MANY else ""
-    says = f"{worst.run}: {error}{worst.judged_by} fit {worst.fit:.1f} %"
-    if len(entries) > 1 and over < MANY:
-        says += f"; over all {len(entries)} runs {over:.2f} x"
-    if is_noise(over):
-        says += ": nothing is left but the noise"
-    elif worst.where:
-        says += f"; fails most at {angles().words(worst.where[0].condition)}"
-    seen = [r.run for r in entries if r.fitted_to]
-    judged = (
-        "which it was not fitted to"
-        if not seen
-        else "which it was fitted to: no fair judge"
-        if len(seen) == len(entries)
-        else (f"{first_names(seen)} of them it was fitted to")
-    )
-    rests = f"a free run over {counted(len(entries), 'run')}, {judged}"
-    return Headline(says, rests, command_after_compare(result.model, model, not is_noise(over), runs, inputs))
+    seen, over = [r.comparison.run for r in result.runs if r.fitted_to], pooled(c.over_noise for c in found)
+    judged = f"{first_names(seen)} of them it was fitted to" if seen else "which it was not fitted to"
+    judged = "which it was fitted to: no fair judge" if len(seen) == len(found) else judged
+    rests = f"a free run over {counted(len(found), 'run')}, {judged}"
+    then = command_after_compare(result.model, found[0].model, not is_noise(over), runs, inputs)
+    return Headline(verdict(found, angles()), rests, then)
 
 
 def command_after_compare(path: str, model: Model, fails: bool, runs: Sequence[Path], inputs: Sequence[Path]) -> str:

@@ -24,9 +24,9 @@ def test_of_a_model_those_are_named_that_stand_on_an_end_of_their_range():
 
 
 def test_a_table_of_parameters_gives_it_no_error():
-    rows = {row[0]: row[1:4] for row in parameter_block(backlash(0.0)).rows}
-    assert rows["gap"] == ("0", "at its bound", "-")
-    assert rows["b2"][1] not in ("at its bound", "-")
+    rows = {row[1]: row[2:5] for row in parameter_block([("", backlash(0.0))]).rows}
+    assert rows["gap"] == ("0 (at its bound)", "", "-")
+    assert rows["b2"][2] != "-"
 
 
 def test_an_estimate_on_its_bound_is_the_value_alone():

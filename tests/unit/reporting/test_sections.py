@@ -8,13 +8,14 @@ import pytest
 
 from fieldsid.comparison.compare import Channel, Comparison
 from fieldsid.comparison.metrics import Metrics
-from fieldsid.reporting.sections import _channel_error, _vehicle, _without_noise
+from fieldsid.reporting.sections import _channel_error, _vehicle
 from fieldsid.vehicle import vehicle_of
+from fieldsid.views.comparison import verdict
 
 
 def run(name, over, fit):
     channel = Channel(name, over, fit, Metrics(0.1, 0.9, 0.5), (), ())
-    return Comparison(None, None, None, (channel,), (), None)
+    return Comparison(SimpleNamespace(record=SimpleNamespace(name="run7")), None, None, (channel,), (), None)
 
 
 @pytest.mark.parametrize(
@@ -28,13 +29,12 @@ def run(name, over, fit):
 def test_an_error_is_told_over_the_noise_where_there_is_some_and_else_as_the_fit(name, over, fit, says):
     found = run(name, over, fit)
     assert _channel_error(found.worst_channel) == says
-    if over > 100.0:
-        assert _without_noise([found], "1 run") == f"{says} on 1 run; the log has next to no noise"
+    assert verdict([found]).startswith(f"run7: {says}" if over > 100.0 else f"run7: error {over:.2f} x the noise, {name} fit")
 
 
 def test_of_runs_without_noise_the_worst_is_that_of_the_least_fit_whatever_their_digits():
     runs = [run("rate", 25000.0, 93.3), run("angle", 5600.0, 65.4)]
-    assert _without_noise(runs, "2 runs") == "angle fit 65.4 % on 2 runs, the worst; the log has next to no noise"
+    assert verdict(runs) == "run7: angle fit 65.4 %"
 
 
 def test_a_report_tells_the_fins_that_make_rudder_and_elevator():
