@@ -106,6 +106,7 @@ def run(arguments: Sequence[str], session: Session | None = None) -> Any:
     from fieldsid.cli.programs import program_of
 
     program, words, name = program_of(arguments)
+    from fieldsid.cli.console import heard
     from fieldsid.cli.headlines.typed import remember
     from fieldsid.cli.session import in_session
     from fieldsid.cli.user_effects import load_own_effects
@@ -114,7 +115,7 @@ def run(arguments: Sequence[str], session: Session | None = None) -> Any:
     if "--help" not in arguments:
         load_own_effects()
     try:
-        with in_session(session):
+        with in_session(session), heard():
             result = program(words, prog_name=name, standalone_mode=False)
     except SystemExit as end:
         if isinstance(end.__context__, BrokenPipeError):  # typer has turned it into an exit

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from copy import copy
 from functools import partial
+from logging import INFO, Handler, LogRecord, getLogger
 from typing import Any, TypeVar
 
 from rich.console import Console, ConsoleOptions, Group, JustifyMethod, RenderableType, RenderResult
@@ -216,6 +217,28 @@ def say(text: str) -> None:
     """Print a message on stderr; nothing with `--quiet`."""
     if not voice().is_quiet:
         complain(text)
+
+
+class _Said(Handler):
+    """Prints the messages of the Python functions as `say` does."""
+
+    def emit(self, record: LogRecord) -> None:
+        """Print one."""
+        say(record.getMessage())
+
+
+@contextmanager
+def heard() -> Iterator[None]:
+    """Print on stderr what the Python functions tell their logger while the context runs."""
+    logger, handler = getLogger("fieldsid"), _Said()
+    level = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(INFO)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(level)
 
 
 def complain(*lines: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import islice
@@ -17,6 +17,7 @@ from fieldsid.runtime.pickling import dumps, loads
 from fieldsid.runtime.worker_pool import fork_worker
 
 if TYPE_CHECKING:
+    from fieldsid.cli.skipped_logs import Skips
     from fieldsid.logs.channels import ChannelMap
     from fieldsid.logs.run import Run
     from fieldsid.logs.several.sifting import Refused
@@ -74,6 +75,24 @@ def read_groups(
     say_how_read(runs, several=len(paths) > 1)
     named = iter(_apart(runs, used, paths))
     return [list(islice(named, len(group))) for group in kept]
+
+
+def read_ready(
+    groups: Sequence[Sequence[Path]], skips: Skips, module: str, models: Mapping[Path, Model | None], *,
+    check: Callable[[], None] = lambda: None, **how: Any,
+) -> list[list[Run]]:  # fmt: skip
+    """Return the runs of each group of files; the command's module is imported, and its models are checked, while they are read.
+
+    `skips` hears of files that cannot be read; options and errors as those of `read_groups`.
+    """
+    from fieldsid.cli.progress import get_ready
+    from fieldsid.cli.user_effects import check_effects
+
+    def check_all() -> None:
+        check_effects((path, model) for path, model in models.items() if model is not None)
+        check()
+
+    return read_groups(groups, models=models, check=check_all, meanwhile=partial(get_ready, module), refused=skips.skip, **how)
 
 
 def say_how_read(runs: Sequence[Run], *, several: bool, also: Sequence[str] = ()) -> None:

@@ -38,6 +38,13 @@ LogAndTables = Annotated[
 ]
 ModelFile = Annotated[Path, argument("MODEL", "A model file written by `sysid identify` or `sysid extend`.")]
 ModelFiles = Annotated[list[Path], argument("MODEL...", "Model files, or one table of parameters over speed.")]
+Text = str | None
+Speeds = Annotated[Text, option("--speeds", "LIST", "Speeds in m/s, `1.0,1.6` or `0.5:2.5:0.1`; the models' if not given.")]
+FinMax = Annotated[
+    Text,
+    option("--fin-max", "ANGLE", "Largest fin angle, `15deg`; the vehicle's if not given, else the models' largest.", LIMITS),
+]
+Forgetting = Annotated[float, option("--forgetting", "", "Forgetting factor of svf_rls; 1 forgets nothing.", min=0.5, max=1.0)]
 ValidateRuns = Annotated[list[Path] | None, option("--validate", "RUN", "A run the fit does not see; may repeat.", READ)]
 AxisOption = Annotated[Axis, option("--axis", "", "The plane to identify.")]
 ExcitedAxis = Annotated[

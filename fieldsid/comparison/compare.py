@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite
 from typing import Annotated, Literal
 
 from fieldsid.comparison.conditions import conditions
@@ -22,26 +21,12 @@ from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import record_of
 from fieldsid.noise.white_floor import told_floor, white_noise_floor
 from fieldsid.records.keys import INLINE, Key
-from fieldsid.rounding import MANY, Angles, number
+from fieldsid.rounding import MANY
 
 
 def left_in_words(over_floor: float, fit: float, digits: int = 1) -> str:
     """Return a model's error in a channel in words: over its noise, or the fit in percent for a log without noise."""
     return f"{over_floor:.{digits}f} x its noise" if over_floor < MANY else f"fit {fit:.1f} %"
-
-
-def errors_in_words(merit: GoodnessOfFit, floor: Noise, angles: Angles, digits: int) -> list[tuple[str, str]]:
-    """Return the name of each measured channel, and its free-run error, noise and fit in words, in a unit of angle."""
-
-    def in_words(unit: str, rms: float, noise: float, fit: float) -> str:
-        error, of = (number(angles.factor * v, digits) for v in (rms, noise))
-        return f"rms {error} {unit} (noise {of}), fit {number(fit, 3)} %"
-
-    channels = (
-        ("angle", angles.unit, merit.angle_rms, floor.angle, merit.angle_fit),
-        ("rate", f"{angles.unit}/s", merit.rate_rms, floor.rate, merit.rate_fit),
-    )
-    return [(name, in_words(unit, rms, *more)) for name, unit, rms, *more in channels if isfinite(rms)]
 
 
 def badness(over_floor: float, fit: float) -> tuple[float, float]:

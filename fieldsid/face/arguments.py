@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
@@ -26,6 +27,8 @@ File: TypeAlias = "str | PathLike[str]"
 OWN_EFFECTS = Path("effects")
 UNKNOWN = Vehicle("")
 """A vehicle without any stated property."""
+say = logging.getLogger("fieldsid").info
+"""Tells the user something: a command prints it on stderr, a script has it in this logger, at level INFO."""
 
 
 def load_user_effects() -> None:
@@ -75,10 +78,10 @@ def fins_of(vehicle: Vehicle, axis: Axis) -> PlaneFins | None:
     return None if vehicle.fins is None else vehicle.fins.of(axis.value)
 
 
-def fin_limit_of(vehicle: Vehicle, source: ParameterSource, say: Callable[[str], None], fin: str = "fin limit") -> float:
+def fin_limit_of(vehicle: Vehicle, source: ParameterSource, fin: str = "fin limit") -> float:
     """Return the largest fin angle in rad: the vehicle's limit, else the largest angle in the models' runs.
 
-    say: called with a message in the second case, in which `fin` names the fin. Raises UsageError where neither is known.
+    A message tells of the second case, in which `fin` names the fin. Raises UsageError where neither is known.
     """
     if (limit := vehicle.fin_max_rad(source.axis.value)) is not None:
         return limit
@@ -97,13 +100,12 @@ def read_again(log: NamedLog, mapping: ChannelMap | None = None) -> Run:
 
 
 def runs_of_models(
-    source: ParameterSource, say: Callable[[str], None], mapping: ChannelMap | None = None, *, hint: str = "", depth: bool = False
+    source: ParameterSource, mapping: ChannelMap | None = None, *, hint: str = "", depth: bool = False
 ) -> list[Run]:
     """Return the runs to which the models of a source were fitted, which show the speed lost in turns, or the path of a dive.
 
-    Each is read with the mapping, else with its former one. Those that cannot be read again are left out, and say is called with
-    their names and the hint. Empty for a source that is no model, and for pitch without
-    `depth`.
+    Each is read with the mapping, else with its former one. Those that cannot be read again are left out, and a message has their
+    names and the hint. Empty for a source that is no model, and for pitch without `depth`.
     """
     from fieldsid.logs.few_of import few_of
     from fieldsid.logs.run import Run
@@ -121,11 +123,11 @@ def runs_of_models(
     return [run for run in outcomes if isinstance(run, Run)]
 
 
-def runs_of_turn(source: ParameterSource, say: Callable[[str], None], mapping: ChannelMap | None = None) -> list[Run]:
+def runs_of_turn(source: ParameterSource, mapping: ChannelMap | None = None) -> list[Run]:
     """Return the runs of `runs_of_models` for a turning radius; none for models without effects, whose radius is a formula."""
     if not any(m.effects for m in source.models):
         return []
-    return runs_of_models(source, say, mapping, hint="; `--runs` takes others")
+    return runs_of_models(source, mapping, hint="; `--runs` takes others")
 
 
 def designed_from(schedule: Schedule, name: str) -> list[Path]:

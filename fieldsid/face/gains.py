@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -28,9 +27,6 @@ if TYPE_CHECKING:
     from fieldsid.schedule.verify import Verification
     from fieldsid.turning.prediction import TurnPrediction
     from fieldsid.vehicle import Vehicle
-
-_say = logging.getLogger("fieldsid").info
-"""Messages that a command prints on stderr go to this logger, at level INFO."""
 
 
 def fit_laws(models: Models, *, unweighted: bool = False) -> Laws:
@@ -69,13 +65,13 @@ def turn_radius(
     load_user_effects()
     source, known = source_of(models, law), vehicle_of(vehicle)
     if runs is None:
-        fitted: Sequence[Run] = runs_of_turn(source, _say, loaded_mapping(mapping))
+        fitted: Sequence[Run] = runs_of_turn(source, loaded_mapping(mapping))
     else:
         fitted = runs_mapped(runs, mapping, models=source.paths)
     return radius_over_speed(
         source,
         speeds_of(speeds) or source.knots,
-        fin_limit_of(known, source, _say, "rudder") if rudder_max is None else rudder_max,
+        fin_limit_of(known, source, "rudder") if rudder_max is None else rudder_max,
         runs=fitted,
         measured=runs_mapped(measured, mapping, models=source.paths),
         method=method,
@@ -124,12 +120,12 @@ def design_schedule(
     source, known = source_of(models, law), vehicle_of(vehicle)
     return design(
         source,
-        fin_limit_of(known, source, _say) if fin_limit is None else fin_limit,
+        fin_limit_of(known, source) if fin_limit is None else fin_limit,
         speeds=speeds_of(speeds),
         wish=Wish(controller or usual_controller(source), damping, phase_margin, step, bandwidth, settling, overshoot, fin_use),
         limits=FinLimits(fin_lag, delay, known.fin_rate_rad_s if fin_rate is None else fin_rate, latency),
         depth=depth,
-        runs=runs_of_models(source, _say, depth=depth),
+        runs=runs_of_models(source, depth=depth),
         length=known.length_m,
         fins=fins_of(known, source.axis),
     )
@@ -147,4 +143,4 @@ def verify_schedule(schedule: Schedule | File, models: Models | None = None) -> 
     known = schedule if isinstance(schedule, Schedule) else load_schedule(Path(schedule))
     name = "SCHEDULE" if isinstance(schedule, Schedule) else str(schedule)
     source = source_of(designed_from(known, name) if models is None else models)
-    return verify(known, source, runs=runs_of_models(source, _say, depth=known.depth))
+    return verify(known, source, runs=runs_of_models(source, depth=known.depth))

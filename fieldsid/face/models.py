@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 OneModel: TypeAlias = "Model | Fit | Extension | Diagnosis | str | PathLike[str]"
 AnyModel: TypeAlias = "OneModel | Sequence[Model] | Sequence[Fit]"
-Models: TypeAlias = "OneModel | Laws | Iterable[OneModel]"
+Models: TypeAlias = "OneModel | Laws | ParameterSource | Iterable[OneModel]"
 
 
 def model_of(given: AnyModel) -> Model:
@@ -37,9 +37,11 @@ def source_of(given: Models, law: str | Sequence[str] = ()) -> ParameterSource:
     law: the user's laws, `NAME=c0[,c1]`, as with `--law`. Raises UsageError, DataError and ArtifactError.
     """
     from fieldsid.plant.laws.axis_laws import Laws
-    from fieldsid.plant.parameter_source import load_parameter_source, source_of_laws, source_of_models
+    from fieldsid.plant.parameter_source import ParameterSource, load_parameter_source, source_of_laws, source_of_models
 
     user_laws = (law,) if isinstance(law, str) else tuple(law)
+    if isinstance(given, ParameterSource):
+        return given
     items = [given] if isinstance(given, (str, PathLike, Model)) or not isinstance(given, Iterable) else list(given)
     if len(items) == 1 and isinstance(items[0], Laws):
         return source_of_laws(items[0], laws=user_laws)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from fieldsid.errors import UsageError
 
@@ -11,6 +12,11 @@ TIME = {"s": 1.0, "ms": 1e-3}
 SHARE = {"%": 0.01}
 BANDWIDTH = {"rad/s": 1.0, "Hz": 2.0 * math.pi}
 DECIBEL = {"dB": 1.0}
+
+
+def given(text: str | None, parse: Callable[..., float], *how: Any) -> float | None:
+    """Return the value of an option, None where it is not given; how: further arguments of `parse`, the option's name first."""
+    return None if text is None else parse(text, *how)
 
 
 def parse_quantity(text: str, option: str, units: Mapping[str, float], example: str) -> float:

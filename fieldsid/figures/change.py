@@ -35,20 +35,15 @@ def draw(parameters: list[ParameterChange], ax: Axes) -> None:
     """Draw the change of each parameter with its 95 % interval, in per cent, the speeds below it where there are several."""
     from fieldsid.figures import canvas
 
-    rows: list[tuple[str, float, tuple[float, float], bool]] = []
+    rows: list[tuple[str, float, float]] = []
     for p in parameters:
-        rows.append((p.word, p.change, p.interval95, True))
-        if len(p.speeds) > 1:
-            rows += [
-                (f"{a.speed:.2f} m/s", a.change, (a.change - reach, a.change + reach), False)
-                for a, reach in ((a, TWO_SIDED_95 * a.std_error) for a in p.speeds)
-            ]
+        rows.append((p.word, p.change, TWO_SIDED_95 * p.std_error))
+        speeds = p.speeds if len(p.speeds) > 1 else ()
+        rows += [(f"{a.speed:.2f} m/s", a.change, TWO_SIDED_95 * a.std_error) for a in speeds]
     places = -np.arange(len(rows), dtype=float)
     ax.axvline(0.0, color="0.4", linewidth=0.8)
-    for place, (_, change, (low, high), is_total) in zip(places, rows, strict=True):
-        color, size = (canvas.SIMULATED, 6.0) if is_total else ("0.55", 4.0)
-        ax.plot([100 * low, 100 * high], [place, place], color=color, linewidth=2.0 if is_total else 1.2)
-        ax.plot([100 * change], [place], marker="o", markersize=size, color=color)
+    change, reach = (100.0 * np.array([r[i] for r in rows], dtype=float) for i in (1, 2))
+    ax.errorbar(change, places, xerr=reach, fmt="o", color=canvas.SIMULATED, markersize=5)
     ax.set_yticks(places, [r[0] for r in rows])
     ax.margins(y=0.1)
     changed = ", ".join(p.word for p in parameters if p.state == CHANGED) or "nothing"

@@ -10,19 +10,15 @@ from fieldsid.fitting.fit import Fit
 from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
 from fieldsid.fitting.predict.predict import Prediction
 from fieldsid.fitting.problem.estimator import History
-from fieldsid.models.axis import NAMES
-from fieldsid.models.model import Model
-from fieldsid.rounding import with_error
 
 
-def figure(fit: Fit, index: int = 0) -> Picture:
+def figure(fit: Fit, index: int, says: str) -> Picture:
     """Return the figure of one of the fit's runs."""
     shown = fit.predictions[index]
-    title = f"{heading(fit.model, shown.record.name)}\n{facts(fit, shown)}"
-    return Picture(title, (9.0, 8.2), (motion.panels([("simulated", "simulated", shown)], fit.floor),))
+    return Picture(f"{says}\n{facts(shown)}", (9.0, 8.2), (motion.panels([("simulated", "simulated", shown)], fit.floor),))
 
 
-def residual_figure(fit: Fit, index: int = 0) -> Picture:
+def residual_figure(fit: Fit, index: int) -> Picture:
     """Return the correlations of the residuals of one of the fit's runs."""
     shown = fit.predictions[index]
     return correlation.figure(shown, f"{shown.record.name}, {fit.model.axis.value}: what the model leaves")
@@ -33,18 +29,8 @@ def history_figure(fit: Fit, history: History) -> Picture:
     return rls.figure(history, fit.model.units, f"{', '.join(fit.model.runs)}, {fit.model.axis.value}: {fit.model.method}")
 
 
-def heading(model: Model, run: str) -> str:
-    """Return the first line: run, axis and base parameters with their errors."""
-    names = NAMES[model.axis]
-    parts = (f"{n} = {with_error(model.values[n], model.std_error(n))} {model.units.get(n, '')}".rstrip() for n in names.base)
-    at = f" at {model.law.reference:.2f} m/s" if len(model.runs) > 1 and isfinite(model.law.reference) else ""
-    return f"{run}, {model.axis.value}: " + ", ".join(parts) + at
-
-
-def facts(fit: Fit, shown: Prediction) -> str:
-    """Return the second line: speed, method, effects, and how well the free run follows."""
+def facts(shown: Prediction) -> str:
+    """Return the second line: the run, its speed, and how well the free run follows."""
     m, speed = goodness_of_fit([shown]), shown.record.speed
-    words = [f"flown at {speed:.2f} m/s" if isfinite(speed) else "speed unknown", fit.model.method]
-    words += list(fit.model.effects)
-    fits = ((f"{n} fit {v:.1f} %") for n, v in (("angle", m.angle_fit), ("rate", m.rate_fit)) if isfinite(v))
-    return ", ".join((*words, *fits))
+    fits = (f"{n} fit {v:.1f} %" for n, v in (("angle", m.angle_fit), ("rate", m.rate_fit)) if isfinite(v))
+    return ", ".join((shown.record.name, f"flown at {speed:.2f} m/s" if isfinite(speed) else "speed unknown", *fits))

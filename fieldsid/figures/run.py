@@ -22,14 +22,12 @@ PANELS = (
 """The signals that share a panel; where its unit is degrees the signals are in rad."""
 
 
-def figure(run: Run) -> Picture:
+def figure(run: Run, title: str) -> Picture:
     """Return a panel for each kind of signal that was measured; raises DataError where none was."""
     shown = [(y, present) for y, names in PANELS if (present := [n for n in names if run.has(n)])]
     if not shown:
         raise DataError(f"run {run.name!r} has nothing to draw", found=", ".join(run.signals) or "no signals")
     panels = [panel(run, names, y, "time, s" if y == shown[-1][0] else "") for y, names in shown]
-    speed = f", {np.nanmedian(run['surge_m_s']):.2f} m/s" if run.has("surge_m_s") else ""
-    title = f"{run.name}: {run.time[-1] - run.time[0]:.1f} s, {len(run)} samples{speed}"
     return Picture(title, (9.0, 1.0 + 1.7 * len(shown)), (panels,))
 
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fieldsid.figures.panel import Band, Panel, Picture, Series
-from fieldsid.numerics.arrays import FloatArray
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import TWO_SIDED_95
 from fieldsid.turning.measured.measured_turn import MeasuredTurn
@@ -33,25 +32,19 @@ def figure(prediction: TurnPrediction) -> Picture:
 
 def panels(body: Mapping[str, Any]) -> tuple[Panel, Panel]:
     """Return the radius of both sides with its bands and the measured circles, and the time of a u-turn, of the JSON of turns."""
-    speeds = np.array([r["speed_m_s"] for r in body["rows"]], dtype=float)
-    span = float(np.mean(speeds)) * np.array([1.0 - LEAST_HALF_SPAN, 1.0 + LEAST_HALF_SPAN])
-    ends = Series(span, np.full(2, np.nan), "quiet")
-    radius, bands = _sides(body, ("predicted_m", "predicted95"), ("radius_m", "interval95"), ", predicted")
-    time, time_bands = _sides(body, ("u_turn_time_s", "u_turn_time95_s"), ("u_turn_time_s", ""), "")
-    circles = [
-        Series(
-            np.array([c.get("entry_speed_m_s") or c.get("path_speed_m_s") for c in of_side], dtype=float),
-            np.array([c["radius_m"] for c in of_side], dtype=float),
-            side,
-            f"measured circle, {side}, {_fins(of_side)} of rudder",
-            "rings",
-            TWO_SIDED_95 * np.array([c["std_error_m"] for c in of_side], dtype=float),
-        )
-        for side in SIDES
-        if (of_side := [c for c in body.get("measured", ()) if c["side"] == side])
-    ]
+    rows = [{"predicted_m": r["radius_m"], "predicted95": r["interval95"], **r} for r in body["rows"]]
+    middle = float(np.mean([r["speed_m_s"] for r in rows]))
+    ends = Series(np.array([(1.0 - LEAST_HALF_SPAN) * middle, (1.0 + LEAST_HALF_SPAN) * middle]), np.full(2, np.nan), "quiet")
+    radius, bands = _sides(rows, "predicted_m", "predicted95", ", predicted")
+    time, time_bands = _sides(rows, "u_turn_time_s", "u_turn_time95_s", "")
+    for side in SIDES:
+        if circles := [c for c in body.get("measured", ()) if c["side"] == side]:
+            speed = np.array([c.get("entry_speed_m_s") or c.get("path_speed_m_s") for c in circles], dtype=float)
+            size, error = (np.array([c[k] for c in circles], dtype=float) for k in ("radius_m", "std_error_m"))
+            name = f"measured circle, {side}, {_fins(circles)} of rudder"
+            radius.append(Series(speed, size, side, name, "rings", TWO_SIDED_95 * error))
+    above = Panel("radius, m", (ends, *radius), bands, 190, from_zero=True)
     x = "speed before the turn, m/s"
-    above = Panel("radius, m", (ends, *radius, *circles), bands, 190, from_zero=True)
     return above, Panel("time to turn 180°, s", (ends, *time), time_bands, 120, from_zero=True, x=x)
 
 
@@ -60,31 +53,21 @@ def _fins(circles: Sequence[Mapping[str, Any]]) -> str:
     return ", ".join(sorted({f"{np.degrees(abs(c['fin_rad'])):.0f}°" for c in circles}))
 
 
-def _sides(
-    body: Mapping[str, Any], keys: tuple[str, str], otherwise: tuple[str, str], of: str
-) -> tuple[list[Series], list[Band]]:
-    """Return a value of each side over speed with its band, by its keys, or by other ones where a row lacks it.
-
-    At few speeds the band is drawn as error bars.
-    """
+def _sides(rows: Sequence[Mapping[str, Any]], value: str, band: str, of: str) -> tuple[list[Series], list[Band]]:
+    """Return a value of each side over speed with its band, by their keys; at few speeds the band is drawn as error bars."""
     series, bands = [], []
     for side, sign in SIDES.items():
-        rows = sorted((r for r in body["rows"] if r["side"] == side), key=lambda r: float(r["speed_m_s"]))
-        if not rows:
+        mine = sorted((r for r in rows if r["side"] == side), key=lambda r: float(r["speed_m_s"]))
+        if not mine:
             continue
-
-        def column(key: str, other: str, i: int | None = None, rows: list[Any] = rows) -> FloatArray:
-            found = [r.get(key) or r.get(other) for r in rows]
-            return np.array([v if i is None or v is None else v[i] for v in found], dtype=float)
-
-        x, y = column("speed_m_s", ""), column(keys[0], otherwise[0])
-        low, high = (column(keys[1], otherwise[1], i) for i in (0, 1))
-        few = len(rows) <= FEW
-        x = x * (1.0 + SHIFT * sign) if few else x
-        error = np.maximum(np.stack([y - low, high - y]), 0.0)
-        series.append(Series(x, y, side, f"{side}{of}", dashed=not few and side == "starboard"))
-        series += [Series(x, y, side, form="points", error=np.nan_to_num(error))] if few else []
-        bands += [] if few else [Band(x, low, high, side)]
+        x, y = (np.array([r.get(k) for r in mine], dtype=float) for k in ("speed_m_s", value))
+        low, high = np.array([r.get(band) or (np.nan, np.nan) for r in mine], dtype=float).T
+        if len(mine) > FEW:
+            series.append(Series(x, y, side, f"{side}{of}", dashed=side == "starboard"))
+            bands.append(Band(x, low, high, side))
+            continue
+        x, error = x * (1.0 + SHIFT * sign), np.nan_to_num(np.maximum(np.stack([y - low, high - y]), 0.0))
+        series += [Series(x, y, side, f"{side}{of}"), Series(x, y, side, form="points", error=error)]
     return series, bands
 
 

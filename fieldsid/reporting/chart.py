@@ -6,10 +6,10 @@ of the drawing; the attributes of the panel have its data range, from which the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from html import escape
 from math import ceil, floor, isfinite, log10
+from typing import TypeAlias
 
 import numpy as np
 
@@ -26,6 +26,10 @@ POINTS = ("points", "rings")
 """The forms of series with a mark at each point."""
 SAME = 2e-4
 """Relative range of values that are drawn level: with the four digits of the tables they are equal."""
+
+
+Scale: TypeAlias = tuple[Callable[[float], float], Callable[[float], float]]
+"""The maps from x and from y to the coordinates of a panel."""
 
 
 def chart(panels: Sequence[Panel], title: str) -> str:
@@ -109,7 +113,7 @@ def _panel(panel: Panel, top: float, x: tuple[float, float]) -> str:
     ends += [end for s in panel.series if s.error is not None for end in _ends(s)]
     y = panel.limits or _range(ends, 0.06, from_zero=panel.from_zero)
     width = WIDTH - LEFT - RIGHT
-    scale = _Scale(x, y, width, panel.height)
+    at_x, at_y = scale = _place(*x, width), _place(y[1], y[0], panel.height)
     head = (
         f'<svg class="panel" x="{LEFT}" y="{top:g}" width="{width}" height="{panel.height}" '
         f'viewBox="0 0 {width} {panel.height}" preserveAspectRatio="none" data-y0="{y[0]:.6g}" data-y1="{y[1]:.6g}" '
@@ -118,39 +122,27 @@ def _panel(panel: Panel, top: float, x: tuple[float, float]) -> str:
     parts = [head]
     axis = []
     for tick in nice_ticks(*y, TICKS_Y if panel.height > 90 else 3):
-        place = scale.y(tick)
+        place = at_y(tick)
         parts.append(f'<line class="grid" x1="0" x2="{width}" y1="{place:.1f}" y2="{place:.1f}"/>')
         axis.append(f'<text x="{LEFT - 5}" y="{top + place + 4:.1f}" text-anchor="end">{_shown(tick)}</text>')
     for low, high in panel.spans:
-        wide = max(scale.x(high) - scale.x(low), 1.0)
-        parts.append(f'<rect class="span" x="{scale.x(low):.1f}" width="{wide:.1f}" height="{panel.height}"/>')
+        wide = max(at_x(high) - at_x(low), 1.0)
+        parts.append(f'<rect class="span" x="{at_x(low):.1f}" width="{wide:.1f}" height="{panel.height}"/>')
     parts += [_band(b, scale) for b in panel.bands]
     parts += [_series(s, scale) for s in panel.series]
     label = f'<text class="label" x="{LEFT}" y="{top - 5:g}">{escape(panel.label)}</text>'
     return "".join([*parts, "</svg>", *axis, label])
 
 
-@dataclass(frozen=True, slots=True)
-class _Scale:
-    """The map from data to the coordinates of the panel."""
-
-    x_range: tuple[float, float]
-    y_range: tuple[float, float]
-    width: float
-    height: float
-
-    def x(self, value: float) -> float:
-        low, high = self.x_range
-        return self.width * (value - low) / (high - low)
-
-    def y(self, value: float) -> float:
-        low, high = self.y_range
-        return self.height * (high - value) / (high - low)
+def _place(low: float, high: float, size: float) -> Callable[[float], float]:
+    """Return the map from data between two ends to the coordinates of a panel."""
+    return lambda value: size * (value - low) / (high - low)
 
 
-def _band(band: Band, scale: _Scale) -> str:
-    there = [(scale.x(x), scale.y(y)) for x, y in zip(band.x, band.high, strict=True)]
-    back = [(scale.x(x), scale.y(y)) for x, y in zip(band.x[::-1], band.low[::-1], strict=True)]
+def _band(band: Band, scale: Scale) -> str:
+    at_x, at_y = scale
+    there = [(at_x(x), at_y(y)) for x, y in zip(band.x, band.high, strict=True)]
+    back = [(at_x(x), at_y(y)) for x, y in zip(band.x[::-1], band.low[::-1], strict=True)]
     points = " ".join(f"{x:.1f},{y:.1f}" for x, y in [*there, *back])
     return f'<polygon class="band {band.kind}" points="{points}"/>'
 
@@ -161,10 +153,11 @@ def _ends(series: Series) -> tuple[FloatArray, FloatArray]:
     return series.y - down, series.y + up
 
 
-def _series(series: Series, scale: _Scale) -> str:
+def _series(series: Series, scale: Scale) -> str:
+    at_x, at_y = scale
     x, y, low, high = thinned(series.x, series.y, *_ends(series))
     ok = np.isfinite(x) & np.isfinite(y)
-    points = [(scale.x(x), scale.y(y)) for x, y in zip(x[ok], y[ok], strict=True)]
+    points = [(at_x(x), at_y(y)) for x, y in zip(x[ok], y[ok], strict=True)]
     kind = f"{series.kind}{' dashed' * series.dashed}{' thin' * series.thin}"
     name = f' data-name="{escape(series.name)}"' if series.name and not series.dashed else ""
     marks = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in points)
@@ -172,7 +165,7 @@ def _series(series: Series, scale: _Scale) -> str:
         return f'<path class="dots {kind}"{name} d="{marks}"/>'
     if series.form in POINTS:
         errors = zip(x[ok], low[ok], high[ok], strict=True)
-        path = "".join(f"M{scale.x(x):.1f} {scale.y(low):.1f}V{scale.y(high):.1f}" for x, low, high in errors)
+        path = "".join(f"M{at_x(x):.1f} {at_y(low):.1f}V{at_y(high):.1f}" for x, low, high in errors)
         return f'<path class="errors {kind}" d="{path}"/><path class="{series.form} {kind}"{name} d="{marks}"/>'
     if series.form == "steps":
         points = [p for (x, y), (x1, _) in zip(points, [*points[1:], points[-1]], strict=True) for p in ((x, y), (x1, y))]
@@ -182,8 +175,9 @@ def _series(series: Series, scale: _Scale) -> str:
 
 def _x_axis(top: float, x: tuple[float, float], label: str) -> str:
     width = WIDTH - LEFT - RIGHT
+    at_x = _place(*x, width)
     ticks = "".join(
-        f'<text x="{LEFT + width * (t - x[0]) / (x[1] - x[0]):.1f}" y="{top + 14:g}" text-anchor="middle">{_shown(t)}</text>'
+        f'<text x="{LEFT + at_x(t):.1f}" y="{top + 14:g}" text-anchor="middle">{_shown(t)}</text>'
         for t in nice_ticks(*x, TICKS_X)
     )
     middle = LEFT + 0.5 * width

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from fieldsid.comparison.compare import Comparison, compare_one
 from fieldsid.display import Brief
-from fieldsid.errors import FieldsidError, UsageError
+from fieldsid.errors import ArtifactError, FieldsidError, UsageError
 from fieldsid.extension.lineage import Generation, Loop, history_of, loop_of
 from fieldsid.logs import Run, load_run
 from fieldsid.logs.segments import may_show
@@ -19,6 +19,7 @@ from fieldsid.plant.parameter_source import ParameterSource, load_parameter_sour
 from fieldsid.records.check import ShapeError, check
 from fieldsid.records.kinds import DRAWN_DIAGNOSIS
 from fieldsid.schedule.record import Schedule, load_schedule
+from fieldsid.trial_folder.journal import relative_to
 from fieldsid.trial_folder.next_step import chosen_models, next_step, single_models
 from fieldsid.trial_folder.state import MODEL, RUN, FolderState, Item
 from fieldsid.vehicle import Vehicle, find_vehicle
@@ -107,7 +108,7 @@ def _read_or_skip(read: Callable[[], T], what: str, skipped: list[str]) -> T | N
     try:
         return read()
     except FieldsidError as error:
-        skipped.append(f"{what}: {error.what}")
+        skipped.append(f"{what}: {error.what}{f'; {error.found}' if isinstance(error, ArtifactError) else ''}")
         return None
 
 
@@ -131,11 +132,8 @@ def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]
     if not best:
         return None
     best_model = state.folder / best[0]
-    line = (
-        (_read_or_skip(lambda: history_of(best_model), f"no history of {best_model.name}", skipped) or ())
-        if len(best) == 1
-        else ()
-    )
+    found = _read_or_skip(partial(history_of, best_model), f"no history of {best_model.name}", skipped) if len(best) == 1 else ()
+    line = found or ()
     ancestors = [g.path for g in reversed(line[:-1]) if g.state != "missing"]
     between = MOST_MODELS - 2
     ancestors = [*ancestors[:between], *ancestors[between:][-1:]]
@@ -147,9 +145,8 @@ def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]
     shown = tuple(s for p in paths if (s := _shown(state, p, runs, skipped)) is not None)
     if not shown:
         return None
-    diagnosis, turning, schedule = (
-        _newest_complete(state, kind, axis, skipped) for kind in ("diagnosis", "turn-radius", "schedule")
-    )
+    kinds = ("diagnosis", "turn-radius", "schedule")
+    diagnosis, turning, schedule = (_newest_complete(state, kind, axis, skipped) for kind in kinds)
     gains = None if schedule is None else _read_or_skip(partial(load_schedule, state.place(schedule)), schedule.path, skipped)
     return AxisMaterial(
         axis,
@@ -165,17 +162,12 @@ def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]
 
 
 def _shown(state: FolderState, path: Path, runs: Sequence[Run], skipped: list[str]) -> Shown | None:
-    try:
-        model = load_model(path)
-    except FieldsidError as error:
-        skipped.append(f"{path.name}: {error.what}; {error.found}")
+    if (model := _read_or_skip(partial(load_model, path), path.name, skipped)) is None:
         return None
     mine = [run for run in runs if may_show(run, model.axis)]
     tried = (_read_or_skip(partial(compare_one, model, run), f"{path.name} on {run.name}", skipped) for run in mine)
     found = [one for one in tried if one is not None]
-    inside = path.resolve().is_relative_to(state.folder.resolve())
-    name = path.resolve().relative_to(state.folder.resolve()) if inside else path
-    return Shown(str(name), model, tuple(found))
+    return Shown(relative_to(path, state.folder), model, tuple(found))
 
 
 def _newest_complete(state: FolderState, kind: str, axis: str, skipped: list[str]) -> Item | None:

@@ -9,11 +9,10 @@ from typing import Any
 from fieldsid._version import __version__
 from fieldsid.comparison.compare import Channel, left_in_words
 from fieldsid.comparison.sufficient import is_noise, pooled
-from fieldsid.display import page_of, view_of
+from fieldsid.display import line_of, page_of
 from fieldsid.extension.lineage import Loop
 from fieldsid.figures import compare, law, loop, schedule, turn
 from fieldsid.figures.bars import places
-from fieldsid.logs import Run
 from fieldsid.models.axis import NAMES
 from fieldsid.page import Block, counted
 from fieldsid.reporting.chart import bars, chart, legend
@@ -43,7 +42,7 @@ def context_of(material: Material) -> dict[str, Any]:
         "tool": f"fieldsid {__version__}",
         "verdicts": [v for a in material.axes for v in _verdicts(a, state)] + _state_verdict(state),
         "next": {"why": why, "command": "" if command.startswith(REPORT) else command},  # this page is that report
-        "runs": [{"name": r.name, "says": view_of(Run).line(r), "page": page_of(r)} for r in material.runs],
+        "runs": [{"name": r.name, "says": line_of(r), "page": page_of(r)} for r in material.runs],
         "models": [s.path for a in material.axes for s in a.shown],
         "axes": [_axis(a) for a in material.axes],
         "vehicle": _vehicle(material),
@@ -87,7 +86,7 @@ FAILED = ("does not hold", "FAILED")
 def _gain_verdict(gains: Schedule, verified: Entry | None) -> dict[str, str]:
     worst, wanted = min(gains.rows, key=lambda r: r.phase_margin_deg), gains.phase_margin_deg
     phase = worst.phase_margin_deg
-    says = f"least phase margin {phase:.0f} deg at {number(worst.speed, 3)} m/s, {wanted:.0f} deg asked for, by the estimate"
+    says = f"{line_of(gains)} at {number(worst.speed, 3)} m/s, {wanted:.0f} deg asked for, by the estimate"
     return {
         "what": f"{gains.axis.value} gains at {counted(len(gains.rows), 'speed')}",
         "says": says if verified is None else f"{says}; verified: {verified.verdict}",

@@ -25,14 +25,6 @@ class AddedCoefficient:
 
 
 @dataclass(frozen=True, slots=True)
-class MadeFrom:
-    """The model it was made from."""
-
-    path: Annotated[str, Key("Its file.")]
-    sha256: Annotated[str, Key("The file's hash.")]
-
-
-@dataclass(frozen=True, slots=True)
 class LeftOver:
     """What a model leaves, over the noise floor."""
 
@@ -55,7 +47,7 @@ class Extended(OfLogs):
     kept_by: Annotated[str | None, Key("What it was kept for: `unseen`, `evidence` or `--keep`; null where it was not.")]
     model: Annotated[str, Key("The file that was written; the parent where nothing was kept.")]
     effects: Annotated[tuple[str, ...], Key("The effects in that model.")]
-    parent: Annotated[MadeFrom, Key("The model it was made from.")]
+    parent: Annotated[Parent, Key("The model it was made from.")]
     coefficients: Annotated[Mapping[str, AddedCoefficient], Key("The coefficients of the added effects, by name.")]
     notes: Annotated[tuple[Note, ...], Key("What else there is to know.")]
     left: Annotated[LeftOver, Key("What the model as it now is leaves.")]

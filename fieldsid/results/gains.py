@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fieldsid.models.axis import Axis
 from fieldsid.records.keys import INLINE, Key, Number, Result
-from fieldsid.schedule.check import Check
 from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.record import Schedule
 from fieldsid.schedule.verdict import Gate
+from fieldsid.schedule.verify import Verification
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +51,7 @@ class Verified(Result):
     axis: Annotated[Axis, Key("The plane.")]
     controller: Annotated[str, Key("The controller.")]
     worst: Annotated[Mapping[str, float], Key("The worst of all.", of=Worst)]
-    scheduled: Annotated[tuple[Check, ...], Key("The schedule, at its rows and between.")]
-    constant: Annotated[tuple[Check, ...], Key("One constant gain, at the same speeds.")]
+    checked: Annotated[Verification, INLINE]
     gates: Annotated[tuple[Gate, ...], Key("The limits that were asked for.")]
     figure: Annotated[str | None, Key("The figure that was drawn.")]
 
@@ -64,24 +63,12 @@ class Verified(Result):
 
 @dataclass(frozen=True, slots=True)
 class Exported(Result):
-    """The gains in the vehicle's own format."""
+    """The gains in the vehicle's own format, or put into a file that exists with `--into`."""
 
     SCHEMA = "fieldsid/export/1"
 
-    target: Annotated[str, Key("The format.")]
-    text: Annotated[str, Key("The file's text.")]
-    file: Annotated[str | None, Key("The file that was written.")] = None
-    difference: Annotated[str, Key("How a file that was replaced has changed, as a unified difference.")] = ""
-    backup: Annotated[str | None, Key("That file as it was; null where none was replaced.")] = None
-
-
-@dataclass(frozen=True, slots=True)
-class Patched(Result):
-    """The gains put into a file that exists, with `--into`."""
-
-    SCHEMA = "fieldsid/export/1"
-
-    difference: Annotated[str, Key("What changes, as a unified difference.")]
-    file: Annotated[str, Key("The file.")]
-    backup: Annotated[str | None, Key("The file as it was; null where nothing was changed.")]
-    target: Annotated[Literal["into"], Key("Always `into`.")] = "into"
+    target: Annotated[str, Key("The format; `into` for `--into`.")]
+    text: Annotated[str | None, Key("The file's text; not with `--into`.", is_optional=True)] = None
+    file: Annotated[str | None, Key("The file that was written, or that is shown changed.")] = None
+    difference: Annotated[str, Key("How a file that exists changes, as a unified difference.")] = ""
+    backup: Annotated[str | None, Key("That file as it was; null where nothing was replaced.")] = None

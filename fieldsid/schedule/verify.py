@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.plant.parameter_source import ParameterSource
+from fieldsid.records.keys import Key
 from fieldsid.runtime.parallel_map import parallel_map
 from fieldsid.schedule.check import READ_OFF, Check, StepCheck
 from fieldsid.schedule.controller import HELD_SHARE, Gains, margins, worst_of
@@ -76,8 +78,8 @@ class Verification(Plotted):
     """Checks of the schedule and of the best constant gain at the same speeds; the constant row; the estimate's simulations."""
 
     schedule: Schedule
-    scheduled: tuple[Check, ...]
-    constant: tuple[Check, ...]
+    scheduled: Annotated[tuple[Check, ...], Key("The schedule, at its rows and between.")]
+    constant: Annotated[tuple[Check, ...], Key("One constant gain, at the same speeds.")]
     constant_row: Row
     flown: tuple[FlownSet, ...]
     draws: int

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from fieldsid.display import Figures, Frames, View
 from fieldsid.figures.sketch import sketch
-from fieldsid.page import Block, Page, facts, listed
+from fieldsid.page import Block, Page
 from fieldsid.records.keys import body_of
 from fieldsid.views._words import table, warned
 
@@ -23,15 +23,7 @@ def line(found: Change) -> str:
 
 def page(found: Change) -> Page:
     """Return the parameters with their changes, the gains and the radius before and after."""
-    known = facts(
-        "Statistics",
-        (
-            ("speeds", f"{listed([f'{s:.2f}' for s in found.speeds])} m/s"),
-            ("effects only after", listed(found.added)),
-            ("effects only before", listed(found.removed)),
-        ),
-    )
-    return Page(found.line, warned(found.notes), (known, *blocks_of(found)))
+    return Page(found.line, warned(found.notes), tuple(blocks_of(found)))
 
 
 def blocks_of(found: Change, title: str = "") -> Iterator[Block | str]:

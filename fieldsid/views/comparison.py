@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import Figures, Frames, View
 from fieldsid.figures.sketch import sketch
-from fieldsid.page import Block, Page, Whole, cut, facts
+from fieldsid.page import Block, Page, Whole, cut
 from fieldsid.records.keys import body_of
-from fieldsid.rounding import MANY, RADIANS, Angles, number, p_value
-from fieldsid.views._words import percent, speed_words, table, warned, where_block
+from fieldsid.rounding import DEGREES, MANY, RADIANS, Angles
+from fieldsid.views._words import merit_blocks, percent, table, warned, where_block
 
 if TYPE_CHECKING:
     from fieldsid.comparison.compare import Comparison
@@ -39,20 +39,9 @@ def verdict(found: Sequence[Comparison], angles: Angles = RADIANS) -> str:
 
 
 def page(found: Comparison, angles: Angles = RADIANS) -> Page:
-    """Return errors, metrics and the places of the error."""
-    from fieldsid.comparison.compare import errors_in_words
-
-    m, errors = found.worst_channel.metrics, errors_in_words(found.merit, found.floor, angles, 3)
-    known = facts(
-        "Statistics",
-        (
-            ("speed", speed_words(found.shown.record.speed)),
-            *((f"{name} error", words) for name, words in errors),
-            ("judged by", f"the {found.worst_channel.name}: Theil {number(m.theil, 3)}, R^2 {number(m.r2, 3)}"),
-            ("whiteness", p_value(m.whiteness_p)),
-        ),
-    )
-    return Page(f"Comparison with {cut(found.run, 60)}", warned(found.shown.notes), (known, *blocks_of(found, angles)))
+    """Return errors, fits and the places of the error."""
+    errors = merit_blocks([(found.run, found.shown.record.speed, found.merit, found.floor)], angles)
+    return Page(f"Comparison with {verdict([found], angles)}", warned(found.shown.notes), (*errors, *blocks_of(found, angles)))
 
 
 def blocks_of(found: Comparison, angles: Angles = RADIANS, top: int = MOST_PLACES) -> Iterator[Block | str]:
@@ -93,7 +82,7 @@ def frames(found: Comparison) -> Frames:
 
 def figures(found: Comparison) -> Figures:
     """Return the free run against its measurement, and where the error falls."""
-    return {"motion": sketch("compare", found, found.model, "the model")}
+    return {"motion": sketch("compare", found, f"the model on {verdict([found], DEGREES)}")}
 
 
 VIEW = View("comparison", line, page, frames, lambda found: found.run, figures)

@@ -4,30 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from fieldsid.display import Figures, Frames, View
+from fieldsid.display import Figures, Frames, View, page_of
 from fieldsid.figures.sketch import sketch
-from fieldsid.page import Block, Page, facts, listed
+from fieldsid.page import Block, Page, listed
 from fieldsid.records.keys import body_of
-from fieldsid.rounding import RADIANS, p_value
-from fieldsid.views._words import (
-    base_words,
-    joined,
-    merit_blocks,
-    parameter_block,
-    parameter_rows,
-    some,
-    table,
-    warned,
-)
+from fieldsid.rounding import RADIANS
+from fieldsid.views._words import base_words, joined, merit_blocks, parameter_rows, some, table, warned
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
     from fieldsid.fitting.fit import Fit
+    from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit
     from fieldsid.fitting.predict.predict import Prediction
     from fieldsid.logs import Note
+    from fieldsid.models.model import Noise
 
 LEAST_CORRELATION = 0.5
 """Correlations of less are not shown: they hardly widen an interval."""
@@ -44,34 +37,16 @@ def line(fit: Fit) -> str:
 
 
 def page(fit: Fit) -> Page:
-    """Return the blocks of a fit's report."""
-    from fieldsid.comparison.compare import errors_in_words
-    from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
-
-    model, records = fit.model, [p.record for p in fit.predictions]
-    seconds = sum(float(r.time[-1] - r.time[0]) for r in records)
-    whiteness = model.info.get("whiteness_p")
-    known = facts(
-        "Statistics",
-        (
-            ("method", model.method),
-            ("effects", listed(model.effects) or "none"),
-            ("runs", listed(model.runs)),
-            ("samples", f"{sum(len(r) for r in records)} in {seconds:.1f} s"),
-            ("estimated", some(len(model.free), "parameter")),
-            *((f"{n} error", e) for n, e in errors_in_words(goodness_of_fit(fit.predictions), fit.floor, RADIANS, 3)),
-            ("whiteness", "" if whiteness is None else p_value(whiteness)),
-        ),
-    )
-    blocks = (known, parameter_block([("", model)]), _correlations(fit), *_runs(fit))
-    return Page(f"Fit of the {model.axis.value} axis", warned(_warnings(fit)), blocks)
+    """Return the model with its warnings, the correlations of its parameters, and how each run is followed."""
+    blocks = (*page_of(fit.model).blocks, _correlations(fit), *merit_blocks(_runs(fit), RADIANS))
+    return Page(f"Fit of the {fit.model.axis.value} axis", warned(_warnings(fit)), blocks)
 
 
 def frames(fit: Fit) -> Frames:
     """Return the parameters, the runs, the correlation of the estimates, and the motion of all runs over time."""
     return {
         "parameters": lambda: table(parameter_rows(fit.model), "parameter"),
-        "runs": lambda: table(map(_run_row, fit.predictions), "run"),
+        "runs": lambda: table(({"run": n, "speed_m_s": u, **body_of(m)} for n, u, m, _ in _runs(fit)), "run"),
         "correlation": lambda: _correlation(fit),
         "motion": lambda: motion(fit.predictions),
     }
@@ -79,7 +54,7 @@ def frames(fit: Fit) -> Frames:
 
 def figures(fit: Fit) -> Figures:
     """Return the motion of each run by its name, and the estimates over time of a recursive method."""
-    drawn = {p.record.name: sketch("identify", fit, i) for i, p in enumerate(fit.predictions)}
+    drawn = {p.record.name: sketch("identify", fit, i, line(fit)) for i, p in enumerate(fit.predictions)}
     if fit.history is not None:
         drawn["over_time"] = sketch("identify", fit, fit.history, draw="history_figure")
     return drawn
@@ -131,18 +106,11 @@ def _correlation(fit: Fit) -> DataFrame:
     return pd.DataFrame(fit.correlation, index=list(fit.model.free), columns=list(fit.model.free))
 
 
-def _runs(fit: Fit) -> tuple[Block | str, ...]:
-    """Return a row for each run, nothing where there is one."""
+def _runs(fit: Fit) -> Iterator[tuple[str, float, GoodnessOfFit, Noise]]:
+    """Yield name, speed, fit and noise of each run."""
     from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
 
-    runs = [(p.record.name, p.record.speed, goodness_of_fit([p]), fit.floor) for p in fit.predictions]
-    return merit_blocks(runs, RADIANS) if len(runs) > 1 else ()
-
-
-def _run_row(p: Prediction) -> dict[str, Any]:
-    from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
-
-    return {"run": p.record.name, "speed_m_s": p.record.speed, **body_of(goodness_of_fit([p]))}
+    yield from ((p.record.name, p.record.speed, goodness_of_fit([p]), fit.floor) for p in fit.predictions)
 
 
 VIEW = View("fit", line, page, frames, lambda fit: "+".join(fit.model.runs), figures)

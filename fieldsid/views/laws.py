@@ -30,11 +30,8 @@ def page(laws: Laws) -> Page:
     """Return the law taken of each parameter, its value at each point, and the exponent."""
     from fieldsid.plant.laws.axis_laws import law_notes
 
-    heads = ("m/s", *laws.by_name)
-    points = [(number(u, 3), *(number(v) for v in laws.at(u).values())) for u in map(float, laws.speeds)]
-    values = Block("Values by the laws", tuple(points), heads, left=0)
     notes = warned((*laws.notes, *law_notes(laws)))
-    return Page(f"Laws of the {laws.axis.value} axis against speed", notes, (*blocks_of(laws), values))
+    return Page(f"Laws of the {laws.axis.value} axis against speed", notes, tuple(blocks_of(laws)))
 
 
 def blocks_of(laws: Laws) -> Iterator[Block | str]:

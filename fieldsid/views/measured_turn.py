@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 from fieldsid.display import Figures, Frames, View
 from fieldsid.figures.sketch import sketch
-from fieldsid.page import Page, cut, facts
+from fieldsid.page import cut
 from fieldsid.records.keys import body_of
-from fieldsid.rounding import interval, number, with_error
-from fieldsid.views._words import speed_words, table
+from fieldsid.rounding import number, with_error
+from fieldsid.views import row
+from fieldsid.views._words import table
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -22,23 +23,6 @@ def line(turn: MeasuredTurn) -> str:
     circle = turn.circle
     radius = f"radius {with_error(circle.radius, circle.radius_std_error)} m"
     return f"{cut(turn.run, 60)}, {turn.side}: {radius}, fin {number(turn.fin, 3)} rad, {turn.path_speed:.2f} m/s along the path"
-
-
-def page(turn: MeasuredTurn) -> Page:
-    """Return the circle, and the speed and fin of the turn."""
-    circle = turn.circle
-    known = facts(
-        "Statistics",
-        (
-            ("radius", f"{with_error(circle.radius, circle.radius_std_error)} m, 95 % {interval(*circle.interval95)}"),
-            ("settled", f"{turn.start_s:.1f} .. {turn.end_s:.1f} s"),
-            ("fin", f"{number(turn.fin, 3)} rad"),
-            ("speed before", speed_words(turn.entry_speed)),
-            ("speed in turn", speed_words(turn.path_speed)),
-            ("current", f"{number(circle.current[0], 2)} north, {number(circle.current[1], 2)} east, m/s"),
-        ),
-    )
-    return Page(f"Circle of {cut(turn.run, 60)} to {turn.side}", (), (known,))
 
 
 def frames(turn: MeasuredTurn) -> Frames:
@@ -58,4 +42,4 @@ def figures(turn: MeasuredTurn) -> Figures:
     return {"track": sketch("turn", turn, draw="track_figure")}
 
 
-VIEW = View("measured_turn", line, page, frames, lambda turn: turn.run, figures)
+VIEW = View("measured_turn", line, row.page, frames, lambda turn: turn.run, figures)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import Frames, View
 from fieldsid.page import Page, facts, listed
-from fieldsid.rounding import number
+from fieldsid.rounding import number, p_value
 from fieldsid.views._words import base_words, joined, parameter_block, parameter_rows, speed_words, table
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ def line(model: Model) -> str:
 def page(model: Model) -> Page:
     """Return how the model was found, and its parameters."""
     low, high = (model.trained.get(k, float("nan")) for k in ("speed_low", "speed_high"))
+    whiteness = model.info.get("whiteness_p")
     known = facts(
         "Statistics",
         (
@@ -28,6 +29,7 @@ def page(model: Model) -> Page:
             ("effects", listed(model.effects) or "none"),
             ("runs", listed(model.runs)),
             ("speeds", f"{low:.2f} .. {high:.2f} m/s" if low < high else speed_words(low)),
+            ("whiteness", "" if whiteness is None else p_value(whiteness)),
             ("damping", f"goes with u^{number(model.law.damping_exponent, 3)}"),
             ("authority", "of its own at each speed" if model.law.points else f"goes with u^{model.law.authority_exponent:.3g}"),
         ),

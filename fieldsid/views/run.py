@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from math import nan
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import Figures, Frames, View
 from fieldsid.figures.sketch import sketch
 from fieldsid.page import Block, Page, cut, facts, listed
-from fieldsid.rounding import number
+from fieldsid.rounding import RADIANS, Angles, number
 from fieldsid.views._words import joined, some, speed_words, warned
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ def line(run: Run) -> str:
     return f"{cut(run.name, 60)}: {words}; {listed(measured, 5)}"
 
 
-def page(run: Run) -> Page:
+def page(run: Run, angles: Angles = RADIANS) -> Page:
     """Return the findings, the run's length and rate, and each signal's count and range."""
     import numpy as np
 
@@ -32,8 +33,9 @@ def page(run: Run) -> Page:
     rows = []
     for name, values in run.signals.items():
         seen = values[np.isfinite(values)]
-        span = (number(float(seen.min())), number(float(seen.max()))) if seen.size else ("-", "-")
-        rows.append((name, COLUMNS.get(name, ""), str(seen.size), *span))
+        factor, unit = angles.of(COLUMNS.get(name, ""))
+        ends = (seen.min(), seen.max(), seen[-1]) if seen.size else (nan, nan, nan)
+        rows.append((name, unit, str(seen.size), *(number(factor * float(v)) for v in ends)))
     known = facts(
         "Statistics",
         (
@@ -43,7 +45,7 @@ def page(run: Run) -> Page:
             ("source", "" if run.source is None else str(run.source)),
         ),
     )
-    signals = Block("Signals", tuple(rows), ("", "unit", "measured", "least", "largest"), left=2)
+    signals = Block("Signals", tuple(rows), ("", "unit", "measured", "least", "largest", "last"), left=2)
     found = _findings(run)
     quiet = tuple(n.message for n in run.notes if n not in found)
     return Page(f"Run {cut(run.name, 60)}", warned(found), (known, signals), quiet)
@@ -97,7 +99,7 @@ def _speed(run: Run) -> float:
 
 def figures(run: Run) -> Figures:
     """Return the signals over time."""
-    return {"signals": sketch("run", run)}
+    return {"signals": sketch("run", run, line(run))}
 
 
 VIEW = View("run", line, page, frames, lambda run: run.name, figures, read)

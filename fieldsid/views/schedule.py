@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import Figures, Frames, View
 from fieldsid.figures.sketch import sketch
-from fieldsid.page import Block, Page, facts, listed
+from fieldsid.page import Block, Page
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import RADIANS, Angles, number
 from fieldsid.views._words import table
@@ -30,18 +30,8 @@ def line(schedule: Schedule) -> str:
 
 
 def page(schedule: Schedule) -> Page:
-    """Return the requirements, and a row of gains for each speed."""
-    known = facts(
-        "Statistics",
-        (
-            ("damping", number(schedule.damping, 3)),
-            ("phase margin", f"{number(schedule.phase_margin_deg, 3)} deg wished"),
-            ("effects", listed(schedule.provenance.get("effects", ()))),
-            ("law", str(schedule.provenance.get("law", ""))),
-            ("fins", "; ".join(schedule.fins_said)),
-        ),
-    )
-    return Page(f"Schedule of the {schedule.axis.value} axis, {schedule.kind}", (), (known, *blocks_of(schedule)))
+    """Return the main result, and a row of gains for each speed."""
+    return Page(f"Schedule of the {schedule.axis.value} axis: {line(schedule)}", (), tuple(blocks_of(schedule)))
 
 
 def blocks_of(schedule: Schedule, angles: Angles = RADIANS, neglected: Iterable[str] = ()) -> Iterator[Block | str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from fieldsid.display import Figures, Frames, View
 from fieldsid.figures.sketch import sketch
-from fieldsid.page import Block, Page, Whole, facts
+from fieldsid.page import Block, Page, Whole
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import number
 from fieldsid.views._words import table
@@ -26,19 +26,9 @@ def line(found: Verification) -> str:
 
 
 def page(found: Verification) -> Page:
-    """Return the worst of all, and what each speed comes to."""
-    worst = found.worst
-    least = facts(
-        "Least margins and most overshoot, over all speeds and the identified set",
-        (
-            ("phase margin", f"{worst['phase_margin_deg']:.1f} deg"),
-            ("gain margin", f"{_decibels(worst['gain_margin_db'])}"),
-            ("delay margin", f"{number(worst['delay_margin_s'], 3)} s"),
-            ("overshoot", f"{worst['overshoot_percent']:.1f} %"),
-        ),
-    )
-    title = f"Verification of the {found.schedule.axis.value} schedule, {found.schedule.kind}"
-    return Page(title, (), (least, *blocks_of(found)))
+    """Return the verdict, and what each speed comes to."""
+    title = f"Verification of the {found.schedule.axis.value} schedule, {found.schedule.kind}: {line(found)}"
+    return Page(title, (), tuple(blocks_of(found)))
 
 
 def blocks_of(found: Verification) -> Iterator[Block | str]:
@@ -114,10 +104,6 @@ def frames(found: Verification) -> Frames:
         "scheduled": lambda: table((body_of(c) for c in found.scheduled), "speed_m_s"),
         "constant": lambda: table((body_of(c) for c in found.constant), "speed_m_s"),
     }
-
-
-def _decibels(margin: float) -> str:
-    return "infinite" if margin == float("inf") else f"{margin:.1f} dB"
 
 
 def figures(found: Verification) -> Figures:

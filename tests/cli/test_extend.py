@@ -100,7 +100,7 @@ def test_keep_overrules_and_is_remembered(run_cli, straight, parent, tmp_path):
     out = tmp_path / "kept.yaml"
     answer = run_cli("extend", parent, *straight.train, "--add", "deadband", "--validate", straight.unseen, "--keep", "-o", out)
     assert answer.code == 0
-    assert "kept because of --keep: on unseen data it does not pay" in answer.out
+    assert "kept because of --keep: the error on unseen data goes from" in answer.out
     assert max(map(len, trial.below(answer.out))) <= 80
     assert load_model(out).info["extension"]["kept_by"] == "--keep"
 

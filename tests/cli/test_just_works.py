@@ -94,7 +94,7 @@ def test_what_is_made_of_its_model_reads_it_again(run_cli, tmp_path, monkeypatch
     models = tmp_path / "models"
     assert run_cli("identify", log, "--axis", "yaw", "--effects", "servo_lag", "-o", models, "--no-figures").code == 0
     model = str(next(models.glob("*.yaml")))
-    (run,) = runs_of_models(load_parameter_source([Path(model)]), pytest.fail)
+    (run,) = runs_of_models(load_parameter_source([Path(model)]))
     assert run.has("surge_m_s")
     (again,) = fs.identify(log, "yaw", effects="servo_lag")
     assert again.model.values["a22"] == pytest.approx(fs.load_model(model).values["a22"])

@@ -11,11 +11,12 @@ import pytest
 from fieldsid.cli.headlines.missing import Searched, headline_of_diagnosis, headline_of_extension
 from fieldsid.diagnosis.records import Candidate, Diagnosis, Errors, NextManeuver, Pair
 from fieldsid.extension.extend import Gain
+from fieldsid.extension.lineage import Parent
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.results.diagnoses import Applied, Diagnosed
-from fieldsid.results.extensions import Extended, LeftOver, MadeFrom
+from fieldsid.results.extensions import Extended, LeftOver
 
 SEARCHED = Searched((Path("a.csv"), Path("b.csv")), (Path("c.csv"),), Path("m.yaml"), thorough=False)
 
@@ -97,6 +98,6 @@ def extended(gain: Gain) -> Extended:
     """What an extension that is kept comes to."""
     return Extended(
         gain=gain, axis=Axis.YAW, log_evidence=9.0, pays=True, kept=True, kept_by="unseen", model="", effects=gain.added,
-        parent=MadeFrom("m.yaml", ""), coefficients={}, notes=(), left=LeftOver(1.0, 1.0, more_than_noise=False), next="",
+        parent=Parent(Path("m.yaml"), "", "intact"), coefficients={}, notes=(), left=LeftOver(1.0, 1.0, more_than_noise=False), next="",
         skipped_runs=(),
     )  # fmt: skip

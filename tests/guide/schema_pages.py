@@ -35,7 +35,7 @@ RESULTS: dict[str, tuple[type[Result], ...]] = {
     "turn-radius": (turning.TurnRadius,),
     "schedule design": (gains.Design,),
     "schedule verify": (gains.Verified,),
-    "schedule export": (gains.Exported, gains.Patched),
+    "schedule export": (gains.Exported,),
     "batch": (trial.Batch,),
     "demo": (trial.Demo,),
     "guide": (trial.Contents, trial.Topic),

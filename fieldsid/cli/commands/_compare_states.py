@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ from fieldsid.errors import UsageError
 from fieldsid.figures.sketch import sketch
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import own_kind
-from fieldsid.page import Block, Page, Whole, counted, written
+from fieldsid.page import Page, counted, written
 from fieldsid.views.change import blocks_of
 
 if TYPE_CHECKING:
@@ -65,7 +65,8 @@ def compare_states(old: Path, new: Path, output: Path | None, *, force: bool) ->
     if shared_logs:
         said = f"both sides were fitted to {', '.join(shared_logs)}: a difference is one of the models alone"
         notes.append(Note("shared_runs", said, {}))
-    page = Page("", blocks=tuple(b for c in changes for b in _blocks(c, title=c.change.axis.value if len(changes) > 1 else "")))
+    blocks = (b for c in changes for b in blocks_of(c.change, c.change.axis.value if len(changes) > 1 else ""))
+    page = Page("", blocks=tuple(blocks), closing=written(figure=[c.figure for c in changes if c.figure]))
     return emit(BeforeAfter(str(old), str(new), changes), render=page, headline=_headline(changes), notes=notes)
 
 
@@ -115,17 +116,15 @@ def _shared_logs(sides: Sequence[Side]) -> list[str]:
 
 def _change_of(sides: Sequence[Side], axis: str) -> Change:
     """Return what has changed in one axis, within the fin limits of the newer folder's vehicle, else of the older one's."""
-    from fieldsid.change.compare import compare_models
     from fieldsid.cli.user_effects import read_source
     from fieldsid.face.arguments import UNKNOWN
-    from fieldsid.schedule.linear_plant import FinLimits
+    from fieldsid.face.trial import compare_models
     from fieldsid.vehicle import find_vehicle
 
     before, after = (read_source(s.files[axis]) for s in sides)
     folders = [s.given if s.given.is_dir() else Path() for s in reversed(sides)]
     vehicle = next((v for f in (*folders, Path()) if (v := find_vehicle(f)) is not None), UNKNOWN)
-    stated = FinLimits(rate=vehicle.fin_rate_rad_s)
-    return compare_models(before, after, fin_limit=vehicle.fin_max_rad(axis), stated=stated)
+    return compare_models(before, after, vehicle=vehicle)
 
 
 def _next_command(found: Change, sides: Sequence[Side]) -> str | None:
@@ -149,8 +148,3 @@ def _inputs(model: Path) -> list[str]:
     from fieldsid.records.named_inputs import inputs_of
 
     return [str(p) for p in inputs_of(model)]
-
-
-def _blocks(axis_change: AxisChange, *, title: str) -> Iterator[Block | str]:
-    yield from blocks_of(axis_change.change, title)
-    yield from map(Whole, written(figure=axis_change.figure))

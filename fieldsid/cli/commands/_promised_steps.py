@@ -25,7 +25,6 @@ def compare_steps(gains: Path, runs: Sequence[Path], reading: Mapping[str, Any])
     is the only one: then raises DataError.
     """
     from fieldsid.change.promise import kept_steps
-    from fieldsid.cli.console import say
     from fieldsid.cli.inputs import read_runs
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.face.arguments import designed_from, runs_of_models
@@ -37,7 +36,7 @@ def compare_steps(gains: Path, runs: Sequence[Path], reading: Mapping[str, Any])
     schedule, skips = load_schedule(gains), Skips()
     source = load_parameter_source(designed_from(schedule, str(gains)))
     logs = read_runs(runs, models=source.paths, refused=skips.skip, **reading)
-    plants, compared_runs = plants_behind(schedule, source, runs_of_models(source, say)), 0
+    plants, compared_runs = plants_behind(schedule, source, runs_of_models(source)), 0
     steps: list[KeptStep] = []
     for run in logs:
         try:
@@ -56,11 +55,10 @@ def compare_steps(gains: Path, runs: Sequence[Path], reading: Mapping[str, Any])
 def _headline(gains: Path, models: Sequence[Path], runs: Sequence[Path], steps: Sequence[KeptStep]) -> Headline:
     from fieldsid.change.promise import worst_of
 
-    worst, (times, unit) = worst_of(steps), angles().of("rad")
+    worst, (_, unit) = worst_of(steps), angles().of("rad")
     broken = [s for s in steps if s.broken]
-    how = f"overshoot {100 * worst.flown.overshoot:.0f} % (at most {100 * worst.promised.overshoot_most:.0f} %), "
-    how += f"settled in {_seconds(worst.flown.settling)} ({_seconds(worst.promised.settling_most)}), "
-    how += f"steady error {times * abs(worst.flown.steady_error):.2g} {unit} ({times * worst.promised.off:.2g})"
+    overshoot, settled, steady = _cells(worst)
+    how = f"overshoot {overshoot} %, settled in {settled}, steady error {steady} {unit}"
     if broken:
         says = f"not as promised in {', '.join(worst.broken)}, {len(broken)} of {counted(len(steps), 'step')}: {worst.run} at "
         says += f"{worst.start:.1f} s, {how}"
@@ -68,6 +66,16 @@ def _headline(gains: Path, models: Sequence[Path], runs: Sequence[Path], steps: 
     else:
         says, next_ = f"as promised, {counted(len(steps), 'step')}: the worst has {how}", pasted("report")
     return Headline(says, f"{gains}; in brackets what 95 % of the draws of its models stay within", next_)
+
+
+def _cells(step: KeptStep) -> tuple[str, str, str]:
+    """Return overshoot (%), settling and steady error of a step, in brackets the most that was promised."""
+    flown, most, times = step.flown, step.promised, angles().of("rad")[0]
+    return (
+        f"{100 * flown.overshoot:.0f} ({100 * most.overshoot_most:.0f})",
+        f"{_seconds(flown.settling)} ({_seconds(most.settling_most)})",
+        f"{times * abs(flown.steady_error):.2g} ({times * most.off:.2g})",
+    )
 
 
 def _seconds(value: float) -> str:
@@ -82,9 +90,7 @@ def _page(steps: Sequence[KeptStep]) -> Page:
             f"{s.start:.1f}",
             f"{s.speed:.2f}",
             f"{times * s.size:.3g}",
-            f"{100 * s.flown.overshoot:.0f} ({100 * s.promised.overshoot_most:.0f})",
-            f"{_seconds(s.flown.settling)} ({_seconds(s.promised.settling_most)})",
-            f"{times * abs(s.flown.steady_error):.2g} ({times * s.promised.off:.2g})",
+            *_cells(s),
             ", ".join(s.broken) or "as promised",
         )
         for s in steps

@@ -6,8 +6,7 @@ import os
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from datetime import UTC, datetime
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,11 +18,9 @@ from fieldsid.cli.options import AxisOption, FigureFile, Force, MappingFile, Met
 from fieldsid.cli.session import draw_figure
 from fieldsid.figures.sketch import sketch
 from fieldsid.page import Page, written
-from fieldsid.rounding import number, with_error
 
 if TYPE_CHECKING:
     from fieldsid.batch.archive import Work
-    from fieldsid.batch.trend import Change, Drift, Trend
     from fieldsid.results.trial import Batch, NotUsed
 
 
@@ -146,30 +143,14 @@ def _unused_log(row: Mapping[str, Any]) -> NotUsed:
 
 
 def _page(result: Batch) -> Page:
+    from fieldsid.figures.trend import lines_of
+
     reasons: dict[str, list[str]] = {}  # messages, by their text without the names of file and run
     for row in result.skipped_runs:
         reasons.setdefault(row.what.replace(row.file, "").replace(row.run, ""), []).append(row.what)
-    lines = [line for t in result.trend for line in _trend_lines(t)]
+    lines = [line for t in result.trend for line in lines_of(t)]
     shown = [(messages[0], len(messages) - 1) for messages in list(reasons.values())[:MOST_REASONS]]
     lines += [f"not used: {message}" + (f"; the same of {more} more" if more else "") for message, more in shown]
     if len(reasons) > MOST_REASONS:
         lines.append(f"and for {len(reasons) - MOST_REASONS} other reasons: see the column `what`")
     return Page("", closing=(*lines, *written(table=f"{result.table} and {result.csv}", figure=result.figure)))
-
-
-def _trend_lines(trend: Trend) -> Iterator[str]:
-    """Yield a line for each date at which a parameter changed, or for its drift, with the amount."""
-    for c in trend.changes:
-        yield f"{trend.name} changed by {_amount(trend, c)} on {c.start_utc[:10]}, from `{c.run}` on"
-    if trend.drift is not None:
-        first, last = (datetime.fromtimestamp(t, UTC).date().isoformat() for t in trend.start[[0, -1]].tolist())
-        yield f"{trend.name} drifted by {_amount(trend, trend.drift)} from {first} to {last}, little by little"
-    elif not trend.changes:
-        yield f"{trend.name}: no change beyond errors and scatter in {trend.runs} runs"
-
-
-def _amount(trend: Trend, change: Change | Drift) -> str:
-    """Return a change with its standard error in per cent, in its unit where the value before was zero."""
-    if not change.before:
-        return f"{number(change.after - change.before, 2)} {trend.name}"
-    return f"{with_error(100.0 * change.share, 100.0 * change.std_error / abs(change.before))} %"

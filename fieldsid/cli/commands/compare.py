@@ -12,16 +12,16 @@ import typer
 from fieldsid.cli.console import complain, emit
 from fieldsid.cli.inputs import fitted_to
 from fieldsid.cli.options import FigurePlace, Figures, Force, FromS, MappingFile, ToS, argument, option
-from fieldsid.cli.progress import get_ready, refuse_place
+from fieldsid.cli.progress import refuse_place
 from fieldsid.cli.session import draw_figures
 from fieldsid.cli.voice import angles
 from fieldsid.errors import UsageError
 from fieldsid.figures.sketch import sketch
 from fieldsid.logs.several.run_names import short_names
 from fieldsid.page import Block, Page, Whole, written
-from fieldsid.rounding import number, number_against
+from fieldsid.rounding import DEGREES, number, number_against
 from fieldsid.views._words import merit_blocks
-from fieldsid.views.comparison import MOST_PLACES, blocks_of
+from fieldsid.views.comparison import MOST_PLACES, blocks_of, verdict
 
 if TYPE_CHECKING:
     from fieldsid.comparison.compare import Comparison
@@ -81,9 +81,8 @@ def command(
     if len(sides) > 1 and (not others or any(p.is_dir() for p in sides)):
         given = ", ".join(str(p) for p in (*sides, *others))
         raise UsageError("several models are compared over runs", found=given, hint="sysid compare M1.yaml M2.yaml RUN")
-    from fieldsid.cli.inputs import files_of, model_first, read_runs
+    from fieldsid.cli.inputs import files_of, model_first, read_ready
     from fieldsid.cli.skipped_logs import Skips
-    from fieldsid.cli.user_effects import check_effects
     from fieldsid.models.model import load_model
     from fieldsid.models.record import left_out
 
@@ -93,9 +92,8 @@ def command(
     if len({m.axis for m in models}) > 1:
         present = ", ".join(f"{p.name}: {m.axis.value}" for p, m in zip(paths, models, strict=True))
         raise UsageError("the models are not of one axis", found=present, hint="compare those of one axis")
-    skips, ready = Skips(), partial(get_ready, "fieldsid.comparison.compare")
-    effects = partial(check_effects, list(zip(paths, models, strict=True)))
-    logs = read_runs(runs, models=paths, check=effects, meanwhile=ready, refused=skips.skip, **reading)
+    skips, known = Skips(), dict(zip(paths, models, strict=True))
+    (logs,) = read_ready([runs], skips, "fieldsid.comparison.compare", known, **reading)
     from fieldsid.comparison.compare import compare
     from fieldsid.records.named_inputs import inputs_of
     from fieldsid.results.comparisons import Compared, compared_run
@@ -111,7 +109,7 @@ def command(
         body = emit(several, render=page, headline=headline, notes=notes)
         _gate([run for m in body["models"] for run in m["runs"]], min_fit)
         return skips.end(body, len(found))
-    plots = {f"{model.stem}_on_{c.run}": sketch("compare", c, models[0], model.name) for c in found}
+    plots = {f"{model.stem}_on_{c.run}": sketch("compare", c, f"{model.name} on {verdict([c], DEGREES)}") for c in found}
     drawn: Sequence[str | None] = draw_figures(output, plots, force=force) or [None] * len(found)
     compared = tuple(compared_run(c, file, fitted[0]) for c, file in zip(found, drawn, strict=True))
     axis, skipped = models[0].axis, tuple(skips.records)

@@ -4,23 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from fieldsid.cli import options
 from fieldsid.cli.console import emit
-from fieldsid.cli.options import (
-    ExcitedAxis,
-    FigureFile,
-    Force,
-    MappingFile,
-    OutputFile,
-    RunFiles,
-    ValidateRuns,
-    flag,
-    option,
-)
-from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, refuse_figure, trying
+from fieldsid.cli.progress import compiling_first, refuse_existing, refuse_figure, trying
 from fieldsid.cli.session import draw_figure
 from fieldsid.cli.voice import angles
 from fieldsid.display import page_of
@@ -39,20 +28,20 @@ if TYPE_CHECKING:
 
 
 def command(
-    runs: RunFiles,
-    axis: ExcitedAxis = None,
-    validate: ValidateRuns = None,
-    model: Annotated[Path | None, option("--model", "MODEL", "A model whose effects are known already.")] = None,
-    mapping: MappingFile = None,
-    output: OutputFile = None,
-    figure: FigureFile = None,
+    runs: options.RunFiles,
+    axis: options.ExcitedAxis = None,
+    validate: options.ValidateRuns = None,
+    model: Annotated[Path | None, options.option("--model", "MODEL", "A model whose effects are known already.")] = None,
+    mapping: options.MappingFile = None,
+    output: options.OutputFile = None,
+    figure: options.FigureFile = None,
     thorough: Annotated[
-        bool, flag("--thorough", "Go on for as long as there is something to try, half a minute where much is left.")
+        bool, options.flag("--thorough", "Go on for as long as there is something to try, half a minute where much is left.")
     ] = False,
     apply: Annotated[
-        bool, flag("--apply", "Add what is named, an effect at a time, each a model in `models/` with its errors.")
+        bool, options.flag("--apply", "Add what is named, an effect at a time, each a model in `models/` with its errors.")
     ] = False,
-    force: Force = False,
+    force: options.Force = False,
 ) -> Mapping[str, Any]:
     """Say which physical effect the model is missing, how sure that is, and what else it could be.
 
@@ -62,19 +51,14 @@ def command(
 
     Example: sysid diagnose runs/pulses_*.parquet --axis yaw --validate runs/zigzag.parquet
     """
-    from fieldsid.cli.inputs import AXIS_OPTION, files_of, mapping_behind, read_groups
+    from fieldsid.cli.inputs import AXIS_OPTION, files_of, mapping_behind, read_ready
     from fieldsid.cli.skipped_logs import Skips
-    from fieldsid.cli.user_effects import check_effects
 
     refuse_existing(output, force=force)
     refuse_figure(figure, force=force)
     known = _known_model(model, axis)
-    skips, ready = Skips(), partial(get_ready, "fieldsid.diagnosis")
-    check = partial(check_effects, [(model, known)] if model and known else [])
-    models = [model] if model else []
-    training, unseen = read_groups(
-        [runs, validate or []], mapping=mapping, models=models, check=check, meanwhile=ready, refused=skips.skip
-    )
+    skips, models = Skips(), {model: known} if model else {}
+    training, unseen = read_ready([runs, validate or []], skips, "fieldsid.diagnosis", models, mapping=mapping)
     from fieldsid.diagnosis import diagnose
     from fieldsid.face.arguments import axis_excited
     from fieldsid.results.diagnoses import Diagnosed
@@ -92,11 +76,8 @@ def command(
         known=() if known is None else known.effects,
         skipped_runs=tuple(skips.records),
     )
-    result = replace(
-        result,
-        file=_save_diagnosis(result, output, [*logs, *models], force=force),
-        figure=draw_figure(figure, found.plot, force=force),
-    )
+    file = _save_diagnosis(result, output, [*logs, *models], force=force)
+    result = replace(result, file=file, figure=draw_figure(figure, found.plot, force=force))
     if apply:
         used = mapping or mapping_behind(models, logs)
         result = replace(result, applied=_add_effects(found, (known, model), training, unseen, used, force=force))

@@ -13,21 +13,18 @@ from fieldsid.cli.headlines.missing import headline_of_extension, headline_of_un
 from fieldsid.cli.headlines.typed import pasted, repeated
 from fieldsid.cli.headlines.words import next_use
 from fieldsid.cli.options import Force, MappingFile, ModelFile, OutputFile, ValidateRuns, argument, flag, option
-from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, trying
+from fieldsid.cli.progress import compiling_first, refuse_existing, trying
 from fieldsid.cli.skipped_logs import Skips
 from fieldsid.cli.voice import angles
 from fieldsid.comparison.sufficient import is_noise
+from fieldsid.display import page_of
 from fieldsid.errors import ArtifactError, UsageError
-from fieldsid.page import Block, Page, paragraph, written
-from fieldsid.rounding import at_its_bound, number, with_error
+from fieldsid.page import Page, paragraph, written
 
 if TYPE_CHECKING:
     from fieldsid.extension.extend import Extension
     from fieldsid.models.model import Model
     from fieldsid.results.extensions import AddedCoefficient, Extended, LeftOver
-
-MUCH, SMALL = 100.0, 1e-3
-"""A coefficient is not determined where its standard error exceeds MUCH times its value, or MUCH * SMALL."""
 
 
 def command(
@@ -56,7 +53,7 @@ def command(
                 "`--undo` takes the model alone", found="runs or other options with it", hint=f"sysid extend {model} --undo"
             )
         return _restore_parent(model, output, force=force)
-    from fieldsid.cli.inputs import files_of, mapping_behind, model_first, read_groups
+    from fieldsid.cli.inputs import files_of, mapping_behind, model_first, read_ready
     from fieldsid.face.arguments import names_of
     from fieldsid.models.model import load_model
 
@@ -68,14 +65,12 @@ def command(
     skips, validate = Skips(), validate or []
     known, names = load_model(path), list(dict.fromkeys(n for given in add or [] for n in names_of(given)))
     targets = step_files(path, names, output, force=force) if names else []
-    check, ready = partial(_check_request, path, known, names), partial(get_ready, "fieldsid.extension.extend")
-    training, unseen = read_groups(
-        [runs, validate], mapping=mapping, models=[path], check=check, meanwhile=ready, refused=skips.skip
-    )
+    check, module = partial(_check_request, known, names), "fieldsid.extension.extend"
+    training, unseen = read_ready([runs, validate], skips, module, {path: known}, check=check, mapping=mapping)
     from fieldsid.extension.extend import extend_in_steps, whole_of
-    from fieldsid.extension.lineage import kept_by, save_steps
+    from fieldsid.extension.lineage import INTACT, Parent, kept_by, save_steps
     from fieldsid.records.named_inputs import sha256_of
-    from fieldsid.results.extensions import Extended, MadeFrom
+    from fieldsid.results.extensions import Extended
 
     with compiling_first(), trying("extending") as report:
         steps = extend_in_steps(known, names, training, unseen, report=report, unfit=skips.skip)
@@ -96,14 +91,14 @@ def command(
         kept_by=kept_by(found) if kept else None,
         model=str(now),
         effects=found.model.effects if kept else known.effects,
-        parent=MadeFrom(str(path), sha256_of(path)),
+        parent=Parent(path, sha256_of(path), INTACT),
         coefficients=_coefficients(found),
         notes=found.notes,
         left=left,
         next=next_,
         skipped_runs=tuple(skips.records),
     )
-    body = emit(result, render=_page(result), headline=headline_of_extension(result), notes=result.notes)
+    body = emit(result, render=_page(result, found), headline=headline_of_extension(result), notes=result.notes)
     return skips.end(body, len(runs) + len(validate) - len(skips.records))
 
 
@@ -120,12 +115,10 @@ def step_files(parent: Path, effects: Sequence[str], last: Path | None = None, *
     return files
 
 
-def _check_request(path: Path, model: Model, names: Sequence[str]) -> None:
+def _check_request(model: Model, names: Sequence[str]) -> None:
     """Raise an error for an effect that is unknown, of the other axis, or in the model already."""
-    from fieldsid.cli.user_effects import check_effects
     from fieldsid.extension.extend import new_effects
 
-    check_effects([(path, model)])
     new_effects(model, names)
 
 
@@ -191,32 +184,6 @@ def _restore_parent(path: Path, output: Path | None, *, force: bool) -> Mapping[
     return emit(undone, render=page, headline=headline_of_undoing(undone))
 
 
-def _page(result: Extended) -> Page:
-    from fieldsid.views.extension import errors
-
-    found = tuple(
-        (name, _value(factor * c.value, factor * c.std_error, at_bound=c.at_bound), unit)
-        for name, c in result.coefficients.items()
-        for factor, unit in [angles().of(c.unit)]
-    )
-    coefficients = Block("", found, ("coefficient", "value", "unit"), left=2)
-    says = paragraph([_verdict(result), left_in_words(result.left)])
-    return Page("", blocks=(errors(result.gain, angles()), coefficients, *says), closing=written(model=result.model))
-
-
-def _verdict(result: Extended) -> str:
-    unseen = result.gain.unseen
-    if result.pays:
-        return f"kept: {'it predicts better what it has not seen' if unseen else 'the evidence pays for it'}"
-    data = "unseen data" if unseen else "the evidence"
-    if result.kept:
-        return f"kept because of --keep: on {data} it does not pay"
-    return f"not kept: on {data} it does not pay; nothing was written, --keep overrules"
-
-
-def _value(value: float, error: float, *, at_bound: bool) -> str:
-    """Return a value with its standard error, or why it has none: it is at its bound, or the data do not determine it."""
-    if at_bound:
-        return at_its_bound(value)
-    known = error < MUCH * max(abs(value), SMALL)
-    return with_error(value, error) if known else f"{number(value)} (these data do not tell)"
+def _page(result: Extended, found: Extension) -> Page:
+    blocks = (*page_of(found, angles()).blocks, *paragraph([left_in_words(result.left)]))
+    return Page("", blocks=blocks, closing=written(model=result.model))

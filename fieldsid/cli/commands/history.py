@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import zip_longest
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.cli.console import emit, say
@@ -11,14 +11,13 @@ from fieldsid.cli.options import FigureFile, Force, ModelFile
 from fieldsid.cli.progress import refuse_figure
 from fieldsid.cli.session import draw_figure
 from fieldsid.cli.voice import angles
+from fieldsid.figures.bars import fall
 from fieldsid.figures.sketch import sketch
 from fieldsid.logs.run import Note
-from fieldsid.page import Block, Page, Whole, paragraph, written
-from fieldsid.rounding import number
-from fieldsid.views.extension import channels_of
+from fieldsid.page import Page, Whole, written
+from fieldsid.views.extension import errors
 
 if TYPE_CHECKING:
-    from fieldsid.extension.extend import Gain
     from fieldsid.extension.lineage import Generation, Step
     from fieldsid.results.extensions import History
 
@@ -77,27 +76,15 @@ def _notes(line: Sequence[Generation]) -> list[Note]:
 
 
 def _page(result: History, steps: Sequence[Step]) -> Page:
+    """Return where the line starts, and the errors before and after each addition."""
     first = result.generations[0]
-    added = [row for step in steps for row in _rows(step.gain)]
-    reasons = []
-    for step in steps:
-        judged = ("judged on " if step.gain.unseen else "fitted to ") + ", ".join(step.gain.judged_on)
-        reasons.append(f"+ {', '.join(step.gain.added)}: {KEPT.get(step.kept_by, step.kept_by)}; {judged}")
-    blocks: tuple[Block | str, ...] = (
-        Whole(f"starts from {', '.join(first.effects) or 'the plain model'}: {first.path}"),
-        Block("", tuple(added), ("added", "error of", "before", "after", "noise", "x floor"), left=2),
-        *paragraph(reasons, Whole),
-    )
-    return Page("", blocks=blocks, closing=written(model=result.model, figure=result.figure))
+    starts = Whole(f"starts from {', '.join(first.effects) or 'the plain model'}: {first.path}")
+    blocks = (replace(errors(step.gain, angles()), title=_reason(step)) for step in steps)
+    return Page("", blocks=(starts, *blocks), closing=written(model=result.model, figure=result.figure))
 
 
-def _rows(gain: Gain) -> Iterator[tuple[str, ...]]:
-    """Yield a row for each channel of one addition; the first row has the pooled error over the noise floor too."""
-    judged = "unseen" if gain.unseen else "fitted"
-    channels = [r for r in channels_of(gain) if r["runs"] == judged]
-    over = f"{gain.over_floor[0]:.2f} -> {gain.over_floor[1]:.2f}"
-    for name, r in zip_longest((f"+ {n}" for n in gain.added), channels, fillvalue=None):
-        times, unit = angles().of(r["unit"]) if r else (1.0, "")
-        errors = [number(times * r[k], 3) if r else "" for k in ("before", "after", "noise_floor")]
-        yield name or "", f"{r['channel']}, {unit}" if r else "", *errors, over
-        over = ""
+def _reason(step: Step) -> str:
+    """Return what was added, how the error fell, why it was kept, and what it was judged on."""
+    gain = step.gain
+    judged = ("judged on " if gain.unseen else "fitted to ") + ", ".join(gain.judged_on)
+    return f"+ {', '.join(gain.added)}: {KEPT.get(step.kept_by, step.kept_by)}; {judged}; {fall([gain], angles())}"

@@ -3,31 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from fieldsid.cli import options
 from fieldsid.cli.console import emit, one_of_each_kind, progress
-from fieldsid.cli.options import (
-    Bandwidth,
-    EffectNames,
-    ExcitedAxis,
-    Figures,
-    Force,
-    FromS,
-    MappingFile,
-    Method,
-    OutputDir,
-    RunFiles,
-    ToS,
-    VehicleFile,
-    flag,
-    option,
-)
-from fieldsid.cli.progress import compiling_first, get_ready, refuse_closed
+from fieldsid.cli.progress import compiling_first, refuse_closed
 from fieldsid.cli.session import draw_figures
 from fieldsid.cli.voice import angles
+from fieldsid.display import line_of
 from fieldsid.figures.sketch import sketch
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import ShortNames, short_names
@@ -44,21 +29,23 @@ MOST_DRAWN = 6
 
 
 def command(
-    runs: RunFiles,
-    axis: ExcitedAxis = None,
-    method: Method = "auto",
-    effects: EffectNames = None,
-    joint: Annotated[bool, flag("--joint", "One model for all runs: damping and trim shared, authority by speed.")] = False,
-    whole: Annotated[bool, flag("--whole", "Use whole runs, not only the part that excites the axis.")] = False,
-    start: FromS = None,
-    end: ToS = None,
-    bandwidth: Bandwidth = 4.0,
-    forgetting: Annotated[float, option("--forgetting", "", "Forgetting factor of svf_rls.", min=0.5, max=1.0)] = 1.0,
-    mapping: MappingFile = None,
-    vehicle: VehicleFile = None,
-    output: OutputDir = None,
-    figures: Figures = True,
-    force: Force = False,
+    runs: options.RunFiles,
+    axis: options.ExcitedAxis = None,
+    method: options.Method = "auto",
+    effects: options.EffectNames = None,
+    joint: Annotated[
+        bool, options.flag("--joint", "One model for all runs: damping and trim shared, authority by speed.")
+    ] = False,
+    whole: Annotated[bool, options.flag("--whole", "Use whole runs, not only the part that excites the axis.")] = False,
+    start: options.FromS = None,
+    end: options.ToS = None,
+    bandwidth: options.Bandwidth = 4.0,
+    forgetting: options.Forgetting = 1.0,
+    mapping: options.MappingFile = None,
+    vehicle: options.VehicleFile = None,
+    output: options.OutputDir = None,
+    figures: options.Figures = True,
+    force: options.Force = False,
 ) -> Mapping[str, Any]:
     """Identify the yaw or pitch model of each run, or one model of all of them.
 
@@ -68,12 +55,12 @@ def command(
 
     Example: sysid identify runs/*.parquet --axis yaw -o models/
     """
-    from fieldsid.cli.inputs import AXIS_OPTION, files_of, read_runs
+    from fieldsid.cli.inputs import AXIS_OPTION, files_of, read_ready
     from fieldsid.cli.skipped_logs import Skips
 
     refuse_closed(output)
-    skips, ready = Skips(), partial(get_ready, "fieldsid.fitting.identify")
-    known = read_runs(runs, mapping=mapping, start=start, end=end, meanwhile=ready, refused=skips.skip)
+    skips = Skips()
+    (known,) = read_ready([runs], skips, "fieldsid.fitting.identify", {}, mapping=mapping, start=start, end=end)
     from fieldsid.face.arguments import axis_excited, names_of, vehicle_of
     from fieldsid.fitting.identify import check_joint, identify
     from fieldsid.fitting.problem.estimator import Options
@@ -127,7 +114,7 @@ def _plots(fit: Fit) -> dict[str, Callable[[], Any]]:
     plots, stem = {}, _stem(fit)
     for i in _runs_to_draw(fit):
         name = stem if len(fit.predictions) == 1 else f"{stem}_{fit.predictions[i].record.name}"
-        plots[name] = sketch("identify", fit, i)
+        plots[name] = sketch("identify", fit, i, line_of(fit))
         plots[f"{name}_residuals"] = sketch("identify", fit, i, draw="residual_figure")
     if fit.history is not None:
         plots[f"{stem}_over_time"] = sketch("identify", fit, fit.history, draw="history_figure")

@@ -6,11 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from fieldsid.cli.options import Force, Join, LogAndTables, MappingFile, MsgPath, option
-from fieldsid.page import Block
+from fieldsid.page import Block, Page, Whole, paragraph
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fieldsid.logs.inspection import Inspection
     from fieldsid.results.logs import Inspected
 
@@ -41,23 +39,20 @@ def command(
     written = write_proposal(found, write_mapping, force=force) if write_mapping is not None else None
     result = inspected(found, written)
     headline = headline_of_inspection(result, mapping)
-    emit(result, render=lambda to: _render(found, result, to), headline=headline)
+    emit(result, render=_page(found, result), headline=headline)
 
 
-def _render(found: Inspection, result: Inspected, to: Console) -> None:
-    from fieldsid.cli.console import table, words
+def _page(found: Inspection, result: Inspected) -> Page:
     from fieldsid.cli.headlines.logs import PROOF
 
-    rows = tuple((c.name, c.type, str(c.count), c.rate, c.holds) for c in result.shown)
-    to.print(table(Block("", rows, ("channel", "type", "samples", "Hz", "holds"), left=2)))
-    if result.more_channels:
-        to.print(f"and {result.more_channels} more channels")
+    channels = tuple((c.name, c.type, str(c.count), c.rate, c.holds) for c in result.shown)
+    more = f"and {result.more_channels} more channels" if result.more_channels else ""
     kind = "canonical names, none is needed" if found.needs_none else "proposed"
-    parts = [(f"mapping ({kind})", found.yaml().rstrip().split("\n"))]
-    parts += [("why these", lines)] if (lines := [f"- {n.message}" for n in found.notes if n.code == PROOF]) else []
-    parts += [("findings", [f"- {n.message} [{n.code}]" for n in found.notes if n.code != PROOF] or ["- none"])]
-    for title, lines in parts:
-        to.print()
-        to.print(words(title, "bold"))
-        for line in lines:
-            to.print(line)
+    parts = (
+        (f"mapping ({kind})", found.yaml().rstrip().split("\n")),
+        ("why these", [f"- {n.message}" for n in found.notes if n.code == PROOF]),
+        ("findings", [f"- {n.message} [{n.code}]" for n in found.notes if n.code != PROOF] or ["- none"]),
+    )
+    said = (s for title, lines in parts if lines for s in paragraph([title, *lines], Whole if lines is parts[0][1] else str))
+    heads = ("channel", "type", "samples", "Hz", "holds")
+    return Page("", blocks=(Block("", channels, heads, left=2), more, *said))

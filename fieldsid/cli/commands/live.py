@@ -16,7 +16,7 @@ import typer
 from fieldsid.cli.console import emit, out, say
 from fieldsid.cli.exit_codes import GATE_FAILED
 from fieldsid.cli.live.feed import Feed
-from fieldsid.cli.options import AxisOption, Bandwidth, MappingFile, VehicleFile, argument, flag, option
+from fieldsid.cli.options import AxisOption, Bandwidth, Forgetting, MappingFile, VehicleFile, argument, flag, option
 from fieldsid.cli.voice import voice
 from fieldsid.errors import UsageError
 
@@ -60,7 +60,7 @@ def command(
     diagnose: Annotated[bool, flag("--diagnose", "Diagnose what was flown whenever a maneuver ends.", SECOND_PROCESS)] = False,
     vehicle: VehicleFile = None,
     bandwidth: Bandwidth = 4.0,
-    forgetting: Annotated[float, option("--forgetting", "", "Forgetting factor; 1 forgets nothing.", min=0.5, max=1.0)] = 1.0,
+    forgetting: Forgetting = 1.0,
     mapping: MappingFile = None,
 ) -> Mapping[str, Any]:
     """Identify while the vehicle flies, sample by sample, and say when there is enough data.

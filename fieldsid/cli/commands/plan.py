@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from fieldsid.cli.console import emit, progress, say
-from fieldsid.cli.options import LIMITS, WRITTEN, Figures, Force, OutputDir, VehicleFile, flag, option
+from fieldsid.cli.options import LIMITS, WRITTEN, Figures, Force, OutputDir, Text, VehicleFile, flag, option
 from fieldsid.cli.progress import compiling, refuse_closed, refuse_existing
 from fieldsid.cli.session import draw_figure
 from fieldsid.cli.voice import angles
@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from fieldsid.models.model import Noise
     from fieldsid.planning.design.leg import Expected
     from fieldsid.planning.design.plan import Plan
-
-Text = str | None
-
 
 GOAL, FLOWN, KNOWN = "What to learn", "How it is flown", "What is known before"
 """Groups of the options that only this command has, on its page of help."""
@@ -38,13 +35,7 @@ def command(
     model: Annotated[Path | None, option("--model", "YAML", "What is known before: a model or a prior file.", KNOWN)] = None,
     prior: Annotated[Text, option("--prior", "NAME", "A prior that is shipped, torpedo where no model is given.", KNOWN)] = None,
     want: Annotated[
-        Text,
-        option(
-            "--want",
-            "a22=5%,..",
-            "Standard errors to reach at every speed, in shares of the value; of the trim, in shares of full fin.",
-            GOAL,
-        ),
+        Text, option("--want", "a22=5%,..", "Standard errors to reach, in shares of the value; the trim's of full fin.", GOAL)
     ] = None,
     minutes: Annotated[float | None, option("--minutes", "MIN", "Time there is for all legs, turns included.", LIMITS)] = None,
     area: Annotated[Text, option("--area", "LxW", "Length along the leg and width across it, m.", LIMITS)] = None,
@@ -220,18 +211,16 @@ def _largest_excursions(excursions: Mapping[str, float], factor: float) -> tuple
 
 
 def _expected_cells(e: Expected, passes: int) -> tuple[str, str, str, str]:
-    """Return a parameter's expected value, its standard error, that of the worst draws, and the time the paper's pulses need."""
+    """Return a parameter's expected value, its standard error, that of the worst draws, and the time the paper's pulses need.
+
+    That is the flying time for the same standard error, as a multiple of the maneuver's.
+    """
     from fieldsid.planning.design.leg import error_in_words
 
+    value, pulses = with_error(e.value, e.std_error), "-"
     if not isfinite(e.std_error):  # the maneuver does not excite it
-        return with_error(e.value, e.std_error), "-", "-", _pulses_need(e.baseline, e.std_error, passes)
+        return value, "-", "-", pulses
+    if isfinite(e.baseline) and e.baseline > 0 and e.std_error > 0:
+        pulses = f"{(e.baseline / e.std_error) ** 2 / passes:.1f} x"
     at_worst = error_in_words(e.value, e.std_error_high, e.relative * e.std_error_high / e.std_error)
-    error = error_in_words(e.value, e.std_error, e.relative)
-    return with_error(e.value, e.std_error), error, at_worst, _pulses_need(e.baseline, e.std_error, passes)
-
-
-def _pulses_need(baseline: float, std_error: float, passes: int) -> str:
-    """Return the flying time of the paper's pulses for the same standard error, as a multiple of the maneuver's."""
-    if not (isfinite(baseline) and isfinite(std_error) and baseline > 0 and std_error > 0):
-        return "-"
-    return f"{(baseline / std_error) ** 2 / passes:.1f} x"
+    return value, error_in_words(e.value, e.std_error, e.relative), at_worst, pulses

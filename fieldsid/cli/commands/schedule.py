@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, print_file, say
+from fieldsid.cli.console import emit, print_file
 from fieldsid.cli.headlines.gains import (
     caveat_of_loops,
     headline_of_design,
@@ -17,7 +17,20 @@ from fieldsid.cli.headlines.gains import (
     headline_of_patch,
     headline_of_verification,
 )
-from fieldsid.cli.options import LIMITS, Force, ModelFiles, OutputFile, OwnLaw, VehicleFile, argument, flag, option
+from fieldsid.cli.options import (
+    LIMITS,
+    FinMax,
+    Force,
+    ModelFiles,
+    OutputFile,
+    OwnLaw,
+    Speeds,
+    Text,
+    VehicleFile,
+    argument,
+    flag,
+    option,
+)
 from fieldsid.cli.progress import refuse_existing, refuse_figure
 from fieldsid.cli.session import draw_figure
 from fieldsid.cli.voice import angles
@@ -46,46 +59,30 @@ TARGETS = ", ".join(m.name for m in iter_modules([str(Path(__file__).parents[2] 
 def design(
     models: ModelFiles,
     controller: Annotated[
-        str | None, option("--controller", "KIND", "p, pd, pi, pid or lqr; pd where the runs have a rate, else p.")
+        Text, option("--controller", "KIND", "p, pd, pi, pid or lqr; pd where the runs have a rate, else p.")
     ] = None,
     settling: Annotated[
-        str | None,
-        option("--settling", "TIME", "Settle within this, `4s`, or `quickest`; if not given as the slowest speed can.", RESPONSE),
+        Text, option("--settling", "TIME", "Settle within this, `4s`, or `quickest`; else as the slowest speed can.", RESPONSE)
     ] = None,
-    bandwidth: Annotated[str | None, option("--bandwidth", "RATE", "Bandwidth in place of a time, `1rad/s`.", RESPONSE)] = None,
-    overshoot: Annotated[str | None, option("--overshoot", "SHARE", "The most overshoot, `10%`.", RESPONSE)] = None,
+    bandwidth: Annotated[Text, option("--bandwidth", "RATE", "Bandwidth in place of a time, `1rad/s`.", RESPONSE)] = None,
+    overshoot: Annotated[Text, option("--overshoot", "SHARE", "The most overshoot, `10%`.", RESPONSE)] = None,
     step: Annotated[
-        str | None,
-        option("--step", "ANGLE", "The error that may ask for the whole fin: 20 deg of yaw, 10 of pitch if not given.", RESPONSE),
+        Text, option("--step", "ANGLE", "The error that may ask for the whole fin; else 20 deg of yaw, 10 of pitch.", RESPONSE)
     ] = None,
-    fin_use: Annotated[str | None, option("--fin-use", "SHARE", "Of the fin that step may ask for, `80%`.", RESPONSE)] = None,
+    fin_use: Annotated[Text, option("--fin-use", "SHARE", "Of the fin that step may ask for, `80%`.", RESPONSE)] = None,
     damping: Annotated[
         float | None, option("--damping", "", "Damping ratio of the loop: that of the overshoot, else 0.7071.", RESPONSE)
     ] = None,
     phase_margin: Annotated[str, option("--phase-margin", "ANGLE", "Phase margin to keep, `45deg`.", RESPONSE)] = "45deg",
-    speeds: Annotated[
-        str | None, option("--speeds", "LIST", "Speeds of the rows, m/s; those of the models if not given.")
-    ] = None,
-    fin_limit: Annotated[
-        str | None,
-        option(
-            "--fin-max",
-            "ANGLE",
-            "Largest fin angle, `15deg`; if not given the vehicle's limit, else the models' largest.",
-            LIMITS,
-        ),
-    ] = None,
+    speeds: Speeds = None,
+    fin_limit: FinMax = None,
     fin_rate: Annotated[
-        str | None, option("--fin-rate", "ANGLE", "Fastest fin per s; the vehicle's or model's if not given.", LIMITS)
+        Text, option("--fin-rate", "ANGLE", "Fastest fin per s; the vehicle's or model's if not given.", LIMITS)
     ] = None,
-    fin_lag: Annotated[
-        str | None, option("--fin-lag", "TIME", "Time constant, `0.2s`; the model's if not given.", LIMITS)
-    ] = None,
-    delay: Annotated[
-        str | None, option("--delay", "TIME", "Dead time from command to fin; the model's if not given.", LIMITS)
-    ] = None,
+    fin_lag: Annotated[Text, option("--fin-lag", "TIME", "Time constant, `0.2s`; the model's if not given.", LIMITS)] = None,
+    delay: Annotated[Text, option("--delay", "TIME", "Dead time from command to fin; the model's if not given.", LIMITS)] = None,
     latency: Annotated[
-        str | None, option("--latency", "TIME", "The autopilot's own, sensor to command, with half its period.", LIMITS)
+        Text, option("--latency", "TIME", "The autopilot's own, sensor to command, with half its period.", LIMITS)
     ] = None,
     depth: Annotated[bool, flag("--depth", "Add the depth loop above pitch.")] = False,
     law: OwnLaw = None,
@@ -105,42 +102,38 @@ def design(
     from fieldsid.angles import FASTEST_FIN, FIN, FIN_RATE, HEADING, TILT, parse_angle, parse_margin
     from fieldsid.cli.inputs import models_among
     from fieldsid.cli.user_effects import read_source
-    from fieldsid.face.arguments import fin_limit_of, fins_of, runs_of_models, vehicle_of
-    from fieldsid.face.quantities import BANDWIDTH, parse_quantity, parse_share
-    from fieldsid.face.speeds import speeds_of
+    from fieldsid.face.arguments import vehicle_of
+    from fieldsid.face.gains import design_schedule
+    from fieldsid.face.quantities import BANDWIDTH, given, parse_quantity, parse_share, parse_time
     from fieldsid.results.gains import Design
-    from fieldsid.schedule.linear_plant import FinLimits
-    from fieldsid.schedule.make import design_schedule, usual_controller
     from fieldsid.schedule.record import save_schedule
     from fieldsid.schedule.verdict import left_out_of
-    from fieldsid.schedule.wish import QUICKEST, Wish
+    from fieldsid.schedule.wish import QUICKEST
 
     refuse_existing(output, force=force)
-    given = None if fin_limit is None else parse_angle(fin_limit, "--fin-max", FIN)
-    known = vehicle_of(vehicle)
-    fastest = known.fin_rate_rad_s if fin_rate is None else parse_angle(fin_rate, "--fin-rate", FIN_RATE, FASTEST_FIN)
+    limit, known = given(fin_limit, parse_angle, "--fin-max", FIN), vehicle_of(vehicle)
+    fastest = given(fin_rate, parse_angle, "--fin-rate", FIN_RATE, FASTEST_FIN)
     margin = parse_margin(phase_margin, "--phase-margin")
     models = models_among(models)
     source = read_source(models, law or ())
     schedule = design_schedule(
         source,
-        fin_limit_of(known, source, say) if given is None else given,
-        speeds=speeds_of(speeds),
-        wish=Wish(
-            controller or usual_controller(source),
-            damping,
-            margin,
-            step=None if step is None else parse_angle(step, "--step", TILT, HEADING),
-            bandwidth=None if bandwidth is None else parse_quantity(bandwidth, "--bandwidth", BANDWIDTH, "1rad/s"),
-            settling=QUICKEST if settling == "quickest" else _time(settling, "--settling", "4s"),
-            overshoot=None if overshoot is None else parse_share(overshoot, "--overshoot"),
-            fin_use=None if fin_use is None else parse_share(fin_use, "--fin-use"),
-        ),
-        limits=FinLimits(_time(fin_lag, "--fin-lag"), _time(delay, "--delay"), fastest, _time(latency, "--latency")),
+        controller=controller,
+        settling=QUICKEST if settling == "quickest" else given(settling, parse_time, "--settling", "4s"),
+        bandwidth=given(bandwidth, parse_quantity, "--bandwidth", BANDWIDTH, "1rad/s"),
+        overshoot=given(overshoot, parse_share, "--overshoot"),
+        step=given(step, parse_angle, "--step", TILT, HEADING),
+        fin_use=given(fin_use, parse_share, "--fin-use"),
+        damping=damping,
+        phase_margin=margin,
+        speeds=speeds,
+        fin_limit=limit,
+        fin_rate=fastest,
+        fin_lag=given(fin_lag, parse_time, "--fin-lag"),
+        delay=given(delay, parse_time, "--delay"),
+        latency=given(latency, parse_time, "--latency"),
         depth=depth,
-        runs=runs_of_models(source, say, depth=depth),
-        length=known.length_m,
-        fins=fins_of(known, source.axis),
+        vehicle=known,
     )
     inputs = [p for p in source.paths if p.is_file()]
     written_to = None if output is None else str(save_schedule(schedule, output, inputs=inputs, force=force))
@@ -157,15 +150,13 @@ def verify(
         list[Path] | None, option("--model", "MODEL", "Models to verify on; those it was designed from if not given.")
     ] = None,
     require_phase_margin: Annotated[
-        str | None, option("--require-phase-margin", "ANGLE", "Exit 1 when any speed has less, `40deg`.")
+        Text, option("--require-phase-margin", "ANGLE", "Exit 1 when any speed has less, `40deg`.")
     ] = None,
-    require_gain_margin: Annotated[
-        str | None, option("--require-gain-margin", "DB", "Exit 1 when any speed has less, `6dB`.")
-    ] = None,
+    require_gain_margin: Annotated[Text, option("--require-gain-margin", "DB", "Exit 1 when any speed has less, `6dB`.")] = None,
     require_delay_margin: Annotated[
-        str | None, option("--require-delay-margin", "TIME", "Exit 1 when any speed has less, `0.3s`.")
+        Text, option("--require-delay-margin", "TIME", "Exit 1 when any speed has less, `0.3s`.")
     ] = None,
-    max_overshoot: Annotated[str | None, option("--max-overshoot", "SHARE", "Exit 1 when any step has more, `20%`.")] = None,
+    max_overshoot: Annotated[Text, option("--max-overshoot", "SHARE", "Exit 1 when any step has more, `20%`.")] = None,
     output: Annotated[Path | None, option("-o --output", "FILE", "Draw a figure: .png, .svg or .pdf, by the suffix.")] = None,
     force: Force = False,
 ) -> Mapping[str, Any]:
@@ -180,23 +171,23 @@ def verify(
     """
     from fieldsid.angles import parse_margin
     from fieldsid.cli.user_effects import read_source
-    from fieldsid.face.arguments import designed_from, runs_of_models
-    from fieldsid.face.quantities import DECIBEL, parse_quantity, parse_share, parse_time
+    from fieldsid.face.arguments import designed_from
+    from fieldsid.face.gains import verify_schedule
+    from fieldsid.face.quantities import DECIBEL, given, parse_quantity, parse_share, parse_time
     from fieldsid.results.gains import Verified
     from fieldsid.schedule.linear_plant import not_counted
     from fieldsid.schedule.record import load_schedule
     from fieldsid.schedule.verdict import against_constant, gates_of, rests_on, verdict_of
-    from fieldsid.schedule.verify import verify_schedule
 
     refuse_figure(output, force=force)
-    least = None if require_phase_margin is None else parse_margin(require_phase_margin, "--require-phase-margin")
+    least = given(require_phase_margin, parse_margin, "--require-phase-margin")
     known = load_schedule(schedule)
     source = read_source(models or designed_from(known, str(schedule)))
-    checked = verify_schedule(known, source, runs=runs_of_models(source, say, depth=known.depth))
-    gain = None if require_gain_margin is None else parse_quantity(require_gain_margin, "--require-gain-margin", DECIBEL, "6dB")
-    delay = None if require_delay_margin is None else parse_time(require_delay_margin, "--require-delay-margin", "0.3s")
-    most = None if max_overshoot is None else 100.0 * parse_share(max_overshoot, "--max-overshoot")
-    wanted = (least, gain, delay, most)
+    checked = verify_schedule(known, source)
+    gain = given(require_gain_margin, parse_quantity, "--require-gain-margin", DECIBEL, "6dB")
+    delay = given(require_delay_margin, parse_time, "--require-delay-margin", "0.3s")
+    most = given(max_overshoot, parse_share, "--max-overshoot")
+    wanted = (least, gain, delay, most and 100.0 * most)
     gates = gates_of(checked, dict(zip(checked.worst, wanted, strict=True)))
     verdict, says = verdict_of(checked, known, gates)
     result = Verified(
@@ -209,8 +200,7 @@ def verify(
         axis=known.axis,
         controller=known.kind,
         worst=checked.worst,
-        scheduled=checked.scheduled,
-        constant=checked.constant,
+        checked=checked,
         gates=gates,
         figure=draw_figure(output, sketch("schedule", known, checked), force=force),
     )
@@ -228,10 +218,10 @@ def verify(
 def export(
     schedule: ScheduleFile,
     to: Annotated[str, option("--to", "TARGET", f"One of {TARGETS}.")] = "yaml",
-    node: Annotated[str | None, option("--node", "NAME", "What the gains go under: node, section, prefix or process.")] = None,
+    node: Annotated[Text, option("--node", "NAME", "What the gains go under: node, section, prefix or process.")] = None,
     template: Annotated[Path | None, option("--template", "FILE", "A template of your own, see templates/exports/.")] = None,
     into: Annotated[Path | None, option("--into", "YAML", "An existing YAML file to put the gains into.")] = None,
-    key: Annotated[str | None, option("--key", "A.B.C", "The key in that file that holds the gains.")] = None,
+    key: Annotated[Text, option("--key", "A.B.C", "The key in that file that holds the gains.")] = None,
     write: Annotated[bool, flag("--write", "Change the file of `--into` (a backup is kept), not only show how.")] = False,
     output: OutputFile = None,
     force: Force = False,
@@ -277,23 +267,17 @@ def _write_export(output: Path, text: str, *, force: bool) -> tuple[str, str, st
 def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write: bool) -> Mapping[str, Any]:
     from fieldsid.exports._patch import patch_yaml, write_patch
     from fieldsid.exports._target import columns_of
-    from fieldsid.results.gains import Patched
+    from fieldsid.results.gains import Exported
 
     patch = patch_yaml(into, key, columns_of(known))
     backup = str(write_patch(patch)) if write else None
-    result = Patched(patch.difference, str(into), backup)
+    result = Exported("into", None, str(into), patch.difference, backup)
     headline = headline_of_patch(result, schedule, key)
     return emit(result, render=lambda out: print_file(out, patch.difference), headline=headline, is_file=not write)
 
 
-def _time(text: str | None, option: str, example: str = "0.1s") -> float | None:
-    from fieldsid.face.quantities import parse_time
-
-    return None if text is None else parse_time(text, option, example)
-
-
 def _render_export(to: Console, result: Exported) -> None:
     """Print the text of an export; where it was written to a file, how that file has changed, and its name."""
-    print_file(to, result.difference if result.file else result.text)
+    print_file(to, result.difference if result.file else result.text or "")
     if result.file:
         to.print(f"exported: {result.file}" + (f"; as it was: {result.backup}" if result.backup else ""), soft_wrap=True)

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 from fieldsid.cli.console import emit
 from fieldsid.cli.options import Force, MappingFile, ModelFile, OutputFile, option
 from fieldsid.cli.voice import angles
+from fieldsid.display import page_of
 from fieldsid.errors import UsageError
-from fieldsid.page import Block, Page, written
-from fieldsid.rounding import number
+from fieldsid.page import Page, written
 
 if TYPE_CHECKING:
     from fieldsid.logs.run import Run
     from fieldsid.models.model import Model
-    from fieldsid.results.logs import Simulation
 
 
 def command(
@@ -80,7 +79,8 @@ def command(
         signals=signals,
     )
     headline = headline_of_simulation(result, known.axis.value, maneuver, run)
-    return emit(result, render=_page(result), headline=headline)
+    page = Page("", blocks=page_of(made, angles()).blocks, closing=written(run=result.file))
+    return emit(result, render=page, headline=headline)
 
 
 def _fly_maneuver(model: Model, spec: str, speed: float | None, fin_max: str, rate: float) -> Run:
@@ -108,14 +108,3 @@ def _replay_run(model: Model, run: Run, speed: float | None) -> Run:
     record = record_of(run, model.axis)
     record = record if speed is None else replace(record, speed=speed)
     return replayed(model, record, simulate(model, record))
-
-
-def _page(result: Simulation) -> Page:
-    from fieldsid.logs.run import COLUMNS
-
-    rows = tuple(
-        (name, *(number(factor * value) for value in (v.low, v.high, v.end)), unit)
-        for name, v in result.signals.items()
-        for factor, unit in [angles().of(COLUMNS[name])]
-    )
-    return Page("", blocks=(Block("", rows, ("signal", "low", "high", "end", "unit")),), closing=written(run=result.file))

@@ -17,12 +17,12 @@ from fieldsid.page import Block, Page, Whole, counted, paragraph
 from fieldsid.trial_folder.state import DONE, FolderState, Item, state_of
 
 NAMES = {
-    "vehicle": "vehicle", "mapping": "mapping", "plan": "plan", "log": "log", "run": "run", "model": "model",
-    "diagnosis": "diagnosis", "fit": "laws", "turn-radius": "turning radius", "schedule": "gains", "simulated": "simulated run",
+    "vehicle": ("vehicle", ""), "mapping": ("mapping", ""), "plan": ("plan", ""), "log": ("log", ""), "run": ("run", ""),
+    "model": ("model", ""), "diagnosis": ("diagnosis", "diagnoses"), "fit": ("file of laws", "files of laws"),
+    "turn-radius": ("turning radius", "turning radii"), "schedule": ("file of gains", "files of gains"),
+    "simulated": ("simulated run", ""),
 }  # fmt: skip
-"""Kinds of files, in the order of the list, and the name of each."""
-MANY_IN_ONE, SEVERAL = ("laws", "gains"), {"diagnosis": "diagnoses", "turning radius": "turning radii"}
-"""Names that are plurals already, and irregular plurals."""
+"""Kinds of files, in the order of the list, and the name of each with an irregular plural."""
 MOST_SOURCES = 2
 """Number of source files up to which each is named; of more only the first is."""
 WIDEST_NAME = 40
@@ -73,18 +73,11 @@ def command(
 def _verdict(state: FolderState) -> str:
     counts = Counter(i.kind for i in state.items)
     contents = (
-        ", ".join(_count_in_words(counts[k], NAMES[k]) for k in NAMES if counts[k] and k not in ("vehicle", "mapping"))
-        or "nothing yet"
+        ", ".join(counted(counts[k], *NAMES[k]) for k in NAMES if counts[k] and k not in ("vehicle", "mapping")) or "nothing yet"
     )
     stale = sum(bool(i.stale) for i in state.items)
     name = state.folder.resolve().name
     return f"{name}: {contents}; " + (f"{stale} stale" if stale else "nothing is stale")
-
-
-def _count_in_words(count: int, name: str) -> str:
-    if name in MANY_IN_ONE:
-        return name if count == 1 else f"{count} files of {name}"
-    return f"1 {name}" if count == 1 else f"{count} {SEVERAL.get(name, name + 's')}"
 
 
 def _page(state: FolderState) -> Page:
@@ -102,7 +95,7 @@ def _page(state: FolderState) -> Page:
 def _row(item: Item) -> tuple[str, ...]:
     names = [stem_of(Path(s.named)) for s in item.sources]
     said = ", ".join(names) if len(names) <= MOST_SOURCES else f"{names[0]} and {len(names) - 1} more"
-    what = NAMES[item.kind]
+    what = NAMES[item.kind][0].removeprefix("file of ")
     effects = len(item.effects) if item.kind == "model" else 0
     kind = f"{what}, {counted(effects, 'effect')}" if effects else what
     return item.path, kind, said.replace("+", " +"), item.standing  # a blank lets a line end between effects

@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from fieldsid.cli.console import emit, say
-from fieldsid.cli.options import Figures, Force, MappingFile, ModelFiles, OutputDir, OwnLaw, VehicleFile, option
+from fieldsid.cli.console import emit
+from fieldsid.cli.options import Figures, FinMax, Force, MappingFile, ModelFiles, OutputDir, OwnLaw, Speeds, VehicleFile, option
 from fieldsid.cli.progress import refuse_closed
 from fieldsid.cli.session import draw_figures
 from fieldsid.cli.skipped_logs import Skips
@@ -25,15 +25,8 @@ if TYPE_CHECKING:
 
 def command(
     models: ModelFiles,
-    speeds: Annotated[
-        str | None, option("--speeds", "LIST", "Speeds in m/s, 0.5:2.5:0.1 or 1.0,1.6; those of the models if not given.")
-    ] = None,
-    rudder_max: Annotated[
-        str | None,
-        option(
-            "--fin-max", "ANGLE", "Rudder held in the turn, `15deg`; if not given the vehicle's limit, else the models' largest."
-        ),
-    ] = None,
+    speeds: Speeds = None,
+    rudder_max: FinMax = None,
     measured: Annotated[
         list[Path] | None, option("--measured", "RUN", "Run of a turning circle, to compare with and to learn from; may repeat.")
     ] = None,
@@ -64,12 +57,13 @@ def command(
     from fieldsid.cli.inputs import mapping_of, models_among, read_runs
     from fieldsid.cli.user_effects import read_source
     from fieldsid.face.arguments import fin_limit_of, runs_of_turn, vehicle_of
+    from fieldsid.face.quantities import given
     from fieldsid.face.speeds import speeds_of
     from fieldsid.results.turning import TurnRadius
     from fieldsid.turning.radius import turn_radius
 
     refuse_closed(output)
-    given = None if rudder_max is None else parse_angle(rudder_max, "--fin-max", FIN)
+    limit = given(rudder_max, parse_angle, "--fin-max", FIN)
     models, known = models_among(models), vehicle_of(vehicle)
     source, skips = read_source(models, law or ()), Skips()
     fitted, circles = (
@@ -78,8 +72,8 @@ def command(
     prediction = turn_radius(
         source,
         speeds_of(speeds) or source.knots,
-        fin_limit_of(known, source, say, "rudder") if given is None else given,
-        runs=fitted if runs else runs_of_turn(source, say, mapping_of(mapping)),
+        fin_limit_of(known, source, "rudder") if limit is None else limit,
+        runs=fitted if runs else runs_of_turn(source, mapping_of(mapping)),
         measured=circles,
         method=method,
         fin_zero=_fin_zero(fin_zero),

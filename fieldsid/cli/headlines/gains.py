@@ -20,7 +20,7 @@ from fieldsid.views._words import times
 
 if TYPE_CHECKING:
     from fieldsid.models.model import Model
-    from fieldsid.results.gains import Design, Exported, Patched, Verified
+    from fieldsid.results.gains import Design, Exported, Verified
     from fieldsid.results.turning import FittedLaws
     from fieldsid.schedule.record import Schedule
     from fieldsid.turning.prediction import TurnPrediction
@@ -37,9 +37,8 @@ def headline_of_fit(result: FittedLaws) -> Headline:
     says = line_of(laws)
     rests = f"{counted(len(laws.points), 'point')}, {number(laws.speed_low, 3)} .. {number(laws.speed_high, 3)} m/s"
     rests += f"; does not belong: {first_names(list(dict.fromkeys(outliers)))}" if outliers else ""
-    if result.file is None:
-        return Headline(says, rests, typed_with("-o", f"law_{laws.axis.value}.yaml"))
-    return Headline(says, rests, next_use(laws.axis.value, result.file))
+    kept = result.file and next_use(laws.axis.value, result.file)
+    return Headline(says, rests, kept or typed_with("-o", f"law_{laws.axis.value}.yaml"))
 
 
 def caveat(models: Iterable[Model], files: Sequence[Path]) -> str:
@@ -101,10 +100,10 @@ def headline_of_verification(
     if result.verdict in ("holds", "passed") and result.passed:
         out = Path(f"{schedule.stem}_{TARGET}.yaml")
         return Headline(says, rests, pasted("schedule", "export", schedule, "--to", TARGET, "-o", out))
-    by_size = ([c for c in result.scheduled if c.steps[i].settling == inf] for i in range(3))
+    by_size = ([c for c in result.checked.scheduled if c.steps[i].settling == inf] for i in range(3))
     unsettled = next((checks for checks in by_size if checks), [])  # of the smallest step that fails, as in the verdict
     if unsettled and not any(c.knot for c in unsettled):
-        speeds = ",".join(number(u, 3) for u in sorted(c.speed for c in result.scheduled if c.knot or c in unsettled))
+        speeds = ",".join(number(u, 3) for u in sorted(c.speed for c in result.checked.scheduled if c.knot or c in unsettled))
         closer = schedule.with_name(f"{schedule.stem}_closer.yaml")
         return Headline(
             says, rests, pasted("schedule", "design", models, *_designed_with(known), "--speeds", speeds, "-o", closer)
@@ -147,7 +146,7 @@ def headline_of_export(result: Exported, schedule: Path) -> Headline:
     return Headline(f"{schedule} written as {result.target}: {result.file}", rests, report)
 
 
-def headline_of_patch(result: Patched, schedule: Path, key: str) -> Headline:
+def headline_of_patch(result: Exported, schedule: Path, key: str) -> Headline:
     """Return how many lines of an existing file the gains change, or have changed."""
     changes = [line for line in result.difference.splitlines() if line[:1] == "+" and line[:3] != "+++"]
     rests = f"{schedule}, its gains as they were designed; an export verifies nothing"

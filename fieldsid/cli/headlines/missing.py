@@ -142,7 +142,9 @@ def _identified_model(runs: Sequence[Path], axis: str) -> Path | None:
 def headline_of_extension(result: Extended) -> Headline:
     """Return whether the addition is kept, and how the error fell."""
     gain = result.gain
-    word = "kept" if result.pays else "kept because of --keep" if result.kept else "not kept"
+    word = (
+        "kept" if result.pays else "kept because of --keep" if result.kept else "not kept, nothing was written (--keep overrules)"
+    )
     says = f"{'+'.join(gain.added)} {word}: {fall([gain], angles())}"
     fitted = f"{counted(len(gain.learned_on), 'run')} fitted to ({first_names(gain.learned_on)})"
     is_split = gain.unseen and set(gain.judged_on) <= set(gain.learned_on)

@@ -50,9 +50,8 @@ def headline_of_plan(result: Planned, model: Path | None) -> Headline:
     risk = f"risk of leaving the envelope {100.0 * plan.break_probability:.1f} %"
     rests = f"{known_by}; {risk}, {NOT_LIMITED}: {', '.join(unlimited) or 'nothing'}"
     file = next((f for f in result.files if Path(f).name == "plan.yaml"), None)
-    if file is None:
-        return Headline(says, rests, typed_with("-o", "plan"))
-    return Headline(says, rests, pasted("live", "--axis", plan.axis.value, "--udp", str(PORT), "--plan", file))
+    live = file and pasted("live", "--axis", plan.axis.value, "--udp", str(PORT), "--plan", file)
+    return Headline(says, rests, live or typed_with("-o", "plan"))
 
 
 def headline_of_status(result: Status) -> Headline:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fieldsid.batch.trend import change_points, scatter_of, trends_of
+from fieldsid.figures.drawn import rendered
 from fieldsid.figures.trend import figure
 from fieldsid.models.axis import Axis
 
@@ -48,7 +49,7 @@ def test_a_slow_drift_is_told_as_one_and_not_as_steps_at_dates():
     assert b2.drift.after - b2.drift.before == pytest.approx(0.3, abs=3.0 * b2.drift.std_error)
     assert 0.005 < b2.drift.std_error < 0.03
     assert by_name["a22"].drift is None
-    assert figure(tuple(by_name.values()), "yaw").axes
+    assert rendered(figure(tuple(by_name.values()), "yaw")).axes
 
 
 def test_runs_at_other_speeds_are_carried_to_one():
@@ -104,7 +105,7 @@ def test_few_runs_have_no_trend():
 
 
 def test_every_date_of_the_figure_is_whole_and_one_of_them_tells_the_year():
-    sheet = figure(trends_of(archive(np.r_[np.full(30, -1.2), np.full(25, -0.98)]), Axis.YAW), "yaw")
+    sheet = rendered(figure(trends_of(archive(np.r_[np.full(30, -1.2), np.full(25, -0.98)]), Axis.YAW), "yaw"))
     sheet.draw_without_rendering()
     bottom = sheet.axes[-1].xaxis
     assert bottom.get_offset_text().get_text() == ""

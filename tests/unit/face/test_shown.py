@@ -118,14 +118,12 @@ Fit of the yaw axis
 warning: a22 and b2 cannot be told apart (correlation -0.970, limit 0.95) [correlated]
 
 Statistics
-  method       output_error
-  effects      none
-  runs         pulses, zigzag
-  samples      800 in 39.9 s
-  estimated    3 parameters
-  angle error  rms 0.0120 rad (noise 0.00500), fit 91.0 %
-  rate error   rms 0.00600 rad/s (noise 0.00400), fit 91.7 %
-  whiteness    p = 0.41
+  method     output_error
+  effects    none
+  runs       pulses, zigzag
+  samples    800 in 39.9 s
+  estimated  3 parameters
+  whiteness  p = 0.41
 
 Parameters at 1.40 m/s
   parameter                  value     unit         95 % interval
