@@ -98,6 +98,6 @@ def extended(gain: Gain) -> Extended:
     """What an extension that is kept comes to."""
     return Extended(
         gain=gain, axis=Axis.YAW, log_evidence=9.0, pays=True, kept=True, kept_by="unseen", model="", effects=gain.added,
-        parent=Parent(Path("m.yaml"), "", "intact"), coefficients={}, notes=(), left=LeftOver(1.0, 1.0, more_than_noise=False), next="",
-        skipped_runs=(),
+        parent=Parent(Path("m.yaml"), "", "intact"), coefficients={}, notes=(), skipped_runs=(), next="",
+        left=LeftOver(1.0, 1.0, more_than_noise=False),
     )  # fmt: skip

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import io
 from itertools import pairwise
+from logging import getLogger
 
 import pytest
 from cli import trial
 from rich.console import Console
 
-from fieldsid.cli.console import one_of_each_kind, print_page, shortened, shows_progress, table
+from fieldsid.cli.console import heard, one_of_each_kind, print_page, shortened, shows_progress, table
 from fieldsid.cli.voice import Voice, take, voice
 from fieldsid.logs.run import Note
 from fieldsid.page import Block, Page, dense, folded, html_of, text_of
@@ -26,6 +27,14 @@ def afterwards():
 def test_the_voice_of_a_command_ends_with_it(run_cli):
     run_cli("effects", "list", "--quiet", "--deg")
     assert voice() == Voice()
+
+
+def test_what_a_function_tells_is_printed_once_also_by_a_command_of_a_tour(capsys):
+    tell = getLogger("fieldsid").info
+    with heard(), heard():
+        tell("the largest fin of the runs is taken")
+    tell("and no command hears this")
+    assert capsys.readouterr().err == "the largest fin of the runs is taken\n"
 
 
 def test_a_quiet_command_does_not_say_where_it_goes_on_from(run_cli, tmp_path):
