@@ -50,7 +50,7 @@ def panels(body: Mapping[str, Any]) -> tuple[Panel, Panel]:
 
 def _fins(circles: Sequence[Mapping[str, Any]]) -> str:
     """Return the fin angles that circles were flown with."""
-    return ", ".join(sorted({f"{np.degrees(abs(c['fin_rad'])):.0f}°" for c in circles}))
+    return ", ".join(sorted({f"{np.degrees(abs(c['fin_rad'])):.0f}°" for c in circles if c["fin_rad"] is not None}))
 
 
 def _sides(rows: Sequence[Mapping[str, Any]], value: str, band: str, of: str) -> tuple[list[Series], list[Band]]:

@@ -68,6 +68,15 @@ DRAWN_DIAGNOSIS: Shape = {
     "candidates": [{"train": anything, "validation": anything}],
 }
 """What a report needs of a diagnosis in addition."""
+SIZE, ENDS = maybe(number(0.0)), (maybe(number(0.0)), maybe(number(0.0)))
+CIRCLE: Shape = {
+    "side": one_of(SIDES),
+    "radius_m": above_zero(),
+    "std_error_m": SIZE,
+    "fin_rad": maybe(number(-LARGEST_FIN_RAD, LARGEST_FIN_RAD)),
+    **dict.fromkeys(("entry_speed_m_s?", "path_speed_m_s?"), maybe(SPEED)),
+}
+"""A measured circle, as it is drawn beside the predictions."""
 TURN_RADIUS: Shape = {
     **HEAD,
     "rudder_max_rad?": above_zero(LARGEST_FIN_RAD),
@@ -81,9 +90,11 @@ TURN_RADIUS: Shape = {
             "trust": text,
             "extrapolated": flag,
             "method?": one_of(("maneuvering", "simulated", "u_turn", "steady", "measured")),
-            **dict.fromkeys(("steady_radius_m?", "u_turn_radius_m?", "u_turn_time_s?", "model_radius_m?"), maybe(number(0.0))),
+            **dict.fromkeys(("steady_radius_m?", "u_turn_radius_m?", "u_turn_time_s?", "model_radius_m?", "predicted_m?"), SIZE),
+            **dict.fromkeys(("predicted95?", "u_turn_time95_s?"), ENDS),
         }
     ),
+    "measured?": [CIRCLE],
 }
 PLAN: Shape = {**HEAD, "axis?": one_of(AXES)}
 RUN_HEAD: Shape = {

@@ -10,7 +10,7 @@ import pytest
 from fieldsid.comparison.compare import compare, left_in_words
 from fieldsid.comparison.residuals import companions
 from fieldsid.errors import DataError
-from fieldsid.figures.compare import figure, view_of
+from fieldsid.figures.compare import figure
 from fieldsid.logs.run import Run
 from fieldsid.maneuvers import Limits, parse_spec
 from fieldsid.models.axis import Axis
@@ -81,11 +81,11 @@ def test_the_figure_shows_the_channels_that_fail_in_their_order_and_shades_nothi
     truth = model()
     run = run_of(truth)
     bad, good = (compare(replace(truth, values=truth.values | {"C0": c0}), [run])[0] for c0 in (0.04, 0.02))
-    titles = [ax.get_title(loc="left").split("\n")[0] for ax in figure(bad, truth, "bad").axes]
-    assert [t.partition(" at ")[0] for t in titles if t] == ["the angle fails most", "the rate fails most"]
-    assert view_of(bad).spans == tuple((s.start_s, s.end_s) for s in bad.worst_channel.worst)
-    assert not any(ax.get_title(loc="left") for ax in figure(good, truth, "good").axes)
-    assert view_of(good).spans == ()
+    motion, places = figure(bad, "bad").columns
+    assert [b.title.partition(" at ")[0] for b in places] == ["the angle fails most", "the rate fails most"]
+    assert {p.spans for p in motion} == {tuple((s.start_s, s.end_s) for s in bad.worst_channel.worst)}
+    (motion,) = figure(good, "good").columns
+    assert {p.spans for p in motion} == {()}
 
 
 def test_the_missing_moment_moves_with_the_signal_that_makes_it():
