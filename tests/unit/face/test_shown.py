@@ -121,9 +121,10 @@ Statistics
   method     output_error
   effects    none
   runs       pulses, zigzag
-  samples    800 in 39.9 s
-  estimated  3 parameters
+  speeds     1.40 m/s
   whiteness  p = 0.41
+  damping    goes with u^1.00
+  authority  goes with u^2
 
 Parameters at 1.40 m/s
   parameter                  value     unit         95 % interval
