@@ -81,11 +81,11 @@ def note(ax: Axes, text: str, place: tuple[float, float], off: tuple[float, floa
 def legend_above(ax: Axes, width: int = 80) -> None:
     """Put the legend above the plot, at its right, where it hides no data; the plot's title goes above it.
 
-    width: letters in a line of it.
+    width: letters of the title in a line of it.
     """
     handles, names = ax.get_legend_handles_labels()
     folds = [fill(name, width) for name in names]
-    columns = max(1, min(4, width // (4 + max(map(len, names)))))
+    columns = max(1, min(4, width * 10 // 9 // (4 + max(map(len, names)))))  # 9 pt here, 10 pt in the title
     rows = -(-sum(1 + fold.count("\n") for fold in folds) // columns)
     if title := ax.get_title(loc="left"):
         ax.set_title(title, loc="left", fontsize=10, pad=6.0 + 14.0 * rows)

@@ -13,6 +13,7 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from fieldsid.figures import canvas
+from fieldsid.figures.drawn import COLOURS
 
 DPI = 96
 LARGEST = 28_000
@@ -68,7 +69,7 @@ def _reduced(image: Image.Image) -> bytes:
 def _palette() -> Image.Image:
     """Return a palette of greys, and of the colours that figures are drawn in with their blends towards white."""
     greys = [[v] * 3 for v in GREYS]
-    colours = [[round(255 * v) for v in to_rgb(c)] for c in canvas.SERIES]
+    colours = [[round(255 * v) for v in to_rgb(c)] for c in (*canvas.SERIES, COLOURS["limit"])]
     blends = [[round(255 - share * (255 - v)) for v in colour] for colour in colours for share in (1.0, 0.5, 0.18)]
     image = Image.new("P", (1, 1))
     image.putpalette([v for colour in (*greys, *blends) for v in colour])

