@@ -35,8 +35,8 @@ def panels(body: Mapping[str, Any]) -> tuple[Panel, Panel]:
     rows = [{"predicted_m": r["radius_m"], "predicted95": r["interval95"], **r} for r in body["rows"]]
     middle = float(np.mean([r["speed_m_s"] for r in rows]))
     ends = Series(np.array([(1.0 - LEAST_HALF_SPAN) * middle, (1.0 + LEAST_HALF_SPAN) * middle]), np.full(2, np.nan), "quiet")
-    radius, bands = _sides(rows, "predicted_m", "predicted95", ", predicted")
-    time, time_bands = _sides(rows, "u_turn_time_s", "u_turn_time95_s", "")
+    radius, bands = _sides(rows, "predicted_m", "predicted95")
+    time, time_bands = _sides(rows, "u_turn_time_s", "u_turn_time95_s")
     for side in SIDES:
         if circles := [c for c in body.get("measured", ()) if c["side"] == side]:
             speed = np.array([c.get("entry_speed_m_s") or c.get("path_speed_m_s") for c in circles], dtype=float)
@@ -53,7 +53,7 @@ def _fins(circles: Sequence[Mapping[str, Any]]) -> str:
     return ", ".join(sorted({f"{np.degrees(abs(c['fin_rad'])):.0f}°" for c in circles if c["fin_rad"] is not None}))
 
 
-def _sides(rows: Sequence[Mapping[str, Any]], value: str, band: str, of: str) -> tuple[list[Series], list[Band]]:
+def _sides(rows: Sequence[Mapping[str, Any]], value: str, band: str) -> tuple[list[Series], list[Band]]:
     """Return a value of each side over speed with its band, by their keys; at few speeds the band is drawn as error bars."""
     series, bands = [], []
     for side, sign in SIDES.items():
@@ -63,11 +63,11 @@ def _sides(rows: Sequence[Mapping[str, Any]], value: str, band: str, of: str) ->
         x, y = (np.array([r.get(k) for r in mine], dtype=float) for k in ("speed_m_s", value))
         low, high = np.array([r.get(band) or (np.nan, np.nan) for r in mine], dtype=float).T
         if len(mine) > FEW:
-            series.append(Series(x, y, side, f"{side}{of}", dashed=side == "starboard"))
+            series.append(Series(x, y, side, f"{side}, predicted", dashed=side == "starboard"))
             bands.append(Band(x, low, high, side))
             continue
         x, error = x * (1.0 + SHIFT * sign), np.nan_to_num(np.maximum(np.stack([y - low, high - y]), 0.0))
-        series += [Series(x, y, side, f"{side}{of}"), Series(x, y, side, form="points", error=error)]
+        series += [Series(x, y, side, f"{side}, predicted"), Series(x, y, side, form="points", error=error)]
     return series, bands
 
 

@@ -121,7 +121,7 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
         "candidates": None if axis.diagnosis is None else candidates(axis.diagnosis.body, DEGREES),
         "diagnosis": axis.diagnosis.body if axis.diagnosis is not None else None,
         "loop": None if axis.loop is None else _loop(axis.loop),
-        "parameters": parameter_block(((s.path, s.model) for s in models), of="model"),
+        "parameters": [(parameter_block([("", s.model)]), s.path) for s in models],
         "laws": _laws(axis),
         "radius": None if axis.turning is None else _radius(axis.turning),
         "gains": None if axis.schedule is None or axis.gains is None else _gains(axis.gains, axis.schedule.path),

@@ -47,8 +47,8 @@ def base_words(model: Model) -> str:
     return ", ".join(f"{e.name} = {with_error(e.value, e.std_error)} {e.unit}".rstrip() for e in known)
 
 
-def parameter_block(models: Iterable[tuple[str, Model]], angles: Angles = RADIANS, of: str = "run") -> Block:
-    """Return the parameters of models, each with what it is `of`: value and error, unit, 95 % interval.
+def parameter_block(models: Iterable[tuple[str, Model]], angles: Angles = RADIANS) -> Block:
+    """Return the parameters of models, each with the name of its run: value and error, unit, 95 % interval.
 
     A value on a bound has no error. A model without a name is the only one, and the title has its speed.
     """
@@ -63,7 +63,7 @@ def parameter_block(models: Iterable[tuple[str, Model]], angles: Angles = RADIAN
         for i, e in enumerate(estimates(model)):
             cells = angles.estimate(e.value, e.std_error, e.interval95, e.unit, at_bound=e.name in bound)
             rows.append(("" if i else name, e.name if e.name in law else model.shown(e.name), *cells))
-    return Block(title, tuple(rows), (of, "parameter", "value", "unit", "95 % interval"), left=2)
+    return Block(title, tuple(rows), ("run", "parameter", "value", "unit", "95 % interval"), left=2)
 
 
 def parameter_rows(model: Model) -> list[dict[str, Any]]:
