@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import Figures, Frames, View
 from fieldsid.figures.sketch import sketch
-from fieldsid.page import Block, Page
+from fieldsid.page import Block, Page, facts
 from fieldsid.records.keys import body_of
 from fieldsid.rounding import RADIANS, Angles, number
 from fieldsid.views._words import table
@@ -30,8 +30,10 @@ def line(schedule: Schedule) -> str:
 
 
 def page(schedule: Schedule) -> Page:
-    """Return the main result, and a row of gains for each speed."""
-    return Page(f"Schedule of the {schedule.axis.value} axis: {line(schedule)}", (), tuple(blocks_of(schedule)))
+    """Return the main result, the fins, what the gains were asked for, and a row of gains for each speed."""
+    asked = (("asked for", f"damping {number(schedule.damping, 3)}, phase margin {number(schedule.phase_margin_deg, 3)} deg"),)
+    known = facts("", (("fins", "; ".join(schedule.fins_said)), *asked))
+    return Page(f"Schedule of the {schedule.axis.value} axis: {line(schedule)}", (), (known, *blocks_of(schedule)))
 
 
 def blocks_of(schedule: Schedule, angles: Angles = RADIANS, neglected: Iterable[str] = ()) -> Iterator[Block | str]:
