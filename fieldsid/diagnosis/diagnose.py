@@ -16,7 +16,7 @@ from fieldsid.diagnosis.data.heading_span import shown_by_headings
 from fieldsid.diagnosis.data.holdout_split import holdout_split
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
-from fieldsid.diagnosis.evidence.scored_model import ScoredModel, with_free_run
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.records import Candidate, Diagnosis
 from fieldsid.diagnosis.report.final_model import final_model
 from fieldsid.diagnosis.report.next_maneuver import next_maneuver
@@ -117,9 +117,7 @@ def _search_result(work: Search) -> _SearchResult:
 
     def with_errors(h: ScoredModel) -> ScoredModel:
         """Return a model with the errors to report; its fit is by output error where that predicts the validation runs better."""
-        if h is found or h.output_error_fit is not None:
-            return h.evaluate_errors()
-        return with_free_run(h, h.likelihood_fit.fitted.by_output_error(), work.floor).evaluate_errors()
+        return (h if h is found else work.with_free_run(h)).evaluate_errors()
 
     def refitted(h: ScoredModel) -> FinalModel:
         model = final_model(h)

@@ -20,13 +20,13 @@ def refitted_from(given: Model, h: ScoredModel, grounds: Grounds) -> ScoredModel
     The given values are a better start for effects whose cost is not smooth; and an optimum that a search reached by adding
     effects may not be found again from the base.
     """
-    start = output_error_of(given, h)
+    start = _output_error_of(given, h)
     if start is None:
         return h
     return grounds.better(h, grounds.fit(start.problem, start.x, h.likelihood_fit.noise)).evaluate_errors()
 
 
-def output_error_of(given: Model, h: ScoredModel) -> FittedProblem | None:
+def _output_error_of(given: Model, h: ScoredModel) -> FittedProblem | None:
     """Return the output-error fit that starts at a given model's values, in its forms; None where it holds no start."""
     fitted = h.likelihood_fit.fitted
     groups = fitted.problem.layout.groups

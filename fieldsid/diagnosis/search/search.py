@@ -208,7 +208,7 @@ class Search:
             h = score_model(ml_fit, self.validation).evaluate_errors()
             own, other = with_free_run(h, fitted, self.floor), other_speed_law(h, self.grounds)
             if other is not None:
-                other = with_free_run(other, other.likelihood_fit.fitted.by_output_error(), self.floor)
+                other = self.with_free_run(other)
             self.tried[self.root] = own if other is None or not keeps_error(own, other) else other.evaluate_errors()
             try_variants([VariantRequest(self.tried[self.root])], self.tried, self.grounds)
             if self.given is not None:
@@ -303,9 +303,12 @@ class Search:
 
     def reported(self, h: ScoredModel) -> ScoredModel:
         """Return a model with the fit to be reported: without noise that by output error, where it is nearer to unseen runs."""
-        if not self.is_noiseless or h.output_error_fit is not None:
-            return h.evaluate_errors()
-        return with_free_run(h, h.likelihood_fit.fitted.by_output_error(), self.floor).evaluate_errors()
+        return (self.with_free_run(h) if self.is_noiseless else h).evaluate_errors()
+
+    def with_free_run(self, h: ScoredModel) -> ScoredModel:
+        """Return a model with its output-error fit, where the free run of that is nearer to the validation runs."""
+        known = h.output_error_fit is not None
+        return h if known else with_free_run(h, h.likelihood_fit.fitted.by_output_error(), self.floor)
 
     def tested_fit(self, h: ScoredModel) -> LikelihoodFit:
         """Return the fit of a model whose innovations are tested: with coloured sensor noise beside the disturbance if likelier.
