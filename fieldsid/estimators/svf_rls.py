@@ -14,6 +14,7 @@ from fieldsid.errors import DataError
 from fieldsid.estimators.svf_ls import Regression, bandwidth_notes, base_slots, feedback_notes, finished, regress
 from fieldsid.fitting.problem.estimator import Estimator, History, Options, Solution
 from fieldsid.fitting.problem.problem import Problem
+from fieldsid.fitting.regression.instruments import instrumental_variables
 from fieldsid.fitting.regression.recursive_iv import recursive_iv
 from fieldsid.fitting.regression.residual_colour_covariance import Series, coloured_covariance
 from fieldsid.logs.run import Note
@@ -47,16 +48,18 @@ def recursion(problem: Problem, block: Regression, series: Series, forgetting: f
     z, phi = block.instruments[:, :size], block.rows.matrix[:, :size]
     target = phi @ theta[:size] + series.residual
     keep = np.unique(np.linspace(0, count - 1, min(count, LONGEST_HISTORY)).round().astype(np.int64))
-    values, spread, inverse = recursive_iv(z, np.column_stack([phi, target]), forgetting, keep)
+    values, spread, _ = recursive_iv(z, np.column_stack([phi, target]), forgetting, keep)
     if not np.isfinite(values[-1]).all():
         raise DataError(
             f"the last part of run {problem.records[0].name!r}, which is not forgotten, does not determine the parameters",
             found=f"a forgetting factor of {forgetting:g}",
             hint="take a larger `--forgetting`, or a run in which the fin moves to the end",
         )
-    weight = forgetting ** np.arange(count - 1.0, -1.0, -1.0)
-    last = Series(z * weight[:, None], target - phi @ values[-1], series.transfer, series.step)
-    covariance = coloured_covariance([last], inverse.T)
+    weighted = block.instruments * forgetting ** np.arange(count - 1.0, -1.0, -1.0)[:, None]
+    last = Series(weighted, target - phi @ values[-1], series.transfer, series.step)
+    # the start terms were estimated from the same rows: their errors are in those of the parameters
+    _, inverse = instrumental_variables(weighted, block.rows.matrix, target)
+    covariance = coloured_covariance([last], inverse)[:size, :size]
     errors = spread * (np.sqrt(np.diag(covariance)) / np.maximum(spread[-1], 1e-300))
     time = block.rows.time[keep]
     settled = {n: settle_time(time, values[:, j], errors[-1, j]) for j, n in enumerate(names)}

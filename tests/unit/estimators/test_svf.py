@@ -99,6 +99,13 @@ def test_a_wide_filter_on_an_angle_alone_is_remarked_and_its_interval_holds_the_
     assert abs(found.model.values["a22"] - YAW[0].a22) < 2.5 * found.model.std_error("a22")
 
 
+@pytest.mark.parametrize("log", [at_sea(3), record(by_rate=False, noise=NOISE)], ids=["sea", "angle_alone"])
+def test_a_recursion_that_forgets_nothing_tells_the_errors_of_the_whole_record(log):
+    whole, recursive = (fit([log], Axis.YAW, method=method).model for method in ("svf_ls", "svf_rls"))
+    for name in ("a22", "b2", "C0"):
+        assert recursive.std_error(name) == pytest.approx(whole.std_error(name), rel=1e-6)
+
+
 def test_a_history_ends_at_the_model_and_says_when_each_parameter_settled():
     found = fit([record(noise=NOISE)], Axis.YAW, method="svf_rls")
     history = found.history
