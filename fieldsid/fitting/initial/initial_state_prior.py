@@ -37,7 +37,7 @@ def initial_state_prior(problem: Problem, run: int, floor: Noise) -> GaussianPri
         known = line_start(record.time[early & ok] - record.time[0], values[early & ok], noise)
         if known is not None:
             centre[slot], precision[slot] = known[0], 1.0 / known[1] ** 2
-    return GaussianPrior(centre, precision)
+    return GaussianPrior(centre, np.diag(precision))
 
 
 def line_start(time: FloatArray, values: npt.NDArray[np.float64], noise: float) -> tuple[float, float] | None:

@@ -28,14 +28,14 @@ would move far for almost no gain, out of the range of the linearisation."""
 
 @dataclass(frozen=True, slots=True)
 class GaussianPrior:
-    """A Gaussian prior of the parameters: centre (N,) and precision (N,), zero where there is none."""
+    """A Gaussian prior of the parameters: centre (N,) and precision (N, N), zero where there is none."""
 
     centre: FloatArray
     precision: FloatArray
 
     def cost(self, x: FloatArray) -> float:
         """Return the sum of squares that the prior adds at x."""
-        return float(self.precision @ (x - self.centre) ** 2)
+        return float((x - self.centre) @ self.precision @ (x - self.centre))
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,8 +226,8 @@ class _Objective:
         if self.prior is None:
             return cost, normal, gradient
         index = list(self.free)
-        pull = self.prior.precision * (self.prior.centre - x)
-        return cost + self.prior.cost(x), normal + np.diag(self.prior.precision[index]), gradient + pull[index]
+        pull = self.prior.precision @ (self.prior.centre - x)
+        return cost + self.prior.cost(x), normal + self.prior.precision[np.ix_(index, index)], gradient + pull[index]
 
     def at(self, x: FloatArray, *, with_equations: bool) -> tuple[float, tuple[FloatArray, FloatArray] | None]:
         """Return the cost at x, and the normal equations where they are wanted or computed anyway."""

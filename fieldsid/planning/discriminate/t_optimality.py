@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldsid.fitting.optimise.levenberg_marquardt import normal_equations
-from fieldsid.fitting.problem.problem import Problem
+from fieldsid.fitting.optimise.levenberg_marquardt import GaussianPrior, levenberg_marquardt
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
@@ -21,7 +20,6 @@ from fieldsid.planning.flight.operating_point import OperatingPoint
 from fieldsid.planning.flight.rule_flight import Response
 
 MAX_REFIT_ITERATIONS, CONVERGED_COST_CHANGE = 6, 0.01
-SMALLEST_STEP = 1.0 / 64.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +29,6 @@ class Rival:
     name: str
     scene: OperatingPoint
     precision: FloatArray
-    scale: FloatArray
 
     @property
     def noise(self) -> Noise:
@@ -54,7 +51,7 @@ def rival_of(scene: OperatingPoint) -> Rival:
         root = np.sqrt(np.maximum(np.diag(known), 1e-300))
         unit = known / np.outer(root, root) + 1e-8 * np.eye(root.size)
         precision[np.ix_(at, at)] += np.linalg.inv(unit) / np.outer(root, root)
-    return Rival("+".join(model.effects) or "none", scene, precision, size)
+    return Rival("+".join(model.effects) or "none", scene, precision)
 
 
 def log_odds(winner: Rival, loser: Rival, response: Response, rounds: int = MAX_REFIT_ITERATIONS) -> float:
@@ -71,38 +68,6 @@ def log_odds(winner: Rival, loser: Rival, response: Response, rounds: int = MAX_
 def _refitted(loser: Rival, record: Record, noise: Noise, rounds: int) -> float:
     """Return the whitened residual sum of squares of a refitted rival on a record, the prior's term included."""
     problem, start = problem_of(loser.scene, record)
-    x, total = start.copy(), np.inf
-    step = np.zeros_like(x)
-    share = 1.0
-    for _ in range(2 * rounds):
-        trial = np.clip(x + share * step, problem.layout.low, problem.layout.high)
-        cost, normal, gradient = _cost(problem, trial, start, loser, noise)
-        if cost < total:
-            settled = total - cost < CONVERGED_COST_CHANGE * max(cost, 1.0)
-            x, total, share = trial, cost, 1.0
-            if settled:
-                break
-            step = _solve(normal, gradient, x, problem)
-        else:
-            share *= 0.25
-            if share < SMALLEST_STEP or not np.isfinite(total):
-                break
-    return float(total) if np.isfinite(total) else 0.0
-
-
-def _cost(problem: Problem, x: FloatArray, start: FloatArray, loser: Rival, noise: Noise) -> tuple[float, FloatArray, FloatArray]:
-    cost, normal, gradient, _ = normal_equations(problem, x, noise, range(x.size))
-    moved = x - start
-    pull = loser.precision @ moved
-    return cost + float(moved @ pull), normal + loser.precision, gradient - pull
-
-
-def _solve(normal: FloatArray, gradient: FloatArray, x: FloatArray, problem: Problem) -> FloatArray:
-    low, high = problem.layout.low, problem.layout.high
-    at_bound = ((x <= low) & (gradient < 0)) | ((x >= high) & (gradient > 0))
-    free = np.flatnonzero(~at_bound)
-    scale = np.sqrt(np.maximum(np.diag(normal)[free], 1e-30))
-    unit = normal[np.ix_(free, free)] / np.outer(scale, scale) + 1e-9 * np.eye(free.size)
-    step = np.zeros_like(x)
-    step[free] = np.linalg.solve(unit, gradient[free] / scale) / scale
-    return step
+    prior = GaussianPrior(start, loser.precision)
+    found = levenberg_marquardt(problem, start, noise, prior=prior, max_iterations=rounds, tolerance=CONVERGED_COST_CHANGE)
+    return found.cost if np.isfinite(found.cost) else 0.0

@@ -232,13 +232,13 @@ def test_a_prior_holds_a_slot_as_strongly_as_it_says():
     problem = problem_of([record(YAW[1])])
     x = equation_error_start(problem.records, problem.layout)
     free = levenberg_marquardt(problem, x, NOISE)
-    centre, precision = free.x.copy(), np.zeros(x.size)
+    centre, precision = free.x.copy(), np.zeros((x.size, x.size))
     centre[4] += 0.01
-    precision[4] = 1e12
+    precision[4, 4] = 1e12
     assert levenberg_marquardt(problem, x, NOISE, prior=GaussianPrior(centre, precision)).x[4] == pytest.approx(
         centre[4], abs=1e-6
     )
-    precision[4] = 0.0
+    precision[4, 4] = 0.0
     np.testing.assert_allclose(
         levenberg_marquardt(problem, x, NOISE, prior=GaussianPrior(centre, precision)).x, free.x, rtol=1e-4, atol=1e-7
     )
