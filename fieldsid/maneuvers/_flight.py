@@ -54,6 +54,10 @@ class Limits:
         """Return the lowest and the highest fin (m,) about trim angles (m,), rad; the trim itself is within them."""
         return np.minimum(-self.fin - trim, 0.0), np.maximum(self.fin - trim, 0.0)
 
+    def rows(self, trim: FloatArray) -> FloatArray:
+        """Return lowest and highest fin, largest rate and trim of vehicles with trim angles (m,), (m, 4), for a kernel."""
+        return np.column_stack([*self.about(trim), np.full(trim.size, self.fin_rate), trim])
+
 
 @dataclass(frozen=True, slots=True)
 class Autopilot:

@@ -9,7 +9,7 @@ from itertools import islice
 import numpy as np
 
 from fieldsid.errors import UsageError
-from fieldsid.maneuvers import Schedule, pick_maneuver
+from fieldsid.maneuvers import pick_maneuver
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.belief.prior_model import draws_of, scales_of
@@ -136,10 +136,10 @@ def _nominal(objective: Objective, candidate: Excitation) -> FloatArray:
     """Return the fin angle about trim (n,) rad that a rule commands for the prior's mean, NaN where the autopilot steers."""
     if candidate.record.rule is None:
         return np.zeros(0)
-    window = objective.window
+    window, limits = objective.window, objective.envelope.limits
     flight = fly_operating_points(
-        [objective.scene], candidate.record, candidate.parameters, limits=objective.envelope.limits,
-        autopilot=objective.autopilot, schedule=Schedule(window.rate_hz, window.lead, window.recover),
+        [objective.scene], candidate.record, candidate.parameters,
+        limits=limits, autopilot=objective.autopilot, schedule=window.schedule,
     )  # fmt: skip
     return np.where(flight.recovering[:, 0], np.nan, flight.fin[:, 0])[: window.time.size]
 

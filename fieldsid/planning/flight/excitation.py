@@ -12,7 +12,7 @@ from fieldsid.errors import UsageError
 from fieldsid.maneuvers import RATE_HZ, Autopilot, Limits, Maneuver, Schedule, pick_maneuver, spec_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.flight.operating_point import OperatingPoint
-from fieldsid.planning.flight.rule_flight import Response, fly_fins, fly_operating_points, plant_of
+from fieldsid.planning.flight.rule_flight import OperatingPointPlant, Response, fly_fins, fly_operating_points, plant_of
 from fieldsid.records.keys import Key
 
 LONGEST_WINDOW_S = 300.0
@@ -37,6 +37,11 @@ class Window:
     def shortest(self) -> float:
         """Least length of a window with this lead and recovery, s."""
         return self.lead + self.recover + 2.0
+
+    @property
+    def schedule(self) -> Schedule:
+        """The same for the flight of a rule."""
+        return Schedule(self.rate_hz, self.lead, self.recover)
 
     @property
     def time(self) -> FloatArray:
@@ -112,6 +117,25 @@ def fin_command(candidate: Excitation, window: Window) -> FloatArray:
     return np.where(steered, np.nan, fin)
 
 
+def fly_window(
+    plant: OperatingPointPlant, candidate: Excitation, window: Window, limits: Limits, autopilot: Autopilot,
+    moments: FloatArray | None = None,
+) -> tuple[FloatArray, FloatArray, FloatArray]:  # fmt: skip
+    """Return command, angle and rate (k, m) of a plant under a candidate, for at most the length of a window.
+
+    `plant` is over the window and has the disturbance `moments` (m, n), which the longer flight of a rule takes as well.
+    """
+    if candidate.record.rule is None:
+        command, angle, rate = fly_fins(plant, fin_command(candidate, window), limits, autopilot)
+        return command, angle, rate
+    flight = fly_operating_points(
+        plant.scenes, candidate.record, candidate.parameters,
+        limits=limits, autopilot=autopilot, schedule=window.schedule, moments=moments,
+    )  # fmt: skip
+    n = plant.steps.size + 1
+    return flight.fin[:n], flight.angle[:n], flight.rate[:n]
+
+
 def flown(scene: OperatingPoint, candidate: Excitation, window: Window, limits: Limits, autopilot: Autopilot) -> Response:
     """Return the response of one operating point to a candidate over a window."""
     return flown_all([scene], candidate, window, limits, autopilot)[0]
@@ -121,17 +145,10 @@ def flown_all(
     scenes: Sequence[OperatingPoint], candidate: Excitation, window: Window, limits: Limits, autopilot: Autopilot
 ) -> list[Response]:
     """Return the responses of several operating points to a candidate over a window."""
-    time = window.time
-    if candidate.record.rule is None:
-        plant = plant_of(scenes, time.size, window.rate_hz, None)
-        columns = fly_fins(scenes, plant, time, fin_command(candidate, window), limits, autopilot)
-    else:
-        schedule = Schedule(window.rate_hz, window.lead, window.recover)
-        flight = fly_operating_points(
-            scenes, candidate.record, candidate.parameters, limits=limits, autopilot=autopilot, schedule=schedule
-        )
-        time, columns = flight.time[: time.size], (flight.fin, flight.angle, flight.rate)
-    return [Response(time, *(c[: time.size, i].copy() for c in columns)) for i in range(len(scenes))]
+    plant = plant_of(scenes, window.time.size, window.rate_hz)
+    columns = fly_window(plant, candidate, window, limits, autopilot)
+    time = window.time[: columns[0].shape[0]]
+    return [Response(time, *(c[:, i].copy() for c in columns)) for i in range(len(scenes))]
 
 
 def fits(candidate: Excitation, window: Window) -> bool:

@@ -40,26 +40,35 @@ def add_fin(drive: FloatArray, i: int, start: float, end: float, push_start: flo
 
 @jit
 def closed_loop(
-    steps: FloatArray, drive: FloatArray, c: FloatArray, pieces: int, fins: FloatArray, off: FloatArray,
-    push: FloatArray, gains: FloatArray, limits: FloatArray, command: FloatArray, out: FloatArray,
+    at: int, steps: FloatArray, drive: FloatArray, c: FloatArray, pieces: int, fins: FloatArray, off: FloatArray,
+    push: FloatArray, gains: FloatArray, limits: FloatArray, state: FloatArray, out: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill command (n,) and out (n, 3) with fin command, and angle, rate and cross state from rest.
+    """Advance m operating points by k samples from the sample `at` on; fill out (3, k, m) with fin command, angle and rate.
 
-    fins (n,): fin angle about trim, NaN where the autopilot steers. off (n-1, 2): fin angle minus command at both ends of each
-    interval. push (n-1, 2): moment per rad at both ends. gains (3,): angle gain, rate gain and fin limit of the autopilot.
-    limits (4,): lowest and highest command, rate limit, trim fin.
+    state (m, 4): angle, rate, cross state, last command, of which the new ones are stored. fins (k, m), or (k, 1) for all alike:
+    fin angle about trim, NaN where the autopilot steers. drive (m, n-1, 6) is without the fin. off (m, n-1, 2): fin angle minus
+    command at both ends of each interval. push (m, n-1, 2): moment per rad at both ends. gains (3,): angle gain, rate gain and
+    fin limit of the autopilot. limits (m, 4): lowest and highest command, rate limit, trim fin. The last sample begins no
+    interval.
     """
-    n, state, last = fins.shape[0], (0.0, 0.0, 0.0), 0.0
-    k, kinds = named(c), kinds_of(c)
-    for i in range(n):
-        out[i, 0], out[i, 1], out[i, 2] = state
-        fin = steer(fins[i], state[0], state[1], last, gains, limits[2] * steps[min(i, n - 2)], limits[0], limits[1])
-        command[i] = fin
-        last = fin
-        if i == n - 1:
-            break
-        add_fin(drive, i, limits[3] + fin + off[i, 0], limits[3] + fin + off[i, 1], push[i, 0], push[i, 1])
-        state = over_interval(k, kinds, drive, i, steps[i], pieces, -0.5 * steps[i], state)
+    now = np.empty((1, drive.shape[2]))
+    for v in range(state.shape[0]):
+        k, kinds, own = named(c[v]), kinds_of(c[v]), v % fins.shape[1]
+        motion, last = (state[v, 0], state[v, 1], state[v, 2]), state[v, 3]
+        for j in range(fins.shape[0]):
+            i = at + j
+            step = steps[min(i, steps.shape[0] - 1)]
+            last = steer(fins[j, own], motion[0], motion[1], last, gains, limits[v, 2] * step, limits[v, 0], limits[v, 1])
+            out[0, j, v], out[1, j, v], out[2, j, v] = last, motion[0], motion[1]
+            if i == steps.shape[0]:
+                break
+            for l in range(drive.shape[2]):
+                now[0, l] = drive[v, i, l]
+            fin = limits[v, 3] + last
+            add_fin(now, 0, fin + off[v, i, 0], fin + off[v, i, 1], push[v, i, 0], push[v, i, 1])
+            motion = over_interval(k, kinds, now, 0, step, pieces, -0.5 * step, motion)
+        state[v, 0], state[v, 1], state[v, 2] = motion
+        state[v, 3] = last
 
 
 @lru_cache(maxsize=16)
@@ -79,37 +88,17 @@ ACTUATOR_ROUNDS = 4
 """Iterations in which the path of the fin behind the actuator effects is fed back into the simulated loop."""
 
 
-@jit
-def advance_all(
-    step: float, at: int, drive: FloatArray, c: FloatArray, pieces: int, push: FloatArray, fin: FloatArray, trim: FloatArray,
-    off: FloatArray, state: FloatArray, moved: FloatArray,
-) -> None:  # fmt: skip
-    """Advance states (m, 3) by the interval `at` with fins (m,) about trim (m,), and fill moved (2, m) with angles and rates.
-
-    drive (m, n-1, 6) without the fin; push (m, n-1, 2) and off (m, n-1, 2) as in `closed_loop`.
-    """
-    now = np.empty((1, drive.shape[2]))
-    for i in range(state.shape[0]):
-        for j in range(drive.shape[2]):
-            now[0, j] = drive[i, at, j]
-        angle = trim[i] + fin[i]
-        add_fin(now, 0, angle + off[i, at, 0], angle + off[i, at, 1], push[i, at, 0], push[i, at, 1])
-        before = (state[i, 0], state[i, 1], state[i, 2])
-        state[i, 0], state[i, 1], state[i, 2] = over_interval(
-            named(c[i]), kinds_of(c[i]), now, 0, step, pieces, -0.5 * step, before
-        )
-        moved[0, i], moved[1, i] = state[i, 0], state[i, 1]
-
-
 @dataclass(slots=True)
 class OperatingPointPlant:
-    """Operating points as the plant of `maneuvers.fly`; `off` (m, n-1, 2) is each fin angle minus its command."""
+    """Operating points as the plant of `maneuvers.fly`, with the arrays of `closed_loop`; `free` are its limits without any."""
 
+    scenes: Sequence[OperatingPoint]
+    steps: FloatArray
     drive: FloatArray
     constants: FloatArray
     pieces: int
     push: FloatArray
-    trim: FloatArray
+    free: FloatArray
     off: FloatArray
     state: FloatArray
     at: int = 0
@@ -117,31 +106,40 @@ class OperatingPointPlant:
     @property
     def size(self) -> int:
         """Number of operating points."""
-        return int(self.trim.size)
+        return len(self.scenes)
 
-    def advance(self, fin: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
-        """Advance by `step` s with constant fins (m,) about trim; return angles and rates (m,)."""
-        at, moved = min(self.at, self.drive.shape[1] - 1), np.empty((2, self.size))
-        advance_all(
-            step, at, self.drive, self.constants, self.pieces, self.push, fin, self.trim, self.off, self.state, moved
-        )  # fmt: skip
-        self.at += 1
-        return moved[0], moved[1]
+    @property
+    def trim(self) -> FloatArray:
+        """Fin angles of straight flight (m,), rad."""
+        trim: FloatArray = self.free[:, 3]
+        return trim
+
+    def flown(self, fins: FloatArray, gains: FloatArray, limits: FloatArray) -> FloatArray:
+        """Advance by the samples of fins (k, m or 1); return command, angle and rate at them, (3, k, m), see `closed_loop`."""
+        out = np.empty((3, fins.shape[0], self.size))
+        at = min(self.at, self.steps.size - 1)
+        closed_loop(
+            at, self.steps, self.drive, self.constants, self.pieces, fins, self.off, self.push, gains, limits, self.state, out
+        )
+        self.at += fins.shape[0]
+        return out
+
+    def advance(self, fin: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 - the plant has its steps
+        """Advance by one sample with constant fins (m,) about trim; return angles and rates (m,)."""
+        self.flown(fin[None, :], np.zeros(3), self.free)
+        return self.state[:, 0].copy(), self.state[:, 1].copy()
 
     def first(self, count: int) -> OperatingPointPlant:
         """Return the first operating points only, at rest."""
-        part = slice(0, count)
-        return OperatingPointPlant(
-            self.drive[part], self.constants[part], self.pieces, self.push[part], self.trim[part], self.off[part],
-            np.zeros((count, 3)),
-        )  # fmt: skip
+        own = {name: getattr(self, name)[:count] for name in ("scenes", "drive", "constants", "push", "free", "off")}
+        return replace(self, **own, state=np.zeros((count, 4)), at=0)
 
     def again(self, off: FloatArray) -> OperatingPointPlant:
         """Return the plant at rest at its start, with another `off`."""
-        return replace(self, off=off, state=np.zeros((self.size, 3)), at=0)
+        return replace(self, off=off, state=np.zeros((self.size, 4)), at=0)
 
 
-def plant_of(scenes: Sequence[OperatingPoint], n: int, rate_hz: float, moments: FloatArray | None) -> OperatingPointPlant:
+def plant_of(scenes: Sequence[OperatingPoint], n: int, rate_hz: float, moments: FloatArray | None = None) -> OperatingPointPlant:
     """Return operating points at rest as one plant over n samples; moments (m, n) rad/s^2 are disturbances."""
     count = len(scenes)
     drive, push = np.empty((count, n - 1, len(DRIVES))), np.empty((count, n - 1, 2))
@@ -154,38 +152,18 @@ def plant_of(scenes: Sequence[OperatingPoint], n: int, rate_hz: float, moments: 
     if moments is not None:
         drive[:, :, MOMENT_START] += moments[:, :-1]
         drive[:, :, MOMENT_END] += moments[:, 1:]
-    trim = np.array([s.trim_fin for s in scenes])
-    return OperatingPointPlant(drive, constants, pieces, push, trim, np.zeros((count, n - 1, 2)), np.zeros((count, 3)))
+    steps, free = np.diff(np.arange(n) / rate_hz), np.array([[-np.inf, np.inf, np.inf, s.trim_fin] for s in scenes])
+    off = np.zeros((count, n - 1, 2))
+    return OperatingPointPlant(scenes, steps, drive, constants, pieces, push, free, off, np.zeros((count, 4)))
 
 
-def fly_fins(
-    scenes: Sequence[OperatingPoint],
-    plant: OperatingPointPlant,
-    time: FloatArray,
-    fins: FloatArray,
-    limits: Limits,
-    autopilot: Autopilot,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return command, angle and rate (n, m) of operating points from rest; fins (n,) rad about trim, NaN for the autopilot.
+def fly_fins(plant: OperatingPointPlant, fins: FloatArray, limits: Limits, autopilot: Autopilot) -> FloatArray:
+    """Return command, angle and rate, (3, n, m), of a plant from rest; fins (n,) rad about trim, NaN for the autopilot.
 
-    `plant` is that of the operating points, from `plant_of`. Actuator effects transform the whole command path, so that the loop
-    is simulated in a few iterations (`_through_actuators`).
+    Actuator effects transform the whole command path, so that the loop is simulated in a few iterations (`_through_actuators`).
     """
-    command, angle, rate = (np.empty((plant.size, time.size)) for _ in range(3))
-    bounds = np.column_stack([*limits.about(plant.trim), np.full(plant.size, limits.fin_rate), plant.trim])
-    gains, steps, out = autopilot.gains, np.diff(time), np.empty((time.size, 3))
-
-    def flown(off: FloatArray) -> FloatArray:
-        for i in range(plant.size):
-            closed_loop(
-                steps, plant.drive[i].copy(), plant.constants[i], plant.pieces, fins, off[i], plant.push[i], gains, bounds[i],
-                command[i], out,
-            )  # fmt: skip
-            angle[i], rate[i] = out[:, 0], out[:, 1]
-        return command.T
-
-    _through_actuators(scenes, time, plant.off, flown, lambda commands: commands)
-    return command.T, angle.T, rate.T
+    rows, gains = limits.rows(plant.trim), autopilot.gains
+    return _through_actuators(plant, lambda at_rest: at_rest.flown(fins[:, None], gains, rows), lambda found: found[0])
 
 
 def fly_operating_points(
@@ -200,35 +178,30 @@ def fly_operating_points(
 ) -> Flight:
     """Return the simulation of a maneuver from rest with actuator effects; moments (m, k) rad/s^2 are disturbances."""
     longest = schedule.run_up + maneuver.duration(parameters) + schedule.recover
-    time = np.arange(round(longest * schedule.rate_hz) + 2) / schedule.rate_hz
+    n = round(longest * schedule.rate_hz) + 2
     if moments is not None:
-        moments = np.pad(moments, ((0, 0), (0, max(0, time.size - moments.shape[1]))), mode="edge")[:, : time.size]
-    plant = plant_of(scenes, time.size, schedule.rate_hz, moments)
+        moments = np.pad(moments, ((0, 0), (0, max(0, n - moments.shape[1]))), mode="edge")[:, :n]
 
-    def flown(off: FloatArray) -> Flight:
-        return fly(maneuver, parameters, plant.again(off), limits=limits, autopilot=autopilot, schedule=schedule)
+    def flown(at_rest: OperatingPointPlant) -> Flight:
+        return fly(maneuver, parameters, at_rest, limits=limits, autopilot=autopilot, schedule=schedule)
 
-    return _through_actuators(scenes, time, plant.off, flown, lambda flight: flight.fin)
+    return _through_actuators(plant_of(scenes, n, schedule.rate_hz, moments), flown, lambda flight: flight.fin)
 
 
 def _through_actuators(
-    scenes: Sequence[OperatingPoint],
-    time: FloatArray,
-    off: FloatArray,
-    flown: Callable[[FloatArray], T],
-    commands: Callable[[T], FloatArray],
+    plant: OperatingPointPlant, flown: Callable[[OperatingPointPlant], T], commands: Callable[[T], FloatArray]
 ) -> T:
-    """Return the last of ACTUATOR_ROUNDS simulations; each has the fin paths for the commands (k, m) of the previous one.
+    """Return the last of ACTUATOR_ROUNDS simulations of a plant; each has the fin paths for the commands (k, m) of the last one.
 
-    off (m, n-1, 2) is each fin angle minus its command at both ends of every interval of `time` (n,), in the first simulation; it
-    is zero after the end of a flight.
+    The difference of fin angle and command is zero in the first simulation, and after the end of a flight.
     """
+    scenes, off = plant.scenes, plant.off
     has_actuator_effect = any(e.fin is not None for s in scenes for e in s.effects)
     for remaining in reversed(range(ACTUATOR_ROUNDS if has_actuator_effect else 1)):
-        found = flown(off)
+        found = flown(plant.again(off))
         if remaining:
             command, before, off = commands(found), off, np.zeros_like(off)
-            idle = _idle(scenes, time[: command.shape[0]])
+            idle = _idle(scenes, np.append(0.0, np.cumsum(plant.steps))[: command.shape[0]])
             for i, scene in enumerate(scenes):
                 fin, constant = command[:, i] + scene.trim_fin, command[:-1, i] + scene.trim_fin
                 path = fin_path(idle[scene.speed].with_fin(fin), scene.effects, scene.values)

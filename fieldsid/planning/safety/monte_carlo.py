@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldsid.maneuvers import Autopilot, Schedule
-from fieldsid.models.axis import Axis
+from fieldsid.maneuvers import Autopilot
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 from fieldsid.planning.belief.prior_model import disturbances, draws_of
-from fieldsid.planning.flight.excitation import Excitation, Window, fin_command
+from fieldsid.planning.flight.excitation import Excitation, Window, fly_window
 from fieldsid.planning.flight.operating_point import OperatingPoint, operating_point
-from fieldsid.planning.flight.rule_flight import OperatingPointPlant, fly_fins, fly_operating_points, plant_of
+from fieldsid.planning.flight.rule_flight import OperatingPointPlant, fly_fins, plant_of
 from fieldsid.planning.safety.envelope import Envelope, excursions_of, outside, track_of
 
 ROLL_SPREAD = 0.4
@@ -25,17 +25,19 @@ TRIM_SPREAD = 0.005
 class Ensemble:
     """Draws of a prior at one speed, each with its disturbance moment (m, n), error of trim fin, and roll factor (m,)."""
 
-    axis: Axis
-    scenes: tuple[OperatingPoint, ...]
     moments: FloatArray
     roll: FloatArray
     plant: OperatingPointPlant
     window: Window
 
+    @property
+    def scenes(self) -> Sequence[OperatingPoint]:
+        """The operating points of the draws."""
+        return self.plant.scenes
+
     def first(self, count: int) -> Ensemble:
         """Return the first draws only."""
-        plant = self.plant.first(count)
-        return replace(self, scenes=self.scenes[:count], moments=self.moments[:count], roll=self.roll[:count], plant=plant)
+        return replace(self, moments=self.moments[:count], roll=self.roll[:count], plant=self.plant.first(count))
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,23 +64,13 @@ def draw_ensemble(model: Model, speed: float, window: Window, count: int, seed: 
     lift = np.array([s.base.authority for s in scenes])
     moments = moments + (lift * TRIM_SPREAD * rng.standard_normal(count))[:, None]
     roll = np.exp(ROLL_SPREAD * rng.standard_normal(count))
-    return Ensemble(model.axis, scenes, moments, roll, plant_of(scenes, n, window.rate_hz, moments), window)
+    return Ensemble(moments, roll, plant_of(scenes, n, window.rate_hz, moments), window)
 
 
 def fly_ensemble(ensemble: Ensemble, candidate: Excitation, envelope: Envelope, autopilot: Autopilot, run_up_m: float) -> Flights:
     """Return the flights of an ensemble under an excitation, with one autopilot, that for the prior's mean."""
-    if candidate.record.rule is None:
-        fins = fin_command(candidate, ensemble.window)
-        _, angle, rate = fly_fins(ensemble.scenes, ensemble.plant, ensemble.window.time, fins, envelope.limits, autopilot)
-    else:
-        schedule = Schedule(ensemble.window.rate_hz, ensemble.window.lead, ensemble.window.recover)
-        flight = fly_operating_points(
-            ensemble.scenes, candidate.record, candidate.parameters,
-            limits=envelope.limits, autopilot=autopilot, schedule=schedule, moments=ensemble.moments,
-        )  # fmt: skip
-        n = ensemble.window.time.size
-        angle, rate = flight.angle[:n], flight.rate[:n]
-    return _with_excursions(ensemble, angle, rate, run_up_m)
+    found = fly_window(ensemble.plant, candidate, ensemble.window, envelope.limits, autopilot, ensemble.moments)
+    return _with_excursions(ensemble, found[1], found[2], run_up_m)
 
 
 def fly_list(ensemble: Ensemble, fins: FloatArray, envelope: Envelope, autopilot: Autopilot, run_up_m: float) -> Flights:
@@ -89,12 +81,13 @@ def fly_list(ensemble: Ensemble, fins: FloatArray, envelope: Envelope, autopilot
     command = np.full(ensemble.window.time.size, np.nan)
     count = min(command.size, fins.size)
     command[:count] = fins[:count]
-    _, angle, rate = fly_fins(ensemble.scenes, ensemble.plant, ensemble.window.time, command, envelope.limits, autopilot)
+    _, angle, rate = fly_fins(ensemble.plant, command, envelope.limits, autopilot)
     return _with_excursions(ensemble, angle, rate, run_up_m)
 
 
 def _with_excursions(ensemble: Ensemble, angle: FloatArray, rate: FloatArray, run_up_m: float) -> Flights:
     """Return the flights of angles and rates (n, m) with tracks and excursions."""
     step, speed = 1.0 / ensemble.window.rate_hz, ensemble.scenes[0].speed
-    far = excursions_of(ensemble.axis, angle, rate, speed=speed, step=step, run_up=run_up_m, roll_gain=ensemble.roll)
-    return Flights(ensemble.window.time[: angle.shape[0]], angle, *track_of(ensemble.axis, angle, speed, step), far)
+    axis = ensemble.scenes[0].axis
+    far = excursions_of(axis, angle, rate, speed=speed, step=step, run_up=run_up_m, roll_gain=ensemble.roll)
+    return Flights(ensemble.window.time[: angle.shape[0]], angle, *track_of(axis, angle, speed, step), far)

@@ -8,8 +8,7 @@ import sys
 AGAIN = """
 from fieldsid.planning import jit_warmup
 from fieldsid.planning.flight.rule_flight import closed_loop
-from fieldsid.planning.flight.rule_flight import advance_all
-doors = closed_loop, advance_all
+doors = (closed_loop,)
 jit_warmup.compile_planning()
 known = [d.signatures for d in doors]
 from fieldsid.cli.app import run
