@@ -11,11 +11,9 @@ Biometrika 73(1); that of correlated ones by an autoregression: Andrews 1991, Ec
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import floor, isfinite, log, nan
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from scipy.special import stdtrit
@@ -42,7 +40,8 @@ constant fin does not separate authority from trim."""
 COLUMNS = RATE, _, _, FIN, ONE, _ = tuple(range(6))
 FREE = (RATE, FIN, ONE)
 """Columns: r, r|r|, angle, fin, one, target. The coefficients of r, fin and one are free after a jump."""
-_UPPER = np.triu_indices(len(COLUMNS))
+BEGIN, COUNT, PRODUCTS = 0, 1, slice(2, 2 + len(COLUMNS) ** 2)
+"""The sums over a second: its begin in s, the number of rows, and the sum of the products of rows [phi, target] (6, 6)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,34 +53,26 @@ class Jump:
     std_error: Annotated[float, Key("Its standard error.")]
 
 
-@dataclass(slots=True)
-class _Sums:
-    """Sum of the products of rows [phi, target] (6, 6) over an interval that starts at `begin` s, and the number of rows."""
-
-    begin: float = nan
-    products: FloatArray = field(default_factory=lambda: np.zeros((len(COLUMNS), len(COLUMNS))))
-    count: float = 0.0
-
-
 class AuthorityJump:
     """Sums of row products, separately for each second of the last minute; `stiff`: whether the model has a stiffness."""
 
-    __slots__ = ("_before", "_free", "_freedom", "_keep", "_noise", "_rows", "_seconds", "_speed", "_usual")
+    STATE = ("_before", "_seconds", "_rows", "_noise", "_freedom", "_usual", "_speed")
+    __slots__ = ("_free", "_keep", *STATE)
 
     def __init__(self, *, stiff: bool) -> None:
         self._keep = np.array([0, 1, 2, FIN, ONE] if stiff else [0, 1, FIN, ONE])
         self._free = np.flatnonzero(np.isin(self._keep, FREE))
-        self._before = _Sums()
-        self._seconds: deque[_Sums] = deque()
+        self._before, self._seconds = np.zeros(PRODUCTS.stop), np.zeros((0, PRODUCTS.stop))
         self._rows: list[tuple[float, ...]] = []
         self._noise, self._freedom, self._usual, self._speed = nan, nan, nan, nan
 
     def add(self, time: float, row: FloatArray, speed: float) -> Jump | None:
         """Add one row (5,) at a time in s and a surge in m/s, NaN where unknown; return a jump where one is detected."""
         found = None
-        if not self._seconds or floor(time) != floor(self._seconds[-1].begin):
+        if not len(self._seconds) or floor(time) != floor(self._seconds[-1, BEGIN]):
             found = self._end_second(time)
-            self._seconds.append(_Sums(time))
+            self._seconds = np.vstack([self._seconds, np.zeros(PRODUCTS.stop)])
+            self._seconds[-1, BEGIN] = time
         self._speed = speed if isfinite(speed) and speed > 0.0 else self._speed
         self._usual = self._usual if isfinite(self._usual) else self._speed
         faster = self._speed / self._usual if isfinite(self._speed) else 1.0
@@ -89,38 +80,26 @@ class AuthorityJump:
         self._rows.append((rate * faster, rate * abs(rate), stiff, moved * faster * faster, one, target))
         return found
 
-    def state(self) -> dict[str, Any]:
-        """Return the state as plain values, NaN as None."""
-        self._sum_waiting_rows()
-        numbers = [v if isfinite(v) else None for v in (self._noise, self._freedom, self._usual, self._speed)]
-        return {"numbers": numbers, "sums": [_plain(s) for s in (self._before, *self._seconds)]}
-
-    def restore(self, state: Mapping[str, Any]) -> None:
-        """Restore a state; raises ValueError, TypeError or IndexError where it is not valid."""
-        self._noise, self._freedom, self._usual, self._speed = (nan if v is None else float(v) for v in state["numbers"])
-        self._before, *seconds = (_sums(s) for s in state["sums"])
-        self._seconds = deque(seconds)
-
     def _end_second(self, time: float) -> Jump | None:
         """Look for a jump at the end of a second; where the clock restarts, all earlier seconds are merged into `_before`."""
         self._sum_waiting_rows()
         seconds = self._seconds
-        while seconds and (len(seconds) >= SEPARATE_SECONDS or time < seconds[-1].begin):
-            oldest = seconds.popleft()
-            self._before.products += oldest.products
-            self._before.count += oldest.count
+        is_restart = len(seconds) and time < seconds[-1, BEGIN]
+        oldest = len(seconds) if is_restart else max(len(seconds) + 1 - SEPARATE_SECONDS, 0)
+        self._before += seconds[:oldest].sum(axis=0)
+        self._seconds = seconds[oldest:]
         found = self._detected()
         if found is not None:
-            since = [s for s in seconds if s.begin >= found.time]
-            self._before, self._seconds, self._noise = _Sums(), deque(since), nan
+            since = self._seconds[:, BEGIN] >= found.time
+            self._before, self._seconds, self._noise = np.zeros(PRODUCTS.stop), self._seconds[since], nan
         return found
 
     def _sum_waiting_rows(self) -> None:
         """Add the waiting rows to the sums of their second."""
         if self._rows:
             rows = np.array(self._rows)
-            self._seconds[-1].products += rows.T @ rows
-            self._seconds[-1].count += len(rows)
+            self._seconds[-1, PRODUCTS] += (rows.T @ rows).ravel()
+            self._seconds[-1, COUNT] += len(rows)
             self._rows.clear()
 
     def _detected(self) -> Jump | None:
@@ -129,13 +108,14 @@ class AuthorityJump:
         Seconds less than MIN_SECONDS_AFTER ago are candidates too: without them, one recent second that does not fit would be
         explained by an earlier candidate.
         """
-        sums, keep, free, count = np.array([s.products for s in self._seconds]), self._keep, self._free, len(self._seconds)
+        keep, free, count = self._keep, self._free, len(self._seconds)
         if not count:
             return None
+        sums = self._seconds[:, PRODUCTS].reshape(count, len(COLUMNS), -1)
         places = np.arange(max(count - MAX_SECONDS_AFTER, 0), count)
-        cumulative, row_counts = np.cumsum(sums, axis=0), np.cumsum([s.count for s in self._seconds])
+        cumulative, row_counts = np.cumsum(sums, axis=0), np.cumsum(self._seconds[:, COUNT])
         earlier = cumulative[places] - sums[places]
-        before, after = self._before.products + earlier, cumulative[-1] - earlier
+        before, after = self._before[PRODUCTS].reshape(len(COLUMNS), -1) + earlier, cumulative[-1] - earlier
         since = row_counts[-1] - np.append(0.0, row_counts)[places]
         inverse, determines_before = _inverses(before[:, keep][:, :, keep], MIN_EXCITATION_BEFORE)
         theta = (inverse @ before[:, keep, -1:])[..., 0]
@@ -152,7 +132,7 @@ class AuthorityJump:
         rss_after = np.maximum(rss_after, 0.0)
         fin, fin_place = int(np.flatnonzero(keep == FIN)[0]), FREE.index(FIN)
         was, is_now = theta[:, fin], new[:, fin]
-        counted = self._before.count + row_counts[-1] - since
+        counted = self._before[COUNT] + row_counts[-1] - since
         noisier = np.maximum(rss_after * counted / np.maximum(rss_before * since, 1e-30), 1.0)
         moved = slopes[:, fin_place].copy()
         moved[:, fin] -= 1.0
@@ -178,7 +158,9 @@ class AuthorityJump:
         best = int(np.argmin(np.where(determines_before & np.isfinite(noise), rss_before + rss_after, np.inf)))
         if not jumps[best] or places[best] > count - MIN_SECONDS_AFTER:
             return None
-        return Jump(self._seconds[places[best]].begin, float(is_now[best] / was[best]), float(error[best] / abs(was[best])))
+        return Jump(
+            float(self._seconds[places[best], BEGIN]), float(is_now[best] / was[best]), float(error[best] / abs(was[best]))
+        )
 
     def _score_variances(self, sums: FloatArray, theta: FloatArray, places: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return the variance of the scores before each candidate over that of the columns, and its degrees of freedom (P,).
@@ -220,14 +202,3 @@ def _inverses(normals: FloatArray, least: float) -> tuple[FloatArray, BoolArray]
     outer = scale[:, :, None] * scale[:, None, :]
     ones = normals / outer
     return np.asarray(np.linalg.pinv(ones, hermitian=True) / outer), is_determined & (np.linalg.eigvalsh(ones)[:, 0] >= least)
-
-
-def _plain(sums: _Sums) -> list[Any]:
-    return [sums.begin if isfinite(sums.begin) else None, sums.count, sums.products[_UPPER].tolist()]
-
-
-def _sums(saved: Sequence[Any]) -> _Sums:
-    begin, count, upper = saved
-    made = _Sums(nan if begin is None else float(begin), count=float(count))
-    made.products[_UPPER] = made.products.T[_UPPER] = np.array(upper, dtype=np.float64)
-    return made

@@ -14,6 +14,7 @@ authority takes 3 ms once a second.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import astuple
 from math import inf, isfinite, nan
 from typing import TYPE_CHECKING, Any, Self
 
@@ -28,7 +29,8 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.online.authority_jump import AuthorityJump, Jump
 from fieldsid.online.estimate import OnlineEstimate
 from fieldsid.online.progress import LOOK_BACK_S, Progress
-from fieldsid.online.sample_filter import SampleFilter
+from fieldsid.online.sample_filter import SampleFilter, check_times
+from fieldsid.records.saved_state import restored, state_of
 
 if TYPE_CHECKING:
     from fieldsid.schedule.search.of_one_model import GainsOfOne, Wanted
@@ -38,7 +40,7 @@ JUDGED_EVERY = WINDOW // 4
 """Samples that are stored, and samples between two tests of whether angle and rate of them contradict each other."""
 WAIT_FOR_RATE_S = 1.0
 """Time after which a vehicle that has sent no rate is taken to have no rate sensor."""
-STATE = 7
+VERSION = 8
 """Version of the saved state."""
 
 
@@ -73,6 +75,8 @@ class OnlineIdentifier:
     uses the measured rate or the angle alone; with None it uses the rate where one arrives within a second. Raises DataError for
     settings out of bounds.
     """
+
+    STATE = ("_first_time", "_window", "_seen", "_speed_sum", "_speeds", "_authority", "_fin_most", "_is_held")
 
     def __init__(
         self,
@@ -184,20 +188,11 @@ class OnlineIdentifier:
 
     def state(self) -> dict[str, Any]:
         """Return the state as plain values; an identifier made of it by `from_state` continues with identical numbers."""
-        return {
-            "version": STATE,
-            "axis": self.axis.value,
-            "settings": self._settings,
-            "by_rate": self._by_rate,
-            "first_time": self._first_time if isfinite(self._first_time) else None,
-            "window": [[v if isfinite(v) else None for v in row] for row in self._window.tolist()],
-            "seen": self._seen,
-            "speed": [self._speed_sum, self._speeds],
-            "authority": self._authority.state(),
-            "fin": [self._fin_most, self._is_held],
-            "jump": None if self._jump is None else [self._jump.time, self._jump.factor, self._jump.std_error],
-            "filter": None if self._filter is None else self._filter.state(),
-        }
+        own: dict[str, Any] = state_of(self)
+        own |= {"version": VERSION, "axis": self.axis.value, "settings": self._settings, "by_rate": self._by_rate}
+        own["jump"] = None if self._jump is None else state_of(astuple(self._jump))
+        own["filter"] = state_of(self._filter)
+        return own
 
     @classmethod
     def from_state(cls, state: Mapping[str, Any]) -> Self:
@@ -206,19 +201,14 @@ class OnlineIdentifier:
         The caller has checked the shape of the state; here its parts must be consistent and give an estimate.
         """
         try:
-            if state["version"] != STATE:
+            if state["version"] != VERSION:
                 raise DataError("the state is of another version", found=str(state["version"]), hint="start without it")
             made = cls(state["axis"], by_rate=state["by_rate"], **state["settings"])
-            made._first_time = nan if state["first_time"] is None else float(state["first_time"])
-            made._window[:] = np.array(state["window"], dtype=np.float64)
-            made._seen = int(state["seen"])
-            made._speed_sum, made._speeds = float(state["speed"][0]), int(state["speed"][1])
-            made._authority.restore(state["authority"])
-            made._fin_most, made._is_held = float(state["fin"][0]), bool(state["fin"][1])
+            restored(made, state)
             made._jump = None if state["jump"] is None else Jump(*map(float, state["jump"]))
             if state["filter"] is not None:
-                made._filter = made._new_filter()
-                made._filter.restore(state["filter"])
+                check_times(state["filter"])
+                made._filter = restored(made._new_filter(), state["filter"])
             made._check_estimate()
         except (KeyError, TypeError, ValueError, IndexError, AttributeError, ArithmeticError) as error:
             raise DataError("this is no state of an online estimate", found=f"{type(error).__name__}: {error}") from error

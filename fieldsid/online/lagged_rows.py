@@ -40,10 +40,10 @@ FIN, ONE = 2, 3
 class LaggedRows:
     """Lagged products of binned regression rows; `stiff`: whether the model has a stiffness."""
 
-    __slots__ = (
-        "_begin", "_bin_s", "_duration", "_durations", "_forget", "_keep", "_last", "_recent", "_rows", "_samples", "_squares",
-        "_sum", "_weight", "products",
+    STATE = (
+        "_rows", "_begin", "_last", "_duration", "_durations", "_samples", "_weight", "_squares", "_sum", "_recent", "products",
     )  # fmt: skip
+    __slots__ = ("_bin_s", "_forget", "_keep", *STATE)
 
     def __init__(self, bandwidth: float, forgetting: float, *, stiff: bool) -> None:
         self._bin_s, self._forget = BIN_TIME_CONSTANTS / bandwidth, forgetting
@@ -130,19 +130,6 @@ class LaggedRows:
         out[:, ONE, ONE] = self.products[: REACH + 1, ONE, ONE]
         return out
 
-    def state(self) -> dict[str, object]:
-        """Return the state as plain values."""
-        numbers = [getattr(self, name) for name in NUMBERS]
-        arrays = (self._sum, self._recent, self.products)
-        return {"numbers": numbers, **{str(i): a.ravel().tolist() for i, a in enumerate(arrays)}}
-
-    def restore(self, state: dict[str, list[float]]) -> None:
-        """Restore a state; raises ValueError or KeyError where it is not valid."""
-        for name, value in zip(NUMBERS, state["numbers"], strict=True):
-            setattr(self, name, float(value))
-        for i, array in enumerate((self._sum, self._recent, self.products)):
-            array[...] = np.reshape(np.array(state[str(i)], dtype=np.float64), array.shape)
-
     def _close(self) -> None:
         """Add the mean of the finished bin to all lagged products; a bin with less than half the usual rows is left out."""
         rows = self._rows
@@ -160,9 +147,6 @@ class LaggedRows:
     def _shift(self, by: int) -> None:
         self._recent[by:] = self._recent[: LAGS + 1 - by]
         self._recent[:by] = 0.0
-
-
-NUMBERS = ("_rows", "_begin", "_last", "_duration", "_durations", "_samples", "_weight", "_squares")
 
 
 def responses(theta: FloatArray, step: float) -> FloatArray:

@@ -12,10 +12,12 @@ from dataclasses import dataclass
 from math import inf, isfinite, nan, sqrt
 from typing import Annotated, Any, Literal
 
+import numpy as np
+
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.numerics.arrays import known
 from fieldsid.online.estimate import OnlineEstimate
 from fieldsid.records.keys import Key, Number
+from fieldsid.records.saved_state import restored, state_of
 from fieldsid.settled import settled_band
 
 Verdict = Literal["starting", "contradicts", "collecting", "not_excited", "moving", "enough"]
@@ -23,8 +25,6 @@ DEFAULT_ACCURACY = 0.05
 """Default goal: the relative standard error of damping, stiffness and authority."""
 LOOK_BACK_S = 10.0
 """Time over which a parameter must stay constant to have settled, and over which the growth of information is measured."""
-MOST_LOOKS = 1000
-"""Most looks in a valid saved state: a watch keeps about forty over the time that it looks back."""
 MIN_WEIGHT = 0.2
 """Sum of weights, reached after two seconds, from which on a root mean square is given."""
 QUIET_FIN_RAD = 0.005
@@ -90,11 +90,11 @@ def default_goals(axis: Axis) -> dict[str, Goal]:
 class RecentExcitation:
     """Root mean square of fin and rate about their means over the last seconds, by exponential averages."""
 
-    __slots__ = ("_means", "_squares", "_time", "_weights")
+    STATE = __slots__ = ("_means", "_squares", "_time", "_weights")
 
     def __init__(self) -> None:
         self._time = nan
-        self._weights, self._means, self._squares = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
+        self._weights, self._means, self._squares = np.zeros((3, 2))
 
     def hear(self, time: float, fin: float, rate: float) -> None:
         """Add a sample of fin in rad and rate in rad/s; a value that is not finite is ignored."""
@@ -107,15 +107,6 @@ class RecentExcitation:
                 self._means[i] += share * (value - self._means[i])
                 self._squares[i] += share * (value * value - self._squares[i])
 
-    def state(self) -> dict[str, Any]:
-        """Return the averages as plain values."""
-        return {"time": self._time, "weights": self._weights, "means": self._means, "squares": self._squares}
-
-    def recall(self, state: Mapping[str, Any]) -> None:
-        """Restore the averages of a state."""
-        self._time = known(state["time"])
-        self._weights, self._means, self._squares = (list(map(float, state[k])) for k in ("weights", "means", "squares"))
-
     def rms(self) -> tuple[float, float]:
         """Return the root mean squares of fin and rate, NaN in the first two seconds."""
         return self._rms(0), self._rms(1)
@@ -125,26 +116,27 @@ class RecentExcitation:
         if weight < MIN_WEIGHT:
             return nan
         mean = self._means[channel] / weight
-        return sqrt(max(self._squares[channel] / weight - mean * mean, 0.0))
+        return sqrt(max(float(self._squares[channel] / weight - mean * mean), 0.0))
 
 
 class Watch:
-    """The progress of an estimate that is looked at repeatedly; keeps the looks of the last seconds only."""
+    """The progress of an estimate that is looked at repeatedly; keeps the looks of the last seconds only.
 
-    __slots__ = ("_looks", "excitation", "goals")
+    A look is the time of an estimate, that of its last jump (s, zero for none), its values and their standard errors.
+    """
+
+    STATE = ("_looks", "excitation")
+    __slots__ = ("goals", *STATE)
 
     def __init__(self, goals: Mapping[str, Goal]) -> None:
         self.goals = dict(goals)
         self.excitation = RecentExcitation()
-        self._looks: list[OnlineEstimate] = []
+        self._looks: list[tuple[float, ...]] = []
 
     def state(self) -> dict[str, Any]:
         """Return the looks of the last seconds as plain values, so that a program that was killed can continue with them."""
-        looks = [
-            {"time": e.time, "values": dict(e.values), "std_errors": dict(e.std_errors), "used": e.used, "speed": e.speed}
-            for e in self._looks
-        ]
-        return {"looks": looks, "excitation": self.excitation.state()}
+        state: dict[str, Any] = state_of(self)
+        return state
 
     def forget(self) -> None:
         """Delete all looks, as they are of another source."""
@@ -153,32 +145,19 @@ class Watch:
 
     def recall(self, state: Mapping[str, Any], axis: Axis) -> None:
         """Restore the looks of a state of the same source; raises ValueError where they are not of this axis."""
-        wrong = [e for e in state["looks"] if {*e["values"]} != {*NAMES[axis].base} or {*e["std_errors"]} != {*NAMES[axis].base}]
-        if wrong or len(state["looks"]) > MOST_LOOKS:
-            raise ValueError(f"{len(state['looks'])} looks, {len(wrong)} of them of other parameters")
-        self.excitation.recall(state["excitation"])
-        self._looks = [
-            OnlineEstimate(
-                axis,
-                known(e["time"]),
-                _numbers(e["values"]),
-                _numbers(e["std_errors"]),
-                int(e["used"]),
-                known(e["speed"]),
-                {},
-            )
-            for e in state["looks"]
-        ]
+        if wrong := [look for look in state["looks"] if len(look) != 2 + 2 * len(NAMES[axis].base)]:
+            raise ValueError(f"{len(wrong)} looks of other parameters")
+        restored(self, state)
 
     def look(self, now: OnlineEstimate) -> Progress:
         """Return the progress of an estimate, from its errors and from the looks of the last seconds."""
-        looks = self._looks
-        if looks and not (looks[-1].time <= now.time and looks[-1].jump == now.jump):
+        looks, jumped = self._looks, 0.0 if now.jump is None else now.jump.time
+        if looks and not (looks[-1][0] <= now.time and looks[-1][1] == jumped):
             looks.clear()
-        while len(looks) > 1 and looks[1].time <= now.time - LOOK_BACK_S:
+        while len(looks) > 1 and looks[1][0] <= now.time - LOOK_BACK_S:
             looks.pop(0)
-        if not looks or now.time - looks[-1].time >= LOOK_BACK_S / 20.0:
-            looks.append(now)
+        if not looks or now.time - looks[-1][0] >= LOOK_BACK_S / 20.0:
+            looks.append((now.time, jumped, *now.values.values(), *now.std_errors.values()))
         known = tuple(self._progress_of(name, now) for name in now.values)
         wanted = [p for p in known if p.name in self.goals]
         least = min(wanted, key=lambda p: p.share, default=None)
@@ -197,21 +176,22 @@ class Watch:
 
     def _is_settled(self, name: str, now: OnlineEstimate) -> bool:
         value, error = now.values[name], now.std_errors[name]
-        if not isfinite(error) or now.time - self._looks[0].time < 0.95 * LOOK_BACK_S:
+        if not isfinite(error) or now.time - self._looks[0][0] < 0.95 * LOOK_BACK_S:
             return False
         band = settled_band(value, error)
-        return all(abs(look.values[name] - value) <= band for look in self._looks)
+        place = 2 + list(now.values).index(name)
+        return all(abs(look[place] - value) <= band for look in self._looks)
 
     def _seconds_to_goal(self, least: ParameterProgress, now: OnlineEstimate) -> float:
         """Return the seconds until the limiting parameter reaches its goal, at the present growth of its information."""
-        then = self._looks[0]
-        before = then.std_errors[least.name]
+        then, *numbers = self._looks[0]
+        before = numbers[1 + len(now.values) + list(now.values).index(least.name)]
         if least.share >= 1.0:
             return 0.0
-        if not (isfinite(before) and isfinite(least.std_error) and isfinite(least.goal) and now.time > then.time):
+        if not (isfinite(before) and isfinite(least.std_error) and isfinite(least.goal) and now.time > then):
             return nan
         gained = least.std_error**-2 - before**-2
-        return (now.time - then.time) * (least.goal**-2 - least.std_error**-2) / gained if gained > 0.0 else inf
+        return (now.time - then) * (least.goal**-2 - least.std_error**-2) / gained if gained > 0.0 else inf
 
     def _verdict(self, known: tuple[ParameterProgress, ...], share: float, fin: float) -> Verdict:
         if not any(isfinite(p.std_error) for p in known):
@@ -219,7 +199,3 @@ class Watch:
         if share >= 1.0:
             return "enough" if all(p.is_settled for p in known if p.name in self.goals) else "moving"
         return "not_excited" if isfinite(fin) and fin < QUIET_FIN_RAD else "collecting"
-
-
-def _numbers(values: Mapping[str, float | None]) -> dict[str, float]:
-    return {name: known(v) for name, v in values.items()}

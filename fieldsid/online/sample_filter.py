@@ -7,7 +7,7 @@ enter two samples late, so that spikes can be detected, by the rule of `convert/
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import pairwise
 from math import inf, isfinite, nan, remainder, tau
 from typing import Any
@@ -39,10 +39,10 @@ SPIKE_LIMIT_EVERY = SPIKE_WINDOW // 2
 class SpikeGate:
     """Spike removal in one signal: `push` takes the newest value and returns that of two samples before, NaN for a spike."""
 
-    __slots__ = ("_limit", "_recent", "_seen", "spikes")
+    STATE = __slots__ = ("_limit", "_recent", "_seen", "spikes")
 
     def __init__(self) -> None:
-        self._recent, self._seen, self._limit, self.spikes = np.full(SPIKE_WINDOW, nan), 0, inf, 0
+        self._recent, self._seen, self._limit, self.spikes = np.full(SPIKE_WINDOW, nan), 0, nan, 0
 
     def push(self, value: float) -> float:
         """Take a value, NaN where nothing was measured; return that of two samples before."""
@@ -52,25 +52,13 @@ class SpikeGate:
         self._seen += 1
         if self._seen % SPIKE_LIMIT_EVERY == 0:
             known = recent[np.isfinite(recent)]
-            self._limit = spike_limit(known) if known.size >= SPIKE_LIMIT_EVERY else inf
+            self._limit = spike_limit(known) if known.size >= SPIKE_LIMIT_EVERY else nan
         middle = float(recent[-3])
-        if self._limit < inf and self._is_spike(recent[-5:]):
+        if isfinite(self._limit) and self._is_spike(recent[-5:]):
             self.spikes += 1
             recent[-3] = nan
             return nan
         return middle
-
-    def state(self) -> dict[str, object]:
-        """Return the state as plain values, NaN as None."""
-        limit = self._limit if isfinite(self._limit) else None
-        values = [v if isfinite(v) else None for v in self._recent.tolist()]
-        return {"recent": values, "seen": self._seen, "limit": limit, "spikes": self.spikes}
-
-    def restore(self, state: dict[str, object]) -> None:
-        """Restore a state; raises ValueError, TypeError or KeyError where it is not valid."""
-        self._recent[:] = np.array(state["recent"], dtype=np.float64)
-        self._seen, self.spikes = int(state["seen"]), int(state["spikes"])  # type: ignore[call-overload]
-        self._limit = inf if state["limit"] is None else float(state["limit"])  # type: ignore[arg-type]
 
     def _is_spike(self, five: FloatArray) -> bool:
         a, b, c, d, e = (float(v) for v in five.tolist())
@@ -92,16 +80,15 @@ MOST_MOVES = 64
 
 
 Line = tuple[float, float]
-"""Start and end, in rad, of the line that the fin follows from the previous sample to this one."""
+"""Start and end, in rad, of the line that the fin follows from the previous sample to this one, NaN where it is not known."""
+NO_LINE = (nan, nan)
 
 
 class SampleFilter:
     """The state of the filter `memory`, Theta and P in `packed`, the rows' lagged products `lagged`, the `counts` of faults."""
 
-    __slots__ = (
-        "_fin", "_last_angle", "_late", "_moves", "_order", "_row", "_sample", "_settings", "_stiff", "angle_gate",
-        "counts", "lagged", "memory", "packed", "rate_gate",
-    )  # fmt: skip
+    STATE = ("memory", "packed", "_late", "_moves", "_fin", "_last_angle", "counts", "lagged", "angle_gate", "rate_gate")
+    __slots__ = ("_order", "_row", "_sample", "_settings", "_stiff", *STATE)
 
     def __init__(self, *, stiff: bool, by_rate: bool, bandwidth: float, forgetting: float) -> None:
         self.memory, self.packed = np.zeros(MEMORY), initial_memory(stiff=stiff)
@@ -111,8 +98,8 @@ class SampleFilter:
         self._sample, self._row = np.zeros((1, 6)), np.zeros((1, 5))
         self.lagged = LaggedRows(bandwidth, forgetting, stiff=stiff)
         self.angle_gate, self.rate_gate = SpikeGate(), SpikeGate()
-        self._late: list[tuple[float, float, bool, Line | None]] = []
-        self._moves: list[tuple[float, float, Line | None]] = []
+        self._late: list[tuple[float, float, bool, Line]] = []
+        self._moves: list[tuple[float, float, Line]] = []
         self._fin, self._last_angle = nan, nan
         self.counts = {"used": 0, "missing": 0, "repeated": 0, "gaps": 0, "restarts": 0, "late": 0}
 
@@ -131,7 +118,7 @@ class SampleFilter:
                 return False
             self.begin_again()
             self.counts["restarts"] += 1
-        self._late.append((time, fin, is_held, line))
+        self._late.append((time, fin, is_held, line or NO_LINE))
         unwrapped = self._unwrapped(angle)
         ready = self.angle_gate.push(unwrapped), self.rate_gate.push(rate)
         if len(self._late) <= DELAY_SAMPLES:
@@ -180,7 +167,7 @@ class SampleFilter:
         self._last_angle = angle
         return angle
 
-    def _take(self, time: float, fin: float, angle: float, rate: float, *, is_held: bool, line: Line | None) -> bool:
+    def _take(self, time: float, fin: float, angle: float, rate: float, *, is_held: bool, line: Line) -> bool:
         memory = self.memory
         fin = fin if isfinite(fin) else self._moves[-1][1] if self._moves else self._fin
         if not isfinite(fin):
@@ -210,14 +197,14 @@ class SampleFilter:
             return 0.0
         return float(memory[ANGLE] + 0.5 * (rate + memory[RATE]) * (time - memory[TIME]))
 
-    def _through_moves(self, time: float, fin: float, angle: float, rate: float, *, is_held: bool, line: Line | None) -> bool:
+    def _through_moves(self, time: float, fin: float, angle: float, rate: float, *, is_held: bool, line: Line) -> bool:
         """Step to a measured sample through the moves of the fin since the last measured sample.
 
         Within a usual step the moves are replaced by one line of the fin. Where samples are missing, there is one step for each
         move, with angle and rate interpolated linearly.
         """
         memory, moves = self.memory, self._moves
-        if memory[SAMPLES] and moves and line is None and time - memory[TIME] <= SLOWER * memory[H]:
+        if memory[SAMPLES] and moves and not isfinite(line[0]) and time - memory[TIME] <= SLOWER * memory[H]:
             line = self._line_of_moves(time, fin, is_held=is_held)
             self.counts["missing"] -= len(moves)
         elif memory[SAMPLES] and moves:
@@ -225,20 +212,22 @@ class SampleFilter:
             for at, then, along in moves:
                 share = (at - begin) / (time - begin)
                 straight = angle0 + share * (angle - angle0), rate0 + share * (rate - rate0)
-                self._step(at, along or self._simple_line(then, is_held=is_held), *straight, counts=False)
+                self._step(at, self._known_line(along, then, is_held=is_held), *straight, counts=False)
                 self._fin = then
         moves.clear()
-        return self._step(time, line or self._simple_line(fin, is_held=is_held), angle, rate, counts=True)
+        return self._step(time, self._known_line(line, fin, is_held=is_held), angle, rate, counts=True)
 
-    def _line_of_moves(self, time: float, fin: float, *, is_held: bool) -> Line | None:
+    def _line_of_moves(self, time: float, fin: float, *, is_held: bool) -> Line:
         """Return the line of the fin over the step to a sample: a fin that is logged in messages alone moves between samples."""
         begin = float(self.memory[TIME])
         track = [(begin, self._fin), *((at, then) for at, then, _ in self._moves), *([] if is_held else [(time, fin)])]
         found = line_over_steps(Track(*np.array(track).T), np.array([begin, time]), inf, is_held=is_held)
-        return None if found is None else (float(found[0, 0]), float(found[1, 0]))
+        return NO_LINE if found is None else (float(found[0, 0]), float(found[1, 0]))
 
-    def _simple_line(self, fin: float, *, is_held: bool) -> Line:
-        """Return the line of a fin that was constant since the last sample (`is_held`), or moved linearly to `fin`."""
+    def _known_line(self, line: Line, fin: float, *, is_held: bool) -> Line:
+        """Return a line, or where it is not known that of a fin that was constant (`is_held`), or moved linearly to `fin`."""
+        if isfinite(line[0]):
+            return line
         before = self._fin if isfinite(self._fin) else fin
         return before, before if is_held else fin
 
@@ -250,36 +239,8 @@ class SampleFilter:
         self.lagged.add(time, self._row[0])
         return True
 
-    def state(self) -> dict[str, Any]:
-        """Return the state as plain values."""
-        numbers = {"fin": self._fin, "last_angle": self._last_angle}
-        return {
-            "memory": self.memory.tolist(),
-            "packed": self.packed.tolist(),
-            "late": [[t, fin if isfinite(fin) else None, is_held, line] for t, fin, is_held, line in self._late],
-            "moves": [list(move) for move in self._moves],
-            "numbers": {k: v if isfinite(v) else None for k, v in numbers.items()},
-            "counts": dict(self.counts),
-            "lagged": self.lagged.state(),
-            "angle_gate": self.angle_gate.state(),
-            "rate_gate": self.rate_gate.state(),
-        }
 
-    def restore(self, state: Mapping[str, Any]) -> None:
-        """Restore a state; raises ValueError, TypeError or KeyError where it is not valid."""
-        _check_times(state)
-        self.memory[:], self.packed[:] = state["memory"], state["packed"]
-        self._late = [(float(t), nan if f is None else float(f), bool(h), _line(line)) for t, f, h, line in state["late"]]
-        self._moves = [(float(t), float(f), _line(line)) for t, f, line in state["moves"]]
-        fin, angle = (state["numbers"][k] for k in ("fin", "last_angle"))
-        self._fin, self._last_angle = (nan if v is None else float(v) for v in (fin, angle))
-        self.counts = {k: int(state["counts"][k]) for k in self.counts}
-        self.lagged.restore(state["lagged"])
-        self.angle_gate.restore(state["angle_gate"])
-        self.rate_gate.restore(state["rate_gate"])
-
-
-def _check_times(state: Mapping[str, Any]) -> None:
+def check_times(state: Mapping[str, Any]) -> None:
     """Raise ValueError where the times of a state do not increase: the filter divides by their differences."""
     begin = float(state["memory"][TIME]) if state["memory"][SAMPLES] else -inf
     moves, late = ([float(row[0]) for row in state[k]] for k in ("moves", "late"))
@@ -287,7 +248,3 @@ def _check_times(state: Mapping[str, Any]) -> None:
         raise ValueError(f"{len(late)} samples and {len(moves)} moves of the fin that wait")
     if any(b <= a for a, b in pairwise([begin, *moves, *late])):
         raise ValueError("times that do not go on")
-
-
-def _line(saved: Sequence[float] | None) -> Line | None:
-    return None if saved is None else (float(saved[0]), float(saved[1]))

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from fieldsid._version import __version__
-from fieldsid.artifacts import plain, write_text
+from fieldsid.artifacts import write_text
 from fieldsid.errors import ArtifactError, DataError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.online.identifier import OnlineIdentifier
@@ -20,7 +20,7 @@ SCHEMA = "fieldsid/online/1"
 
 def save_state(path: Path, identifier: OnlineIdentifier, watch: Watch, source: str) -> Path:
     """Write the states of an identifier and its watch, with the name of the source of the samples; raises ArtifactError."""
-    states = {"state": identifier.state(), "watch": plain(watch.state())}
+    states = {"state": identifier.state(), "watch": watch.state()}
     body = {"schema": SCHEMA, "tool": f"fieldsid {__version__}", "source": source, **states}
     return write_text(path, json.dumps(body, allow_nan=False), force=True)
 

@@ -98,9 +98,9 @@ def test_laws_of_wrong_numbers_are_refused(tmp_path, way, to):
 @pytest.mark.parametrize(
     ("way", "to"),
     [
-        (("state", "seen"), 10**40), (("state", "window"), {}), (("state", "window", 5, 0), None), (("state", "filter"), []),
-        (("state", "filter", "memory", 1), 1e300), (("state", "filter", "late"), [[1.0, 0.0, True, None]] * 9),
-        (("state", "filter", "lagged", "numbers", 1), None), (("state", "speed"), [None, None]), (("watch", "looks"), 3),
+        (("state", "seen"), 10**40), (("state", "window"), {}), (("state", "window", 25), None), (("state", "filter"), []),
+        (("state", "filter", "memory", 1), 1e300), (("state", "filter", "late"), [[1.0, 0.0, True, [None, None]]] * 9),
+        (("state", "filter", "lagged", "begin"), None), (("state", "speeds"), None), (("watch", "looks"), 3),
         (("watch", "excitation", "means"), [0.0]), (("watch",), None), (("state", "settings", "more"), 1), (("source",), {}),
     ],
 )  # fmt: skip
