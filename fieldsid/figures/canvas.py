@@ -48,7 +48,7 @@ class Sheet(Figure):
         return out.getvalue()
 
 
-def sheet(width: float = 9.0, height: float = 7.0, title: str = "") -> Figure:
+def sheet(width: float, height: float, title: str = "") -> Figure:
     """Return an empty figure of a size in inches, with a separate canvas and a title at the left."""
     figure = Sheet(figsize=(width, height), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
@@ -73,12 +73,12 @@ def dress(ax: Axes, *, x: str = "", y: str = "", title: str = "") -> Axes:
     return ax
 
 
-def note(ax: Axes, text: str, place: tuple[float, float], off: tuple[float, float] = (4.0, 0.0), **how: Any) -> None:
+def note(ax: Axes, text: str, place: tuple[float, float], off: tuple[float, float], **how: Any) -> None:
     """Write words beside a point of the data; off: from there to the words, in points."""
     ax.annotate(text, place, xytext=off, textcoords="offset points", **{"fontsize": 9, **how})
 
 
-def legend_above(ax: Axes, width: int = 80) -> None:
+def legend_above(ax: Axes, width: int) -> None:
     """Put the legend above the plot, at its right, where it hides no data; the plot's title goes above it.
 
     width: letters of the title in a line of it.

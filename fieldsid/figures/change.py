@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fieldsid.change.record import CHANGED, Answers, Change, GainChange, ParameterChange
-from fieldsid.figures.panel import Cell, Panel, Picture, Series
+from fieldsid.figures.panel import MOST_TIMES, Cell, Panel, Picture, Series
 from fieldsid.rounding import TWO_SIDED_95
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MOST_TIMES = 3.0
-"""Multiple of the gains at which a band is cut: a wider one only shows that the gains are not known."""
 BEFORE, AFTER = "second", "simulated"
 
 

@@ -20,7 +20,8 @@ from fieldsid.numerics.shifted_correlation import shifted_correlations
 if TYPE_CHECKING:
     from fieldsid.fitting.predict.predict import Prediction
 
-LONGEST_LAG_S, MOST_LAGS = 5.0, 400
+LONGEST_LAG_S = 5.0
+"""Longest lag that is drawn."""
 
 
 def figure(shown: Prediction, title: str) -> Picture:
@@ -68,5 +69,5 @@ def _stems(
 
 
 def _reach(count: int, step: float) -> int:
-    """Return the number of lags that are drawn: at most five seconds, a quarter of the run, and a number of lines."""
-    return max(1, min(round(LONGEST_LAG_S / step), count // 4, MOST_LAGS))
+    """Return the number of lags that are drawn: at most five seconds, and a quarter of the run."""
+    return max(1, min(round(LONGEST_LAG_S / step), count // 4))

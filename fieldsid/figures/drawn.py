@@ -44,7 +44,7 @@ def rendered(picture: Picture) -> Figure:
     return sheet
 
 
-def draw(cell: Cell, ax: Axes, width: int = 80) -> None:
+def draw(cell: Cell, ax: Axes, width: int) -> None:
     """Draw a part of a picture without its legend; width: letters in a line of its title."""
     if isinstance(cell, Panel):
         draw_panel(cell, ax)

@@ -10,6 +10,7 @@ import numpy as np
 from fieldsid.figures.panel import Panel, Series
 from fieldsid.models.axis import Axis
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.tail_probabilities import student_quantile
 
 if TYPE_CHECKING:
     from fieldsid.fitting.predict.predict import Prediction
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 SYMBOLS = {Axis.YAW: ("yaw", "yaw rate", "rudder"), Axis.PITCH: ("pitch", "pitch rate", "elevator")}
 UNITS = ("deg", "deg/s")
-TWO_SIDED_99 = 2.576
+TWO_SIDED_99 = student_quantile(0.995, 0)
 """Quantile 0.995 of the normal distribution: bands are those of 99 %."""
 Shown: TypeAlias = "Sequence[tuple[str, str, Prediction]]"
 """Free runs over one record: of each its name, the kind of its lines, and the motion."""

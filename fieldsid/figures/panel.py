@@ -93,7 +93,7 @@ class Bars:
 
 
 MOST_TIMES = 3.0
-"""Multiple of the first bar, or of the mark, at which longer bars are cut."""
+"""Multiple of the first bar, of the mark or of the gains at which longer bars and wider bands are cut."""
 Cell: TypeAlias = Panel | Bars | Callable[[Any], None]
 """A part of a picture; a function draws on the axes that it is given, what no other form shows."""
 

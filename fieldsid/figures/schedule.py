@@ -9,17 +9,15 @@ import numpy as np
 from fieldsid.figures.motion import level
 from fieldsid.figures.panel import Band, Panel, Picture, Series
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.schedule.flown.response import Steps
+from fieldsid.schedule.flown.response import FLIGHT_S, FLOWN_TIMES, Steps
 from fieldsid.schedule.record import Schedule
-from fieldsid.schedule.search.objective import DRAWS_MARGIN_SHARE
+from fieldsid.schedule.search.objective import DRAWS_MARGIN_SHARE, ROUNDING
 from fieldsid.schedule.verify import Verification, steps_of
 
-SHOWN_SHARE = 25.0 / 60.0
+SHOWN_SHARE = FLOWN_TIMES / FLIGHT_S
 """Share of a flight that is shown: a satisfactory step has settled by then."""
 LEAST_SCALE_DEG = 1.0
-"""Least range of the feed-forward scale in deg, as the neutral position of a fin is not set more accurately."""
-LEAST_LEG_DEG = 0.5
-STOP_SHARE = 0.999
+"""Least range of the scale of a feed-forward or a straight leg, deg: the neutral position of a fin is not set more accurately."""
 SPEED = "speed, m/s"
 
 
@@ -101,7 +99,7 @@ def fin(schedule: Schedule, verification: Verification, until: float) -> Panel:
         max(schedule.column("fin_limit_rad")),
         [(f.speed, f.scheduled[2], f.scheduled[1]) for f in verification.flown],
     )
-    at_stop = max(float(np.mean(np.abs(s.fin[:, 0]) >= STOP_SHARE * limit)) * float(s.time[-1]) for _, s, _ in flights)
+    at_stop = max(float(np.mean(np.abs(s.fin[:, 0]) >= (1.0 - ROUNDING) * limit)) * float(s.time[-1]) for _, s, _ in flights)
     _, usual, large = np.degrees(steps_of(schedule))
     edges = (level(np.array([0.0, until]), float(np.degrees(sign * limit)), kind="fin") for sign in (-1.0, 1.0))
     title = f"fin in the {usual:.0f}° step, thin in the {large:.0f}° step: at its limit for up to {at_stop:.1f} s"
@@ -127,7 +125,7 @@ def leg(verification: Verification) -> Panel:
         Series(f.leg.time, np.degrees(f.leg.angle[:, 0]), colour, thin=True)
         for f, colour in zip(verification.flown, colours, strict=True)
     ]
-    most = max(1.1 * max(float(np.abs(s.y).max()) for s in series), LEAST_LEG_DEG)
+    most = max(1.1 * max(float(np.abs(s.y).max()) for s in series), LEAST_SCALE_DEG)
     title = f"straight leg in a disturbance as the runs had, up to {verification.disturbance:.2g} rad/s² rms"
     return Panel("straight leg, deg", series, limits=(-most, most), x="time, s", title=title)
 

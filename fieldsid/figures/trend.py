@@ -66,7 +66,7 @@ def draw(trend: Trend, ax: Axes) -> None:
     for i, (cut, change) in enumerate(zip(cuts.tolist(), trend.changes, strict=True)):
         at = 0.5 * (dates[cut - 1] + dates[cut])
         ax.axvline(at, color=canvas.SIMULATED, linestyle="--", linewidth=1.2, label="_" if i else "change")
-        canvas.note(ax, _amount(trend, change), (at, 0.5), xycoords=("data", "axes fraction"), color=canvas.SIMULATED)
+        canvas.note(ax, _amount(trend, change), (at, 0.5), (4, 0), xycoords=("data", "axes fraction"), color=canvas.SIMULATED)
     at_speed = f" at {trend.speed:.2f} m/s" if isfinite(trend.speed) else ""
     canvas.dress(ax, x="start of the run, UTC", y=f"{trend.name}{at_speed}")
     locator = matplotlib_dates.AutoDateLocator()

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from fieldsid.numerics.arrays import BoolArray, FloatArray, IntArray
+from fieldsid.online.lagged_rows import FEWEST_DRAWS
 from fieldsid.records.keys import Key
 from fieldsid.rounding import TWO_SIDED_95
 
@@ -32,15 +33,14 @@ CHANCE = 3.4e-6
 errors. Where few seconds tell the noise, Student's distribution asks for more of them."""
 MAX_RELATIVE_ERROR = 0.1
 """Largest standard error of the authorities before and after, as a share of the larger one, at which they are compared."""
-MIN_DRAWS = 20
-"""Least number of seconds from which the noise of the scores is estimated."""
 MIN_EXCITATION_BEFORE, MIN_EXCITATION_AFTER = 1e-6, 0.05
 """Least eigenvalue of the normal matrix, scaled to a unit diagonal, of all columns before a jump, and of fin and trim after it: a
 constant fin does not separate authority from trim."""
 COLUMNS = RATE, _, _, FIN, ONE, _ = tuple(range(6))
 FREE = (RATE, FIN, ONE)
 """Columns: r, r|r|, angle, fin, one, target. The coefficients of r, fin and one are free after a jump."""
-BEGIN, COUNT, PRODUCTS = 0, 1, slice(2, 2 + len(COLUMNS) ** 2)
+BEGIN, COUNT = range(2)
+PRODUCTS = slice(2, 2 + len(COLUMNS) ** 2)
 """The sums over a second: its begin in s, the number of rows, and the sum of the products of rows [phi, target] (6, 6)."""
 
 
@@ -166,7 +166,7 @@ class AuthorityJump:
         """Return the variance of the scores before each candidate over that of the columns, and its degrees of freedom (P,).
 
         It is the variance of a row's residual with its correlation to the neighbouring rows, within the second by the sum and
-        from second to second as an autoregression of first order keeps it. Where fewer than MIN_DRAWS seconds come before the
+        from second to second as an autoregression of first order keeps it. Where fewer than FEWEST_DRAWS seconds come before the
         candidate, the last variance known is returned.
         """
         keep = self._keep
@@ -181,7 +181,7 @@ class AuthorityJump:
         independent = draws * (1.0 - kept) / (1.0 + kept)
         freedom = np.maximum(independent - keep.size, 1.0)
         noise = spread / keep.size * draws / freedom
-        is_new = draws >= MIN_DRAWS
+        is_new = draws >= FEWEST_DRAWS
         noise, freedom = np.where(is_new, noise, self._noise), np.where(is_new, freedom, self._freedom)
         self._noise, self._freedom = float(noise[-1]), float(freedom[-1])
         return noise, freedom

@@ -24,17 +24,18 @@ LAGS = 256
 """Bins over which rows are multiplied: 32 s at a bandwidth of 4 rad/s."""
 REACH = LAGS // 2
 """Bins over which the fin's past makes an instrument, and over which correlation is followed: together they reach over LAGS."""
-FEWEST_BINS = 20
-"""Bins below which nothing is estimated."""
+FEWEST_DRAWS = 20
+"""Bins below which nothing is estimated, and seconds below which the noise of their scores is not."""
 REFINEMENTS = 3
 """Estimates in turn, each with the instruments of the one before."""
-WIDTH = 5
 ROUNDING = 1e-6
 """Share of a bin by which rounded time stamps may miss its end."""
 AKAIKE = 2.0
 """Penalty of a coefficient of the residual's autoregression; Schwarz's would give too low an order for a slow disturbance in
 addition to white noise."""
-FIN, ONE = 2, 3
+COLUMNS = _, _, FIN, ONE, _ = tuple(range(5))
+"""Columns of a row: rate, angle, fin, one, target."""
+WIDTH = len(COLUMNS)
 
 
 class LaggedRows:
@@ -77,7 +78,7 @@ class LaggedRows:
         start: the estimate (4,) whose response makes the first instruments.
         """
         keep, theta = self._keep, start.copy()
-        if not self._durations or self._weight**2 < max(FEWEST_BINS, 2 * len(keep) + 2) * self._squares:
+        if not self._durations or self._weight**2 < max(FEWEST_DRAWS, 2 * len(keep) + 2) * self._squares:
             return None
         scale = np.sqrt(self.products[0].diagonal()[keep])
         if not scale.all():

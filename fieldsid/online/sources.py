@@ -28,7 +28,7 @@ from fieldsid.online.samples import LONGEST_LINE, MessageReader, Sample, samples
 from fieldsid.records.named_inputs import size_and_time
 
 TICK_S = 0.2
-POLL_S = 0.5
+"""Longest wait before the caller can update its display."""
 READING_SHARE = 0.25
 """Share of the time spent on reading a log that grows: it is read in full each time, less often the longer that takes."""
 LOCALHOST = "127.0.0.1"
@@ -57,13 +57,13 @@ def followed(
     The newest row is used only once another follows it, as it may be half written. A log without samples is waited for. Raises
     MappingError and LogError as reading does.
     """
-    seen, grown, pause = (-1, -1), clock.monotonic(), POLL_S
+    seen, grown, pause = (-1, -1), clock.monotonic(), TICK_S
     while clock.monotonic() - grown < idle_s:
         size = size_and_time(path)
         if size != seen:
             begin = clock.monotonic()
             run = _present_run(path, mapping)
-            pause = max(POLL_S, (clock.monotonic() - begin) / READING_SHARE)
+            pause = max(TICK_S, (clock.monotonic() - begin) / READING_SHARE)
             seen = size
             if run is not None:
                 for sample in samples_of(run.between(-inf, _complete_until(run, axis)), axis, after):

@@ -21,8 +21,10 @@ from fieldsid.models.model import Model
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
-SETTLE_S = 60.0
-STEP_S = 0.05
+SETTLE_S, STEP_S = 60.0, 0.05
+"""Time in which a fin comes to rest, and time step of a turn: the usual sampling interval of logs, s."""
+LEAST_SURGE_M_S = 0.05
+"""Lower limit of the surge in a simulation, m/s: a hull at rest has neither rudder nor drag."""
 EXPONENT = "damping_exponent"
 NEARBY = 0.9
 """Share of the speed at which constants are computed a second time, for the powers of the speed they are proportional to."""

@@ -19,7 +19,7 @@ from fieldsid.fitting.regression.state_variable_filter import filtered
 from fieldsid.logs.doctor.pair_findings import goes_against_depth, goes_with_depth
 from fieldsid.logs.run import Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
-from fieldsid.turning.steady.transient import LEAST_SURGE_M_S
+from fieldsid.plant.yaw_plant import LEAST_SURGE_M_S
 
 SIGNALS = ("depth_m", "pitch_rad", "surge_m_s")
 LENGTHS_M = np.concatenate([[0.0], np.geomspace(0.1, 100.0, 61)])

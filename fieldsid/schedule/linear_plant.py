@@ -111,11 +111,8 @@ class LinearPlant:
     def growth(self) -> FloatArray:
         """Return the largest real part (d,) 1/s of the open-loop poles of the hull, without the integrator of the heading."""
         a, k, c, c_r, c_f = self.straight
-        coupled = bool(c_r.any() or c_f.any())
-        polynomial = np.column_stack([np.ones_like(a), a + c, k + a * c + c_r] if coupled else [np.ones_like(a), a])
-        if k.any():
-            polynomial = np.column_stack([np.ones_like(a), a + c, k + a * c + c_r, k * c] if coupled else [np.ones_like(a), a, k])
-        return np.asarray(roots_of(polynomial).real.max(axis=1))
+        parts = [np.ones_like(a), a + c, k + a * c + c_r, k * c] if c_r.any() or c_f.any() else [np.ones_like(a), a, k]
+        return np.asarray(roots_of(np.column_stack(parts if k.any() else parts[:-1])).real.max(axis=1))
 
     @cached_property
     def straight(self) -> FloatArray:

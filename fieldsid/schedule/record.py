@@ -13,11 +13,11 @@ import numpy as np
 
 from fieldsid.artifacts import save_record
 from fieldsid.display import Brief, Displayed, InControl, Plotted
-from fieldsid.errors import ArtifactError
 from fieldsid.logs.run import Note
 from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.allocation import PlaneFins, plane_fins_of
 from fieldsid.models.axis import NAMES, Axis
+from fieldsid.planning.whole_file import whole_file
 from fieldsid.records.check import ShapeError
 from fieldsid.records.keys import INLINE, Key, Number, body_of
 from fieldsid.records.reading import load_record
@@ -173,14 +173,10 @@ def load_schedule(path: Path) -> Schedule:
     """Read a schedule back; raises ArtifactError naming what is missing or wrong."""
     with unless_log(path, "a schedule"):
         body = load_record(path, KIND)
-    try:
+    with whole_file(path, "schedule", "design it again, with `--force`"):
         rows = tuple(_row(r) for r in body["rows"])
         _check_rows(rows)
         fins = {name: body_of(plane_fins_of(value)) for name, value in body["provenance"].items() if name == "fins"}
-    except ValueError as error:  # a wrong shape too
-        raise ArtifactError(
-            f"`{path}` is not a complete schedule", found=str(error), hint="design it again, with `--force`"
-        ) from error
     return Schedule(
         axis=Axis(body["axis"]),
         kind=body["controller"],

@@ -16,9 +16,7 @@ from fieldsid.schedule.controller import HELD_SHARE
 from fieldsid.schedule.flown.response import steady_error, swing
 from fieldsid.schedule.record import Schedule
 from fieldsid.schedule.verify import AT_REST_SHARE, DEPTH_STEP_M, Verification, steps_of
-
-MOST_NAMED = 3
-
+from fieldsid.turning.prediction import MAX_LISTED
 
 UNSTABLE = "the hull alone is unstable: it may take up to twice as long to settle"
 """The worst of the hulls of `tests/truth/gain_table.py` settled in 19.3 s where 9.7 s were predicted."""
@@ -163,7 +161,7 @@ def _longest(checked: Verification) -> float:
 def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource) -> str:
     """Return what a verification is based on, in words: models, their errors, speeds, fin, disturbance."""
     names = source.names or tuple(p.name for p in source.paths)
-    named = ", ".join(names[:MOST_NAMED]) + (f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else "")
+    named = ", ".join(names[:MAX_LISTED]) + (f" and {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else "")
     effects = sorted({e for m in source.models for e in m.effects})
     errors = f"{checked.draws} draws of {checked.draws_of}" if checked.spread else "no errors stated, the estimate alone"
     speeds = [c.speed for c in checked.scheduled]

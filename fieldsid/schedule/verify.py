@@ -164,22 +164,9 @@ def verify_schedule(
     triples = zip(scheduled, compared, demands, strict=True)
     worse = tuple(a.speed for a, b, demand in triples if a.knot and a.outcome.worse_than(b.outcome, demand))
     return Verification(
-        schedule,
-        scheduled,
-        compared,
-        constant,
-        flown,
-        draws,
-        spread,
-        of.draws_of,
-        of.says,
-        disturbance,
-        unstable,
-        curvature,
-        of.actuator,
-        worse,
-        of.path,
-    )
+        schedule, scheduled, compared, constant, flown, draws, spread, of.draws_of, of.says, disturbance, unstable, curvature,
+        of.actuator, worse, of.path,
+    )  # fmt: skip
 
 
 def plants_behind(schedule: Schedule, source: ParameterSource, runs: Sequence[Run]) -> Plants:

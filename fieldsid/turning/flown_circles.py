@@ -11,6 +11,7 @@ from fieldsid.errors import DataError
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.several.sifting import Refused, attempt, sifted
 from fieldsid.models.axis import NAMES, Axis
+from fieldsid.planning.safety.envelope import LEAST_FIN
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.rounding import TWO_SIDED_95
 from fieldsid.turning.measured.circle import LEAST_TURN_FOR_CURRENT_RAD
@@ -20,8 +21,6 @@ from fieldsid.turning.prediction import MeasuredRow, TurnRow
 REPEATED_SD = 0.005
 """Relative standard deviation of a circle from flight to flight: hulls of the ensemble (seed 1), at the same speed and rudder and
 with a disturbance moment of a hundredth of the rudder's, were 0.1 to 0.3 % off the truth."""
-LEAST_HELD_FIN_RAD = 0.01
-"""Rudder angle below which a circle is due to the trim or to a current."""
 
 
 def circles_of(measured: Sequence[Run], unfit: Refused[Run] | None, *, needed: bool) -> tuple[list[MeasuredTurn], list[Note]]:
@@ -40,7 +39,7 @@ def against_rudder(turn: MeasuredTurn, source: ParameterSource) -> bool:
     """Return whether a vehicle circled to the other side than its rudder turns it, as an unstable hull may."""
     to_starboard = float(np.sign(source.base_at(float(source.speeds[0]))[NAMES[Axis.YAW].authority])) * turn.fin
     is_known = bool(np.isfinite(to_starboard))
-    return is_known and abs(turn.fin) > LEAST_HELD_FIN_RAD and (to_starboard > 0.0) != (turn.side == "starboard")
+    return is_known and abs(turn.fin) > LEAST_FIN and (to_starboard > 0.0) != (turn.side == "starboard")
 
 
 def against_rudder_note(turn: MeasuredTurn) -> Note:
@@ -53,7 +52,7 @@ def compared_with(
     turn: MeasuredTurn, rows_at: Callable[[Sequence[float], float], list[TurnRow]], least: Callable[[float], float]
 ) -> MeasuredRow:
     """Return a measured turn with its prediction; the prediction is NaN where the fin is below `least` (rad) of its speed."""
-    if not (np.isfinite(turn.fin) and abs(turn.fin) > max(LEAST_HELD_FIN_RAD, least(turn.flown_at))):
+    if not (np.isfinite(turn.fin) and abs(turn.fin) > max(LEAST_FIN, least(turn.flown_at))):
         nan = float("nan")
         return MeasuredRow(turn, nan, (nan, nan))
     row = next(r for r in rows_at([turn.flown_at], abs(turn.fin)) if r.side == turn.side)

@@ -48,8 +48,8 @@ BY_METHOD: Mapping[str, str] = {
     "measured": "measured",
 }
 """The methods in words."""
-MAX_SPEEDS_LISTED = 4
-"""Largest number of speeds that are listed one by one."""
+MAX_LISTED = 4
+"""Largest number of speeds or models that are listed one by one."""
 HOW = "one and a half circles, x_m and y_m logged"
 
 
@@ -211,6 +211,6 @@ def _to(rows: Sequence[TurnRow], side: str) -> bool:
 
 def _speeds(speeds: Sequence[float]) -> str:
     """Return speeds in m/s as words, many of them as the range they span."""
-    if len(speeds) > MAX_SPEEDS_LISTED:
+    if len(speeds) > MAX_LISTED:
         return f"{min(speeds):.2f} to {max(speeds):.2f} m/s"
     return f"{', '.join(f'{s:.2f}' for s in speeds)} m/s"

@@ -72,7 +72,7 @@ def proposed(training, pair: tuple[str, str]):
     """The maneuver that tells the pair apart, each of the two fitted to what was flown so far."""
     records = [record_of(r, Axis.YAW) for r in training]
     models = [fit(records, Axis.YAW, method="output_error", effects=(e,)).model for e in pair]
-    return separate(models, Envelope(FIN), speeds=(SPEED,))
+    return separate(models, Envelope(FIN), speed=SPEED)
 
 
 def trial(pair: tuple[str, str], truth: str, seed: int) -> tuple[bool, bool, str, float]:

@@ -113,7 +113,7 @@ def figure(told: Telltale) -> Figure:
     canvas.dress(axes[0], y=f"{symbol} [deg/s]")
     axes[0].plot(time, motion.measured(view.record, 1), color="0.25", linewidth=1.5, label="with the effect")
     axes[0].plot(time, np.degrees(view.rate), color=canvas.SIMULATED, linewidth=1.1, label="textbook's model, fitted to it")
-    canvas.legend_above(axes[0])
+    canvas.legend_above(axes[0], 80)
     draw(motion.fin(replace(view, fin=view.record.fin)), axes[1])
     for ax, role in zip(axes[2:], roles, strict=False):
         label, factor = HELPER[role]
@@ -133,7 +133,7 @@ def _draw_residual(view: Prediction, ax: Axes) -> None:
     angle, rate = (motion.measured(view.record, i) - np.degrees((view.angle, view.rate)[i]) for i in (0, 1))
     ax.plot(view.record.time, rate / np.degrees(NOISE.rate), color=canvas.SECOND, linewidth=1.4, label="rate")
     ax.plot(view.record.time, angle / np.degrees(NOISE.angle), color=canvas.WARM, linewidth=1.4, label="angle")
-    canvas.legend_above(ax)
+    canvas.legend_above(ax, 80)
 
 
 def noise_in_words() -> str:

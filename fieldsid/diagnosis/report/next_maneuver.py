@@ -57,7 +57,7 @@ def _separating_maneuver(search: Search, rivals: list[ScoredModel]) -> NextManeu
     try:
         speed = float(np.median(speeds)) if speeds else 1.0
         models = [h.likelihood_model for h in rivals]
-        found = separate(models, Envelope(fin), speeds=(speed,), fast=True, mapped=search.parallel.map)
+        found = separate(models, Envelope(fin), speed=speed, fast=True, mapped=search.parallel.map)
     except FieldsidError as error:
         # no maneuver inside the limits separates them: propose one that the effects declare to excite them
         return NextManeuver(*_declared_maneuver(names), **command, note=error.what)

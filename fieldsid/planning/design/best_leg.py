@@ -20,7 +20,7 @@ from fieldsid.planning.flight.excitation import LONGEST_WINDOW_S, Excitation, Wi
 from fieldsid.planning.flight.operating_point import operating_point
 from fieldsid.planning.flight.rule_flight import fly_operating_points
 from fieldsid.planning.safety.envelope import MOST_TURNS, Envelope
-from fieldsid.planning.safety.monte_carlo import Ensemble, draw_ensemble, fly_ensemble, fly_list
+from fieldsid.planning.safety.monte_carlo import Ensemble, draw_ensemble, fly_ensemble
 from fieldsid.runtime.parallel_map import parallel_map
 
 DESIGN_PROBABILITY_SHARE = 0.7
@@ -52,8 +52,7 @@ def best_leg(setting: Setting, speed: float, known: Sequence[Excitation] = ()) -
     """
     objective = make_objective(setting.model, speed, setting.envelope, setting.window, setting.want, setting.run_up_s)
     ensemble = ensemble_at(objective, setting)
-    straight = fly_list(ensemble.first(COARSE_DRAWS), np.zeros(0), objective.envelope, objective.autopilot, objective.run_up)
-    if np.mean(straight.outside(objective.envelope)) > setting.envelope.share:
+    if risk_of(objective, ensemble.first(COARSE_DRAWS), np.zeros(0))[0] > setting.envelope.share:
         raise _nothing_inside(objective)  # not even the autopilot on a straight run stays inside
     # the best maneuvers of other speeds, each at its best amplitude here
     scored = [at_best_amplitude(objective, c) for c in known if fits(c, objective.window)] if known else catalogue(objective)
@@ -94,8 +93,8 @@ def ensemble_at(objective: Objective, setting: Setting) -> Ensemble:
     return draw_ensemble(setting.model, objective.scene.speed, objective.window, DRAWS, setting.seed + 1)
 
 
-def risk_of(objective: Objective, ensemble: Ensemble, candidate: Excitation) -> tuple[float, dict[str, float]]:
-    """Return the share of draws that leave the envelope, and each excursion's 95 % quantile."""
+def risk_of(objective: Objective, ensemble: Ensemble, candidate: Excitation | FloatArray) -> tuple[float, dict[str, float]]:
+    """Return the share of draws that leave the envelope, and each excursion's 95 % quantile; see `fly_ensemble`."""
     flights = fly_ensemble(ensemble, candidate, objective.envelope, objective.autopilot, objective.run_up)
     excursions = {name: float(np.quantile(values, 0.95)) for name, values in flights.excursions.items()}
     return float(np.mean(flights.outside(objective.envelope))), excursions
@@ -108,13 +107,7 @@ def leg_of(
     scene, ensemble = objective.scene, ensemble or ensemble_at(objective, setting)
     risk, excursions = risk_of(objective, ensemble, candidate)
     nominal = _nominal(objective, candidate)
-    open_loop_risk = float("nan")
-    if nominal.size:
-        open_loop_risk = float(
-            np.mean(
-                fly_list(ensemble, nominal, objective.envelope, objective.autopilot, objective.run_up).outside(objective.envelope)
-            )
-        )
+    open_loop_risk = risk_of(objective, ensemble, nominal)[0] if nominal.size else float("nan")
     turn = turn_back_s(scene.base.damping, scene.base.authority, objective.envelope.fin)
     return Leg(
         speed=scene.speed,

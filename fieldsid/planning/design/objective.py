@@ -28,9 +28,8 @@ from fieldsid.planning.flight.rule_flight import Response
 from fieldsid.planning.safety.envelope import Envelope, excursions_of, used
 from fieldsid.planning.safety.monte_carlo import ROLL_SPREAD
 
-RIDGE = 1e-12
 SMALLEST_PIVOT = 1e-10
-"""Smallest eigenvalue of the information in correlation form above which a direction counts as identifiable."""
+"""Smallest eigenvalue of the information in correlation form of an identifiable direction; a ridge of this size is added."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +94,7 @@ def _without_nuisances(normal: FloatArray, shared: int) -> FloatArray:
     own = normal[shared:, shared:]
     scale = np.sqrt(np.maximum(np.diag(own), 1e-300))
     cross = normal[:shared, shared:] / scale
-    unit = own / np.outer(scale, scale) + RIDGE * np.eye(scale.size)
+    unit = own / np.outer(scale, scale) + SMALLEST_PIVOT * np.eye(scale.size)
     return np.asarray(normal[:shared, :shared] - cross @ np.linalg.solve(unit, cross.T))
 
 

@@ -15,7 +15,7 @@ from fieldsid.models.model import Model
 from fieldsid.planning.design.best_leg import FINALISTS
 from fieldsid.planning.design.optimise import moves_of
 from fieldsid.planning.design.plan import MOST_PASSES
-from fieldsid.planning.discriminate.t_optimality import MAX_REFIT_ITERATIONS, Rival, log_odds, rival_of
+from fieldsid.planning.discriminate.t_optimality import Rival, log_odds, rival_of
 from fieldsid.planning.flight.excitation import Excitation, Window, fits, flown
 from fieldsid.planning.flight.operating_point import autopilot_of, operating_point
 from fieldsid.planning.flight.rule_flight import Response
@@ -29,7 +29,7 @@ Map = Callable[[Callable[[Excitation], Pairs], Sequence[Excitation]], list[Pairs
 LONGEST_WINDOW_S = 60.0
 """Length of the window unless another is requested: slow differences discriminate rivals as well."""
 MOST_LOG_ODDS = 300.0
-FAST_HZ, FAST_ROUNDS, BEYOND_DOUBT = 10.0, 3, 50.0
+FAST_HZ, BEYOND_DOUBT = 10.0, 50.0
 AT_ONCE = 2
 """Candidates that are evaluated together before the fast search checks whether one of them is decisive."""
 DECISIVE_LOG_ODDS = float(np.log(20.0))
@@ -103,7 +103,6 @@ class _RivalFlights:
     rivals: tuple[Rival, ...]
     envelope: Envelope
     window: Window
-    rounds: int
     run_up: float
 
     @property
@@ -135,7 +134,7 @@ class _RivalFlights:
         found = {}
         for (true, flight), (wrong, _) in permutations(zip(self.rivals, flights, strict=True), 2):
             if not set(true.scene.model.effects) <= set(wrong.scene.model.effects):
-                found[f"{true.name}>{wrong.name}"] = log_odds(true, wrong, flight, self.rounds)
+                found[f"{true.name}>{wrong.name}"] = log_odds(true, wrong, flight)
         return found
 
 
@@ -143,7 +142,7 @@ def separate(
     models: Sequence[Model],
     envelope: Envelope,
     *,
-    speeds: Sequence[float],
+    speed: float,
     rate_hz: float = RATE_HZ,
     window_s: float = LONGEST_WINDOW_S,
     run_up_s: float = 0.0,
@@ -151,34 +150,32 @@ def separate(
     fast: bool = False,
     mapped: Map = lambda function, candidates: list(map(function, candidates)),
 ) -> Separation:
-    """Return the maneuver inside the envelope that discriminates rival models best, at the best of the speeds (m/s).
+    """Return the maneuver inside the envelope that discriminates rival models best at a speed (m/s).
 
     `fast`: at most 10 Hz, only the maneuvers that the rivals' effects name in `excited_by`, no tuning, and the search ends at the
     first clearly decisive maneuver. `candidates` replace the catalogue. `mapped` evaluates several candidates in parallel. Raises
     UsageError for fewer than two rivals, rivals of different axes, or when no maneuver stays within the envelope.
     """
     _check(models)
-    if set(models[0].effects) == set(models[1].effects) and len(models) == 2:
-        raise UsageError("the two rivals are the same model", found="+".join(models[0].effects), hint="name two different ones")
-    best: Separation | None = None
-    for speed in speeds:
-        rivals = tuple(rival_of(operating_point(m, speed)) for m in models)
-        rate = min(rate_hz, FAST_HZ) if fast else rate_hz
-        rounds = FAST_ROUNDS if fast else MAX_REFIT_ITERATIONS
-        simulator = _RivalFlights(rivals, envelope, Window(window_s, rate_hz=rate), rounds, run_up_s * speed)
-        found = _at_speed(simulator, candidates, mapped, fast=fast)
-        if found is not None and fast:
-            found = replace(found, window=replace(found.window, rate_hz=rate_hz))
-        if found is not None and (best is None or found.expected_log_odds > best.expected_log_odds):
-            best = found
-    if best is None:
+    rivals = tuple(rival_of(operating_point(m, speed)) for m in models)
+    window = Window(window_s, rate_hz=min(rate_hz, FAST_HZ) if fast else rate_hz)
+    arena = _RivalFlights(rivals, envelope, window, run_up_s * speed)
+    among = candidate_maneuvers(window, envelope) if candidates is None else candidates
+    scored = sorted(_scored(arena, among, mapped, fast=fast), key=lambda s: -worth(s[1]))
+    if not scored:
         raise UsageError(
             "no maneuver of the catalogue stays inside the envelope for every rival",
-            found=f"at {', '.join(f'{u:g}' for u in speeds)} m/s; "
+            found=f"at {speed:g} m/s; "
             + (", ".join(f"{k} {v:.3g}" for k, v in envelope.excursion_limits().items()) or "no room"),
             hint=envelope.widening() + ("; `--max-heading none` lets circles in" if envelope.heading is not None else ""),
         )
-    return best
+    tuned = scored if fast else [_tuned(arena, *s) for s in scored[:FINALISTS]]
+    candidate, pairs = max(tuned, key=lambda s: worth(s[1]))
+    window = replace(_shortened(window, arena.responses(candidate)), rate_hz=rate_hz)
+    return Separation(
+        candidate.maneuver, candidate.parameters, speed, min(pairs.values()), pairs, window,
+        {c.spec: min(p.values()) for c, p in scored[:5]},
+    )  # fmt: skip
 
 
 def as_flown(
@@ -186,7 +183,7 @@ def as_flown(
 ) -> Separation:
     """Return a separation with another candidate in place of its own, and the log odds expected of that one."""
     rivals = tuple(rival_of(operating_point(m, found.speed)) for m in models)
-    simulator = _RivalFlights(rivals, envelope, found.window, MAX_REFIT_ITERATIONS, run_up_s * found.speed)
+    simulator = _RivalFlights(rivals, envelope, found.window, run_up_s * found.speed)
     pairs = simulator.pairs(candidate)
     return replace(
         found, maneuver=candidate.maneuver, parameters=candidate.parameters, pairs=pairs,
@@ -199,21 +196,8 @@ def _check(models: Sequence[Model]) -> None:
         raise UsageError("one model has no rival", found=f"{len(models)} model", hint="name two: `--separate delay,servo_lag`")
     if len({m.axis for m in models}) > 1:
         raise UsageError("the rivals are of different axes", found=", ".join(m.axis.value for m in models), hint="plan one axis")
-
-
-def _at_speed(arena: _RivalFlights, candidates: Sequence[Excitation] | None, mapped: Map, *, fast: bool) -> Separation | None:
-    among = candidate_maneuvers(arena.window, arena.envelope) if candidates is None else candidates
-    scored = _scored(arena, among, mapped, fast=fast)
-    if not scored:
-        return None
-    scored.sort(key=lambda s: -worth(s[1]))
-    tuned = scored if fast else [_tuned(arena, *s) for s in scored[:FINALISTS]]
-    candidate, pairs = max(tuned, key=lambda s: worth(s[1]))
-    window = _shortened(arena.window, arena.responses(candidate))
-    return Separation(
-        candidate.maneuver, candidate.parameters, arena.speed, min(pairs.values()), pairs, window,
-        {c.spec: min(p.values()) for c, p in scored[:5]},
-    )  # fmt: skip
+    if len(models) == 2 and set(models[0].effects) == set(models[1].effects):
+        raise UsageError("the two rivals are the same model", found="+".join(models[0].effects), hint="name two different ones")
 
 
 def _scored(arena: _RivalFlights, candidates: Sequence[Excitation], mapped: Map, *, fast: bool) -> list[tuple[Excitation, Pairs]]:

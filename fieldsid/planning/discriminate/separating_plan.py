@@ -46,7 +46,7 @@ def _leg_at(rivals: Sequence[Model], request: Request, speed: float) -> tuple[Le
     trials = [c for c in candidate_maneuvers(setting.window, envelope) if c.record.rule is None or not request.open_loop]
     inside = [enforce_envelope(objective, coarse, few, c) for c in trials]
     found = separate(
-        rivals, envelope, speeds=(speed,), rate_hz=setting.window.rate_hz, window_s=setting.window.length,
+        rivals, envelope, speed=speed, rate_hz=setting.window.rate_hz, window_s=setting.window.length,
         run_up_s=request.run_up_s, candidates=[c for c in inside if c is not None],
     )  # fmt: skip
     setting = replace(setting, window=found.window)

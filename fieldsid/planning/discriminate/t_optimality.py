@@ -54,7 +54,7 @@ def rival_of(scene: OperatingPoint) -> Rival:
     return Rival("+".join(model.effects) or "none", scene, precision)
 
 
-def log_odds(winner: Rival, loser: Rival, response: Response, rounds: int = MAX_REFIT_ITERATIONS) -> float:
+def log_odds(winner: Rival, loser: Rival, response: Response) -> float:
     """Return the expected log odds for the true model (`winner`) after its flight, with the other one refitted to it."""
     truth = winner.scene.record(response.time, response.command + winner.scene.trim_fin)
     problem, x = problem_of(winner.scene, truth)
@@ -62,12 +62,14 @@ def log_odds(winner: Rival, loser: Rival, response: Response, rounds: int = MAX_
     if not np.isfinite(motion.rate).all():
         return 0.0
     record = replace(truth, angle=motion.angle, rate=motion.rate)
-    return 0.5 * _refitted(loser, record, winner.noise, rounds)
+    return 0.5 * _refitted(loser, record, winner.noise)
 
 
-def _refitted(loser: Rival, record: Record, noise: Noise, rounds: int) -> float:
+def _refitted(loser: Rival, record: Record, noise: Noise) -> float:
     """Return the whitened residual sum of squares of a refitted rival on a record, the prior's term included."""
     problem, start = problem_of(loser.scene, record)
     prior = GaussianPrior(start, loser.precision)
-    found = levenberg_marquardt(problem, start, noise, prior=prior, max_iterations=rounds, tolerance=CONVERGED_COST_CHANGE)
+    found = levenberg_marquardt(
+        problem, start, noise, prior=prior, max_iterations=MAX_REFIT_ITERATIONS, tolerance=CONVERGED_COST_CHANGE
+    )
     return found.cost if np.isfinite(found.cost) else 0.0

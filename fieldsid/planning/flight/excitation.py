@@ -118,15 +118,17 @@ def fin_command(candidate: Excitation, window: Window) -> FloatArray:
 
 
 def fly_window(
-    plant: OperatingPointPlant, candidate: Excitation, window: Window, limits: Limits, autopilot: Autopilot,
+    plant: OperatingPointPlant, candidate: Excitation | FloatArray, window: Window, limits: Limits, autopilot: Autopilot,
     moments: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:  # fmt: skip
     """Return command, angle and rate (k, m) of a plant under a candidate, for at most the length of a window.
 
+    In place of a candidate it may be a list of fin angles about trim (rad, NaN for the autopilot, which steers after its end).
     `plant` is over the window and has the disturbance `moments` (m, n), which the longer flight of a rule takes as well.
     """
-    if candidate.record.rule is None:
-        command, angle, rate = fly_fins(plant, fin_command(candidate, window), limits, autopilot)
+    if not isinstance(candidate, Excitation) or candidate.record.rule is None:
+        fins = fin_command(candidate, window) if isinstance(candidate, Excitation) else _filled(candidate, window)
+        command, angle, rate = fly_fins(plant, fins, limits, autopilot)
         return command, angle, rate
     flight = fly_operating_points(
         plant.scenes, candidate.record, candidate.parameters,
@@ -134,6 +136,11 @@ def fly_window(
     )  # fmt: skip
     n = plant.steps.size + 1
     return flight.fin[:n], flight.angle[:n], flight.rate[:n]
+
+
+def _filled(fins: FloatArray, window: Window) -> FloatArray:
+    """Return a list of fin angles over a window, NaN after its end."""
+    return np.append(fins, np.full(window.time.size, np.nan))[: window.time.size]
 
 
 def flown(scene: OperatingPoint, candidate: Excitation, window: Window, limits: Limits, autopilot: Autopilot) -> Response:

@@ -11,6 +11,7 @@ from fieldsid.artifacts import plain, write_text
 from fieldsid.errors import UsageError
 from fieldsid.logs.readers.bags.ros2_commands import write_commands
 from fieldsid.models.axis import NAMES
+from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.design.leg import Leg, aborts_of, commands_of
 from fieldsid.planning.design.plan import Plan
 from fieldsid.planning.output.mission import instead, refuse_blind, render, styles
@@ -65,12 +66,17 @@ def check_formats(wanted: Sequence[str]) -> None:
 
 def table_text(plan: Plan, leg: Leg) -> str:
     """Return a leg's commands as CSV: time, fin about trim (0 while the autopilot steers), 1 while it does, and each fin."""
-    time, fin, steered = commands_of(leg, plan.envelope)
-    each = {} if plan.fins is None else dict(zip(plan.fins.names, plan.fins.fin_commands(fin).tolist(), strict=True))
+    time, fin, steered, each = _commands(plan, leg)
     head = ",".join(["time_s", NAMES[plan.axis].fin, "autopilot", *each])
-    samples = zip(time.tolist(), fin.tolist(), steered.tolist(), *each.values(), strict=True)
+    samples = zip(time.tolist(), fin.tolist(), steered.tolist(), *(v.tolist() for v in each.values()), strict=True)
     rows = [",".join([f"{t:.6g}", f"{f:.6g}", f"{s:.0f}", *(f"{v:.6g}" for v in fins)]) for t, f, s, *fins in samples]
     return "\n".join([head, *rows]) + "\n"
+
+
+def _commands(plan: Plan, leg: Leg) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
+    """Return time, fin and autopilot of a leg, see `commands_of`, and the command (n,) of each of several fins."""
+    time, fin, steered = commands_of(leg, plan.envelope)
+    return time, fin, steered, {} if plan.fins is None else dict(zip(plan.fins.names, plan.fins.fin_commands(fin), strict=True))
 
 
 def _leg_files(plan: Plan, leg: Leg, stem: Path, chosen: Sequence[str], *, force: bool) -> list[Path]:
@@ -81,8 +87,7 @@ def _leg_files(plan: Plan, leg: Leg, stem: Path, chosen: Sequence[str], *, force
         topic = f"/{NAMES[plan.axis].fin.removesuffix('_rad')}_command"
         bag = stem.with_name(f"{stem.name}_bag")
         text = conditions_text(plan, leg)
-        time, fin, steered = commands_of(leg, plan.envelope)
-        each = {} if plan.fins is None else dict(zip(plan.fins.names, plan.fins.fin_commands(fin), strict=True))
+        time, fin, steered, each = _commands(plan, leg)
         commands = {topic: fin, **{f"/{name}_command": values for name, values in each.items()}}
         made.append(write_commands(bag, time, commands, steered, conditions=text, force=force))
     missions = [s for s in styles() if _family(s) in chosen]

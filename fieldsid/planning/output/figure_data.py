@@ -10,6 +10,7 @@ import numpy as np
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.planning.design.best_leg import COARSE_DRAWS
 from fieldsid.planning.design.leg import Leg, commands_of, error_in_words
 from fieldsid.planning.design.plan import Plan
 from fieldsid.planning.flight.excitation import flown
@@ -17,7 +18,6 @@ from fieldsid.planning.flight.operating_point import operating_point
 from fieldsid.planning.safety.envelope import Envelope, track_of
 from fieldsid.planning.safety.monte_carlo import draw_ensemble, fly_ensemble
 
-FIGURE_DRAWS = 120
 LEVELS = (0.025, 0.16, 0.84, 0.975)
 TRACKS = 25
 
@@ -48,7 +48,7 @@ class LegFigure:
 def figure_data(plan: Plan, leg: Leg, model: Model) -> LegFigure:
     """Return the data of a leg's figure, with draws of the prior simulated again."""
     envelope = plan.envelope
-    ensemble = draw_ensemble(model, leg.speed, leg.window, FIGURE_DRAWS, plan.seed + 9)
+    ensemble = draw_ensemble(model, leg.speed, leg.window, COARSE_DRAWS, plan.seed + 9)
     flights = fly_ensemble(ensemble, leg.candidate, envelope, leg.autopilot, 0.0)
     mean = flown(operating_point(model, leg.speed), leg.candidate, leg.window, envelope.limits, leg.autopilot)
     n = min(flights.time.size, mean.time.size)

@@ -18,6 +18,7 @@ from fieldsid.planning.design.leg import Expected, Leg
 from fieldsid.planning.design.plan import MOST_PASSES, Plan
 from fieldsid.planning.flight.excitation import Excitation, Window, fits
 from fieldsid.planning.safety.envelope import LARGEST_SPEED, Envelope
+from fieldsid.planning.specify.quantities import MOST_SPEEDS
 from fieldsid.planning.whole_file import whole_file
 from fieldsid.records.check import finite_number
 from fieldsid.records.keys import body_of
@@ -25,7 +26,8 @@ from fieldsid.records.reading import load_record
 
 KIND = "fieldsid/plan"
 MAX_LEG_S = 3600.0
-MOST_LEGS = 200
+MOST_LEGS = 3 * MOST_SPEEDS
+"""One leg and two circles at every speed."""
 
 
 def save_plan(plan: Plan, path: Path, *, inputs: Sequence[Path] = (), force: bool = False) -> Path:

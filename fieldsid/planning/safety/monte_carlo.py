@@ -13,7 +13,7 @@ from fieldsid.numerics.arrays import BoolArray, FloatArray
 from fieldsid.planning.belief.prior_model import disturbances, draws_of
 from fieldsid.planning.flight.excitation import Excitation, Window, fly_window
 from fieldsid.planning.flight.operating_point import OperatingPoint, operating_point
-from fieldsid.planning.flight.rule_flight import OperatingPointPlant, fly_fins, plant_of
+from fieldsid.planning.flight.rule_flight import OperatingPointPlant, plant_of
 from fieldsid.planning.safety.envelope import Envelope, excursions_of, outside, track_of
 
 ROLL_SPREAD = 0.4
@@ -67,26 +67,14 @@ def draw_ensemble(model: Model, speed: float, window: Window, count: int, seed: 
     return Ensemble(moments, roll, plant_of(scenes, n, window.rate_hz, moments), window)
 
 
-def fly_ensemble(ensemble: Ensemble, candidate: Excitation, envelope: Envelope, autopilot: Autopilot, run_up_m: float) -> Flights:
-    """Return the flights of an ensemble under an excitation, with one autopilot, that for the prior's mean."""
-    found = fly_window(ensemble.plant, candidate, ensemble.window, envelope.limits, autopilot, ensemble.moments)
-    return _with_excursions(ensemble, found[1], found[2], run_up_m)
+def fly_ensemble(
+    ensemble: Ensemble, candidate: Excitation | FloatArray, envelope: Envelope, autopilot: Autopilot, run_up_m: float
+) -> Flights:
+    """Return the flights of an ensemble under an excitation or a list of fin angles about trim (rad), see `fly_window`.
 
-
-def fly_list(ensemble: Ensemble, fins: FloatArray, envelope: Envelope, autopilot: Autopilot, run_up_m: float) -> Flights:
-    """Return the flights of an ensemble under a list of fin angles about trim, (n,) rad, NaN for the autopilot.
-
-    The autopilot steers after the end of the list.
+    They have one autopilot, that for the prior's mean.
     """
-    command = np.full(ensemble.window.time.size, np.nan)
-    count = min(command.size, fins.size)
-    command[:count] = fins[:count]
-    _, angle, rate = fly_fins(ensemble.plant, command, envelope.limits, autopilot)
-    return _with_excursions(ensemble, angle, rate, run_up_m)
-
-
-def _with_excursions(ensemble: Ensemble, angle: FloatArray, rate: FloatArray, run_up_m: float) -> Flights:
-    """Return the flights of angles and rates (n, m) with tracks and excursions."""
+    _, angle, rate = fly_window(ensemble.plant, candidate, ensemble.window, envelope.limits, autopilot, ensemble.moments)
     step, speed = 1.0 / ensemble.window.rate_hz, ensemble.scenes[0].speed
     axis = ensemble.scenes[0].axis
     far = excursions_of(axis, angle, rate, speed=speed, step=step, run_up=run_up_m, roll_gain=ensemble.roll)

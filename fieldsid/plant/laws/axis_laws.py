@@ -18,6 +18,7 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import KIND as MODEL_KIND
 from fieldsid.models.model import Model, model_of
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.planning.whole_file import whole_file
 from fieldsid.plant.laws.parameter_law import ParameterLaw, authority_law, other_law
 from fieldsid.plant.laws.regression import Regression, regression_of
 from fieldsid.plant.points import Point, check_authority, distinct_speeds
@@ -169,13 +170,9 @@ def carried_models(path: Path) -> tuple[tuple[str, Model], ...]:
 def load_laws(path: Path) -> Laws:
     """Read laws back; raises ArtifactError naming the key that is missing or wrong."""
     body = load_record(path, KIND)
-    try:
+    with whole_file(path, "fit file", "make it again: `sysid fit MODEL...`"):
         points = _points_of(body["points"])
         laws = {n: _law_of(n, r, points) for n, r in body["laws"].items()}
-    except ShapeError as error:
-        raise ArtifactError(
-            f"`{path}` is not a complete fit file", found=str(error), hint="make it again: `sysid fit MODEL...`"
-        ) from error
     return Laws(Axis(body["axis"]), points, MappingProxyType(laws))
 
 

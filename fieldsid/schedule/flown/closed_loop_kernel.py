@@ -1,4 +1,6 @@
-"""The compiled closed loop: a fin with angle and rate limit, lag and delay; the plant (models/hull.py) by the midpoint rule.
+"""The compiled closed loop: a fin with angle and rate limit, lag and delay; the plant or the hull by the midpoint rule.
+
+A plant is one of models/hull.py, a hull one in surge, sway and yaw (turning/maneuvering/equations.py).
 
 The speed falls in the turn, u' = a_u (u0^2 - u^2 (1 + f delta^2) - t r^2), the plant's coefficients follow powers of u/u0, and
 the gains are those of the schedule at that speed. Anti-windup: the integral is constant while the fin is at its limit and the
@@ -11,16 +13,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fieldsid.dynamics.steady_kernel import MAX_RATE_RAD_S
 from fieldsid.models.hull import Core, Kinds, core_at, kinds_of, named, power, slope, surge_slope
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import inner, jit
+from fieldsid.plant.yaw_plant import LEAST_SURGE_M_S
+from fieldsid.turning.maneuvering.equations import OFFSET, rudder_lift, servo
+from fieldsid.turning.maneuvering.equations import midpoint_step as hull_step
 
 GAINS = SPEED, KP, KI, KD, BIAS, REFERENCE_GAIN, FIN_LIMIT, DEPTH_GAIN = tuple(range(8))
 """Columns of the gains' rows."""
 MOTION = ANGLE, FIN, DEPTH, SURGE = tuple(range(4))
 """Columns of the motion."""
-DIVERGED_RATE_RAD_S = 20.0
-SLOWEST_SHARE = 0.05
 
 
 class Plants(NamedTuple):
@@ -96,6 +100,23 @@ def level_flight(
 
 
 @inner
+def start_of(stiffness: float, authority: float, offset: float, now: FloatArray, dive: Dive) -> tuple[float, float, float, float]:
+    """Return angle, integral, fin and depth error at the start of a flight: of level flight in a dive, else the steady state."""
+    if dive.depth != 0.0 and now[DEPTH_GAIN] != 0.0:
+        return level_flight(stiffness, authority, offset, now, dive.level)
+    angle, integral, fin = steady_state(stiffness, authority, offset, now)
+    return angle, integral, fin, 0.0
+
+
+@inner
+def target_of(reference: float, dive: Dive, now: FloatArray, z: float) -> float:
+    """Return the angle that is to be reached: the reference, in a dive that of the depth error, limited."""
+    if dive.depth == 0.0:
+        return reference
+    return float(min(max(now[DEPTH_GAIN] * (z - dive.depth), -dive.pitch_limit), dive.pitch_limit))
+
+
+@inner
 def fin_command(now: FloatArray, target: float, y: float, p: float, integral: float, step: float) -> tuple[float, float]:
     """Return the fin command and the integral, which does not change where the fin is at its limit and the error increases it."""
     error = target - y
@@ -104,6 +125,14 @@ def fin_command(now: FloatArray, target: float, y: float, p: float, integral: fl
     if command == wanted or (wanted - command) * now[KP] * error <= 0.0:
         integral += error * step
     return command, integral
+
+
+@inner
+def at_speed(plants: Plants, case: int, ratio: float, core: FloatArray) -> tuple[float, float]:
+    """Return damping and authority of a plant at `ratio` times its initial speed, and fill core (C,) with its constants there."""
+    core_at(plants.core[case], plants.core_powers[case], ratio, core)
+    damping = plants.damping[case] * power(ratio, plants.damping_power[case])
+    return damping, plants.authority[case] * power(ratio, plants.authority_power[case])
 
 
 @inner
@@ -119,63 +148,73 @@ def midpoint_step(
     return y + step * middle, p + step * then.rate, x + step * then.cross, middle
 
 
+@inner
+def delayed(sent: FloatArray, i: int, late: float, start: float) -> float:
+    """Return the command of `late` steps before step i, of those sent (t,) up to it; `start` before the first."""
+    full = int(late)
+    newer, older = (sent[i - full] if i >= full else start), (sent[i - full - 1] if i > full else start)
+    return newer + (late - full) * (older - newer)
+
+
+@inner
+def hull_of(hulls: FloatArray, case: int, offset: float, out: FloatArray) -> None:
+    """Fill out (22,) with the coefficients of a hull, none where there are no hulls, with the fin's offset (rad)."""
+    if hulls.shape[0] > 0:
+        for j in range(out.shape[0]):
+            out[j] = hulls[case, j]
+        out[OFFSET] = offset
+
+
 @jit
 def close_loop(
-    plants: Plants,
-    table: FloatArray,
-    reference: float,
-    dive: Dive,
-    speed: float,
-    step: float,
-    push: FloatArray,
-    out: FloatArray,
-) -> None:
+    plants: Plants, hulls: FloatArray, table: FloatArray, reference: float, dive: Dive, speed: float, step: float,
+    push: FloatArray, out: FloatArray,
+) -> None:  # fmt: skip
     """Fill out (n, t, 4) with angle, fin, depth and speed of n plants under the gains of table (k, 8).
 
-    push (t,) is a disturbance moment in rad/s^2. In a dive the reference is depth gain (z - its depth), limited, and the flight
-    begins level at the depth that the loop holds for the depth zero; else it is `reference` rad. From the sample at which a plant
-    diverges on its angle is inf.
+    hulls (n, 22) are the coefficients of vehicles in surge, sway and yaw, of which the plants are the linearisation and have the
+    fin; (0, 22) without. push (t,) is a disturbance moment in rad/s^2. In a dive the reference is depth gain (z - its depth),
+    limited, and the flight begins level at the depth that the loop holds for the depth zero; else it is `reference` rad. From the
+    sample at which a plant diverges on its angle is inf.
     """
-    now = np.empty(table.shape[1])
-    for case in range(plants.core.shape[0]):
+    now, of_hull, hull, core = np.empty(table.shape[1]), hulls.shape[0] > 0, np.ones(hulls.shape[1]), plants.core[0].copy()
+    for case in range(out.shape[0]):
         stiffness, offset, drag = plants.stiffness[case], plants.offset[case], plants.drag[case]
-        late, most = int(plants.delay_steps[case]), plants.largest_move[case]
+        late, most, keep = plants.delay_steps[case], plants.largest_move[case], plants.decay[case]
         kinds, a, b = kinds_of(plants.core[case]), plants.damping[case], plants.authority[case]
+        sign, sway = 1.0 if b < 0.0 else -1.0, 0.0  # a positive fin of a hull's equations turns to port
+        hull_of(hulls, case, sign * offset, hull)
+        lift = rudder_lift(hull, speed)
         gains_at(table, speed, now)
-        core = plants.core[case].copy()  # for `core[:] =` numba would compile the text of its shape error, for 2 s
-        p = x = z = 0.0
-        u = speed
-        y, integral, start = steady_state(stiffness, b, offset, now)
-        if dive.depth != 0.0 and now[DEPTH_GAIN] != 0.0:
-            y, integral, start, z = level_flight(stiffness, b, offset, now, dive.level)
-        fin, path = start, 0.0
+        at_speed(plants, case, 1.0, core)
+        y, integral, start, z = start_of(stiffness, b, offset, now, dive)
+        u, p, x, fin, path = speed, 0.0, 0.0, start, 0.0
         follows = 1.0 - np.exp(-step / dive.lag) if dive.lag > 0.0 else 1.0
         for i in range(out.shape[1]):
             out[case, i, ANGLE], out[case, i, FIN], out[case, i, DEPTH], out[case, i, SURGE] = y, fin, z, u
-            if not abs(p) < DIVERGED_RATE_RAD_S:
+            if not abs(p) < MAX_RATE_RAD_S:
                 out[case, i:, ANGLE] = np.inf
                 break
-            if drag > 0.0:
+            if u != speed:
                 gains_at(table, u, now)
-                core_at(plants.core[case], plants.core_powers[case], u / speed, core)
-                a = plants.damping[case] * power(u / speed, plants.damping_power[case])
-                b = plants.authority[case] * power(u / speed, plants.authority_power[case])
-            target = reference
-            if dive.depth != 0.0:
-                target = min(max(now[DEPTH_GAIN] * (z - dive.depth), -dive.pitch_limit), dive.pitch_limit)
+            target = target_of(reference, dive, now, z)
             command, integral = fin_command(now, target, y, p, integral, step)
             # the fin receives the command of `late` steps ago; the fin's column of out stores the commands until then
-            if late > 0:
+            if late > 0.0 or of_hull:
                 out[case, i, FIN] = command
-                command = out[case, i - late, FIN] if i >= late else start
-            goal = command + (fin - command) * plants.decay[case]
-            new = fin + min(max(goal - fin, -most), most)
-            mean, before = 0.5 * (fin + new) + offset, y
-            y, p, x, middle = midpoint_step(named(core), kinds, a, stiffness, b * mean + push[i], mean, step, (y, p, x))
-            was = path
-            path += follows * (0.5 * (before + y) - dive.level - path)
-            z -= u * 0.5 * (was + path) * step
-            if drag > 0.0:
+                command = delayed(out[case, :, FIN], i, late, start)
+            new = servo(fin, command, 1.0 - keep, most)
+            if of_hull:
+                fins = sign * fin, sign * servo(fin, command, 1.0 - np.sqrt(keep), 0.5 * most)
+                u, sway, p, middle = hull_step(u, sway, p, fins, 1.0, speed, lift, hull, step, push[i])
+                y += step * middle
+            else:
+                if drag > 0.0:
+                    a, b = at_speed(plants, case, u / speed, core)
+                mean, before, was = 0.5 * (fin + new) + offset, y, path
+                y, p, x, middle = midpoint_step(named(core), kinds, a, stiffness, b * mean + push[i], mean, step, (y, p, x))
+                path += follows * (0.5 * (before + y) - dive.level - path)
+                z -= u * 0.5 * (was + path) * step
                 to_surge = surge_slope(u, speed, drag, plants.fin_loss[case], plants.turn_loss[case], mean, middle)
-                u = max(u + step * to_surge, SLOWEST_SHARE * speed)
+                u = max(u + step * to_surge, LEAST_SURGE_M_S)
             fin = new

@@ -7,7 +7,6 @@ import numpy as np
 from fieldsid.dynamics.steady_kernel import settled_rates, straight_slopes
 from fieldsid.models.hull import CONSTANTS
 from fieldsid.schedule.flown.closed_loop_kernel import GAINS, MOTION, Dive, Plants, close_loop
-from fieldsid.schedule.flown.hull_kernel import close_hull_loop
 from fieldsid.schedule.flown.response import STEP_S
 from fieldsid.turning.maneuvering.equations import NAMES, about_straight, settle, simulate
 from fieldsid.turning.steady.speed_loss import simulated
@@ -26,5 +25,4 @@ def compile_loops() -> None:
     plants = Plants(**{name: rows if name.startswith("core") else row for name in Plants._fields})
     straight_slopes(rows)
     settled_rates(rows, row, row, row, 1.0, np.zeros(0), np.zeros((1, 0)), np.zeros(1))
-    close_loop(plants, none, 0.0, Dive(0.0, 0.0, 0.0, 0.0), 1.0, STEP_S, push, out)
-    close_hull_loop(p[None], np.ones((1, 5)), none, 0.0, 1.0, STEP_S, push, out)
+    close_loop(plants, p[None], none, 0.0, Dive(0.0, 0.0, 0.0, 0.0), 1.0, STEP_S, push, out)

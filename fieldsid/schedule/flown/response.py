@@ -17,18 +17,19 @@ import numpy.typing as npt
 from fieldsid.display import Brief
 from fieldsid.models.model import Noise
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.plant.yaw_plant import LEAST_SURGE_M_S
 from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.flown.closed_loop_kernel import MOTION, Dive, Plants, close_loop
-from fieldsid.schedule.flown.hull_kernel import close_hull_loop
 from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.record import Row
-from fieldsid.turning.steady.transient import LEAST_SURGE_M_S
+from fieldsid.turning.maneuvering.equations import NAMES
 
 SIDES = (1.0, -1.0)
 """The signs of the steps that are simulated: a trim leaves less of the fin to one side than to the other."""
-STEP_S, FLIGHT_S = 0.02, 60.0
-SLOWEST_RAD_S, QUICKEST_RAD_S = 25.0 / FLIGHT_S, 2.0
-"""Bandwidths of the full fin: below the first 60 s are less than 25/w, above the second a step of 0.02 s is too coarse."""
+STEP_S, FLIGHT_S, FLOWN_TIMES = 0.02, 60.0, 25.0
+"""Usual time step and length of a flight, and the length that suffices, times the bandwidth of the full fin."""
+SLOWEST_RAD_S, QUICKEST_RAD_S = FLOWN_TIMES / FLIGHT_S, 2.0
+"""Bandwidths of the full fin: below the first 60 s are too short, above the second a step of 0.02 s is too coarse."""
 LEAST_RAD_S = 1e-4
 """Lower limit of the bandwidth, below that of any fin."""
 LARGEST_TURN = 0.2
@@ -195,21 +196,17 @@ def fly(plant: LinearPlant, rows: Sequence[Row], flight: Flight) -> Steps:
     out = np.zeros((plant.count, time.size, len(MOTION)))
     table = np.array([_gains(row) for row in rows])
     lag, fin_rate = np.maximum(plant.lag, FASTEST_LAG_S), np.minimum(plant.fin_rate, 1e6)
-    offset = plant.offset + flight.offset
-    if plant.hull is None:
-        of_damping, of_authority, of_core, drag, fin_loss, turn_loss = (
-            np.ascontiguousarray(part) for part in (*plant.powers[:, :2].T, plant.powers[:, 2:], *plant.speed_loss.T)
-        )
-        plants = Plants(
-            plant.damping, plant.stiffness, plant.authority, offset, np.ascontiguousarray(plant.core), of_damping, of_authority,
-            of_core, np.exp(-step / lag), np.round(plant.delay / step), fin_rate * step, drag, fin_loss, turn_loss,
-        )  # fmt: skip
-        dive = Dive(flight.depth, flight.pitch_limit, plant.path_lag, plant.level_pitch)
-        close_loop(plants, table, flight.reference, dive, plant.speed, step, push, out)
-    else:
-        sign = np.where(plant.authority < 0.0, 1.0, -1.0)
-        settings = np.column_stack([sign, offset, lag, fin_rate, plant.delay])
-        close_hull_loop(np.ascontiguousarray(plant.hull), settings, table, flight.reference, plant.speed, step, push, out)
+    delay, hulls = plant.delay / step, np.zeros((0, len(NAMES))) if plant.hull is None else np.ascontiguousarray(plant.hull)
+    of_damping, of_authority, of_core, drag, fin_loss, turn_loss = (
+        np.ascontiguousarray(part) for part in (*plant.powers[:, :2].T, plant.powers[:, 2:], *plant.speed_loss.T)
+    )
+    plants = Plants(
+        plant.damping, plant.stiffness, plant.authority, plant.offset + flight.offset, np.ascontiguousarray(plant.core),
+        of_damping, of_authority, of_core, np.exp(-step / lag), np.round(delay) if plant.hull is None else delay,
+        fin_rate * step, drag, fin_loss, turn_loss,
+    )  # fmt: skip
+    dive = Dive(flight.depth, flight.pitch_limit, plant.path_lag, plant.level_pitch)
+    close_loop(plants, hulls, table, flight.reference, dive, plant.speed, step, push, out)
     return Steps(time, *(np.ascontiguousarray(out[:, :, j].T) for j in MOTION))
 
 

@@ -23,6 +23,7 @@ from fieldsid.records.keys import Key, Number
 from fieldsid.schedule.controller import HELD_SHARE, Gains, PlantResponse, margins, margins_of, plant_response, worst_of
 from fieldsid.schedule.flown.response import (
     FLIGHT_ERROR_SHARE,
+    FLOWN_TIMES,
     LIMIT_CYCLE_SHARE,
     SETTLING_BAND,
     SIDES,
@@ -49,8 +50,8 @@ ROUNDING = 1e-3
 """Shortfall at which a requirement counts as met, and tolerance of the search in log units: gains to a thousandth."""
 BETTER_SHARE = 0.01
 """Relative difference of settling time or fin use from which on gains are better than others."""
-FLOWN_TIMES, LEAST_SHARE = 25.0, 1.0 / 3.0
-"""Simulated time of a step, times the bandwidth of the full fin; and its least share of the time of the pace."""
+LEAST_SHARE = 1.0 / 3.0
+"""Least simulated time of a step over that of the pace."""
 ANSWER_TIMES = 3.0
 """Least simulated time of a step over the required settling time."""
 MOST_ERROR = 3.0

@@ -22,14 +22,14 @@ from fieldsid.models.axis import NAMES
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.block_means import block_means, block_width
-from fieldsid.plant.yaw_plant import steady_fins
+from fieldsid.plant.yaw_plant import LEAST_SURGE_M_S, STEP_S, steady_fins
 from fieldsid.turning.maneuvering.equations import coefficients, longest_step, simulate
 from fieldsid.turning.maneuvering.fit import Fitted, fit_maneuvering
 from fieldsid.turning.maneuvering.flown import HEADING, OWN_EFFECTS, SURGE, SWAY, FlownRun, nearest_model, usable_runs
 from fieldsid.turning.maneuvering.posterior import Posterior, draw_posterior, effective_draws, settled_turns, weighted_quantile
 from fieldsid.turning.maneuvering.prior import FARTHEST_COST
 from fieldsid.turning.model_error import STALL_LOG_SD
-from fieldsid.turning.steady.transient import LEAST_SURGE_M_S, Transient, read_off
+from fieldsid.turning.steady.transient import MAX_TRANSIENT_S, Transient, read_off
 
 T = TypeVar("T")
 SEED = 20240511
@@ -37,7 +37,7 @@ FORM_LOG_SD = 0.025
 """Log error of the equations for a turn that was flown: 0.4 % on the ensemble (seed 1), 0.5 to 4 % on a vehicle outside it."""
 UNSEEN_LOG_SD = 0.16
 """Additional log error, times the share of the curvature that was not flown: 10 % on the ensemble (seed 1) with pulses only."""
-TRACK_STEPS = 4800
+TRACK_STEPS = round(MAX_TRANSIENT_S / STEP_S)
 """Time steps of a simulated turn through 180 deg: four minutes for a vehicle, 200 lengths for a ship."""
 
 

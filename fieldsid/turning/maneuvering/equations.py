@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import inner, jit
+from fieldsid.plant.yaw_plant import LEAST_SURGE_M_S, STEP_S
 from fieldsid.records.check import LARGEST_SPEED_M_S
 
 NAMES = (
@@ -35,8 +36,6 @@ IN_LOGARITHM = np.array([n in LOGARITHMS for n in NAMES])
 REFERENCE_SPEED_M_S = 1.5
 LENGTHS_A_STEP = 1.0 / 24.0
 """Longest time step, over the time in which the hull travels its length: the product with its eigenvalues is below a fifth."""
-FINEST_STEP_S = 0.05
-"""Lower limit of the longest time step: the usual sampling interval of logs, fine enough for the smallest vehicles."""
 STATIONS = np.linspace(-0.45, 0.45, 10)
 HEIGHTS = 0.1 * np.sqrt(1.0 - np.abs(2.0 * STATIONS) ** 3)
 SUMS = np.concatenate([np.zeros((1, 4)), np.cumsum(HEIGHTS[:, None] * STATIONS[:, None] ** np.arange(4), axis=0)])
@@ -45,7 +44,6 @@ FIRST_STATION, STATION_STEP = float(STATIONS[0]), float(STATIONS[1] - STATIONS[0
 OFFSET = NAMES.index("rudder_offset")
 DIFFERENCE = 1e-5
 """Width of the central differences, relative to speed and speed over length, and in rad; truncation error below 1e-10."""
-LEAST_SURGE_M_S = 0.02
 
 
 @inner
@@ -99,6 +97,27 @@ def rudder_lift(p: FloatArray, straight: float) -> float:
     return float(p[4] * (straight / REFERENCE_SPEED_M_S) ** p[17])
 
 
+@inner
+def servo(angle: float, command: float, share: float, most: float) -> float:
+    """Return the fin angle after it has gone a share of the way to its command, by `most` rad at most."""
+    return angle + min(max((command - angle) * share, -most), most)
+
+
+@inner
+def midpoint_step(
+    u: float, v: float, r: float, fins: tuple[float, float], push: float, straight: float, lift: float, p: FloatArray, h: float,
+    moment: float,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """Return u, v and r after a step of h s by the midpoint rule, and r at its middle.
+
+    fins are the fin angles (rad) at the start and the middle, `moment` (rad/s^2) is a disturbance.
+    """
+    du, dv, dr = slope(u, v, r, fins[0], push, straight, lift, p)
+    middle = r + 0.5 * h * (dr + moment)
+    du, dv, dr = slope(u + 0.5 * h * du, v + 0.5 * h * dv, middle, fins[1], push, straight, lift, p)
+    return max(u + h * du, LEAST_SURGE_M_S), v + h * dv, r + h * (dr + moment), middle
+
+
 @jit
 def simulate(
     p: FloatArray,
@@ -136,16 +155,14 @@ def simulate(
             last, keep, half = h, math.exp(-h / p[14]), math.exp(-0.5 * h / p[14])
         for j in range(pieces):
             command = fin[i, 0] + (fin[i, 1] - fin[i, 0]) * (j + 0.5) / pieces
-            between = angle + min(max((command - angle) * (1.0 - half), -0.5 * h * p[16]), 0.5 * h * p[16])
+            fins = angle, servo(angle, command, 1.0 - half, 0.5 * h * p[16])
             push = thrust[i] + (thrust[i + 1] - thrust[i]) * (j + 0.5) / pieces
-            du, dv, dr = slope(u, v, r, angle, push, straight, lift, p)
-            mu, mv, mr = u + 0.5 * h * du, v + 0.5 * h * dv, r + 0.5 * h * dr
-            du, dv, dr = slope(mu, mv, mr, between, push, straight, lift, p)
-            heading += h * mr
-            u = min(max(u + h * du, LEAST_SURGE_M_S), LARGEST_SPEED_M_S)
-            v = min(max(v + h * dv, -LARGEST_SPEED_M_S), LARGEST_SPEED_M_S)
-            r = min(max(r + h * dr, -LARGEST_SPEED_M_S), LARGEST_SPEED_M_S)
-            angle += min(max((command - angle) * (1.0 - keep), -h * p[16]), h * p[16])
+            u, v, r, middle = midpoint_step(u, v, r, fins, push, straight, lift, p, h, 0.0)
+            heading += h * middle
+            u = min(u, LARGEST_SPEED_M_S)
+            v = min(max(v, -LARGEST_SPEED_M_S), LARGEST_SPEED_M_S)
+            r = min(max(r, -LARGEST_SPEED_M_S), LARGEST_SPEED_M_S)
+            angle = servo(angle, command, 1.0 - keep, h * p[16])
     return out
 
 
@@ -161,10 +178,7 @@ def settle(p: FloatArray, straight: float, fin: float) -> FloatArray:
     low, high = 1e9, -1e9
     block = 400
     for i in range(1, 10 * block + 1):
-        du, dv, dr = slope(u, v, r, fin, 1.0, straight, lift, p)
-        mu, mv, mr = u + 0.5 * h * du, v + 0.5 * h * dv, r + 0.5 * h * dr
-        du, dv, dr = slope(mu, mv, mr, fin, 1.0, straight, lift, p)
-        u, v, r = max(u + h * du, LEAST_SURGE_M_S), v + h * dv, r + h * dr
+        u, v, r, _ = midpoint_step(u, v, r, (fin, fin), 1.0, straight, lift, p, h, 0.0)
         if not (abs(v) < LARGEST_SPEED_M_S and abs(r) < LARGEST_SPEED_M_S):
             break
         low, high = min(low, r), max(high, r)
@@ -176,8 +190,8 @@ def settle(p: FloatArray, straight: float, fin: float) -> FloatArray:
 
 
 def longest_step(length: float, speed: float) -> float:
-    """Return the longest time step (s) for a hull of a length (m) at a speed (m/s)."""
-    return max(LENGTHS_A_STEP * length / speed, FINEST_STEP_S)
+    """Return the longest time step (s) for a hull of a length (m) at a speed (m/s); STEP_S suffices for any."""
+    return max(LENGTHS_A_STEP * length / speed, STEP_S)
 
 
 def coefficients(theta: FloatArray) -> FloatArray:

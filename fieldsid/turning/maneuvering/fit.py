@@ -18,13 +18,13 @@ import numpy.typing as npt
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 from fieldsid.numerics.ljung_box import inflation
+from fieldsid.plant.yaw_plant import LEAST_SURGE_M_S
 from fieldsid.turning.maneuvering.equations import NAMES, coefficients, growth_rate, longest_step, simulate
 from fieldsid.turning.maneuvering.flown import HEADING, RATE, STATE_SD, SURGE, SWAY, FlownRun
 from fieldsid.turning.maneuvering.prior import FARTHEST_COST, Prior, prior
-from fieldsid.turning.steady.transient import LEAST_SURGE_M_S
 
-OWN = 3
-"""Number of a run's nuisances ahead of those of its segments: straight speed, bias of the rate, bias of the sway."""
+OWN = len(("straight speed", "bias of the rate", "bias of the sway"))
+"""Number of a run's nuisances ahead of those of its segments."""
 SWAY_BIAS_SD = 0.02
 """Standard deviation of a Doppler log's sway bias, m/s."""
 LARGEST_RESIDUAL = 1e6

@@ -18,11 +18,11 @@ from fieldsid.models.record import Record, knows_speed, record_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.block_means import block_means
 from fieldsid.numerics.ljung_box import inflation
+from fieldsid.turning.measured.measured_turn import LEAST_TURN_RAD_S
 from fieldsid.turning.steady.speed_loss import LEAST_SAMPLES, RPM, at_start, thrust_ratio
 
 OWN_EFFECTS = frozenset({"servo_lag", "rate_limit"})
 """Actuator effects that are part of the maneuvering model."""
-LEAST_TURN_RAD_S = 0.005
 UNKNOWN_BIAS_RAD_S = 0.002
 """Standard deviation of a gyro bias that no heading shows."""
 LEAST_BIAS_SD_RAD_S = 1e-5

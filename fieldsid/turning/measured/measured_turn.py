@@ -20,8 +20,8 @@ from fieldsid.turning.measured.circle import LEAST_TURN_FOR_CURRENT_RAD, Circle,
 TURNING_SHARE = 0.5
 SMOOTH_S = 2.0
 APPROACH_S = 5.0
-LEAST_RATE_RAD_S = 0.01
-"""Yaw rate below which a run has no turn."""
+LEAST_TURN_RAD_S = 0.005
+"""Yaw rate below which a run has no turn: a ship turns with a third of a degree a second."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -116,7 +116,7 @@ def _heading(run: Run, rate: FloatArray) -> FloatArray:
 def _settled(run: Run, rate: FloatArray) -> tuple[int, int]:
     """Return first and last sample of the settled part of the longest turn: rate within 5 % of that of its second half."""
     peak = float(np.percentile(np.abs(rate), 95))
-    if peak < LEAST_RATE_RAD_S:
+    if peak < LEAST_TURN_RAD_S:
         raise DataError(
             f"run {run.name!r} does not turn", found=f"yaw rate up to {peak:.4f} rad/s", hint="give the run of a turning circle"
         )

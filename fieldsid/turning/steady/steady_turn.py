@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.dynamics.steady_kernel import settled_rates
+from fieldsid.dynamics.steady_kernel import MAX_ITERATIONS, settled_rates
 from fieldsid.models.hull import CROSS_SHARE
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
@@ -21,7 +21,6 @@ from fieldsid.turning.prediction import SIDES
 from fieldsid.turning.steady.speed_loss import SpeedLoss, SurgeModel, draw_speed_loss, no_speed_loss
 from fieldsid.turning.steady.transient import Transient, turn_transient
 
-MAX_TURN_ITERATIONS = 60
 TOLERANCE = 1e-10
 
 
@@ -44,7 +43,7 @@ def steady_turn(plant: YawPlant, speed_loss: SpeedLoss, entry: FloatArray, side:
     start = np.broadcast_to(entry[None, :], (plant.count, entry.size))
     surge = start / speed_loss.factor(fin, np.zeros_like(start))
     rate = np.zeros_like(surge)
-    for _ in range(MAX_TURN_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         rate = balance(plant, surge, side)
         new = start / speed_loss.factor(fin, np.nan_to_num(rate) / surge)
         change = float(np.max(np.abs(new - surge) / start))

@@ -15,12 +15,11 @@ from fieldsid.dynamics.steady_kernel import between
 from fieldsid.models.hull import core_at, kinds_of, named, power, slope, surge_slope
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
-from fieldsid.plant.yaw_plant import YawPlant, fins_after_step
+from fieldsid.plant.yaw_plant import LEAST_SURGE_M_S, STEP_S, YawPlant, fins_after_step
 from fieldsid.turning.steady.speed_loss import SpeedLoss
 
-STEP_S = 0.04
 MAX_TRANSIENT_S = 240.0
-LEAST_SURGE_M_S = 0.05
+"""The longest simulated turn through 180 deg."""
 
 
 @dataclass(frozen=True, slots=True)

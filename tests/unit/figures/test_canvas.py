@@ -24,7 +24,7 @@ def draw(ax):
     canvas.dots(ax, x, x**2)
     ax.plot(x, x**3, label="model")
     ax.fill_between(x, x, x**2, hatch="//", clip_on=True)
-    canvas.legend_above(ax)
+    canvas.legend_above(ax, 80)
 sheet = canvas.sheet(8.0, 5.0)
 draw(sheet.add_subplot())
 for suffix in sys.argv[2:]:
@@ -52,7 +52,7 @@ def test_the_suffix_is_the_kind_of_file_and_the_same_figure_the_same_bytes(drawn
 
 
 def test_capital_letters_are_a_suffix_too(tmp_path):
-    sheet = canvas.sheet()
+    sheet = canvas.sheet(9.0, 7.0)
     sheet.add_subplot()
     path = canvas.save(sheet, tmp_path / "F.SVG")
     assert path.read_bytes().startswith(b"<?xml")
@@ -61,7 +61,7 @@ def test_capital_letters_are_a_suffix_too(tmp_path):
 @pytest.mark.parametrize("name", ["f.jpg", "f", "f.", "f.png.txt"])
 def test_another_suffix_is_refused_with_one_that_is_drawn(tmp_path, name):
     with pytest.raises(UsageError) as caught:
-        canvas.save(canvas.sheet(), tmp_path / name)
+        canvas.save(canvas.sheet(9.0, 7.0), tmp_path / name)
     assert list(tmp_path.iterdir()) == []
     assert all(f".{kind}" in caught.value.hint for kind in KINDS)
 

@@ -25,7 +25,7 @@ BASE, NAMED, WORSE = model("model as it is", 3.0, 3.2), model("servo_lag", 1.0, 
 
 
 def drawn(*models, noiseless=False):
-    ax = canvas.sheet().add_subplot()
+    ax = canvas.sheet(9.0, 7.0).add_subplot()
     draw_bars(errors(models, "servo_lag", noiseless=noiseless), ax)
     return ax
 

@@ -62,7 +62,7 @@ def test_fin_of_the_model_is_drawn_only_where_it_differs_from_the_command(view):
 
 
 def test_many_samples_are_thinned_to_what_the_eye_can_tell_apart():
-    ax = canvas.sheet().add_subplot()
+    ax = canvas.sheet(9.0, 7.0).add_subplot()
     canvas.dots(ax, np.arange(1e5), np.zeros(100_000))
     assert ax.lines[0].get_xdata().size <= canvas.MOST_DOTS
 

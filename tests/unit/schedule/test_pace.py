@@ -37,8 +37,7 @@ def _verified(kind):
     source, steps = source_of_models([fit.model], [kind.name]), []
     with pytest.MonkeyPatch.context() as patched:
         patched.setenv("FIELDSID_IS_WORKER", "1")  # what a forked worker counts is lost
-        for name in ("close_loop", "close_hull_loop"):
-            patched.setattr(response, name, _counting(getattr(response, name), steps))
+        patched.setattr(response, "close_loop", _counting(response.close_loop, steps))
         schedule = design_schedule(source, LIMIT, wish=Wish("pd"))
         checked = verify_schedule(schedule, source)
     return schedule, checked, sum(steps), plants_of(source, schedule.stated_limits, (), None)

@@ -63,7 +63,7 @@ def test_a_circle_shows_current_where_pulses_hardly_do():
 
 @pytest.mark.parametrize("names", PAIRS)
 def test_a_quick_search_finds_a_maneuver_inside_the_envelope_for_every_pair(names):
-    found = separate(rivals_named(PRIOR, names.split(",")), ENVELOPE, speeds=(1.4,), fast=True)
+    found = separate(rivals_named(PRIOR, names.split(",")), ENVELOPE, speed=1.4, fast=True)
     assert found.parameters["amplitude"] <= ENVELOPE.fin
     assert len(found.pairs) == 2
     assert found.expected_log_odds == min(found.pairs.values())
@@ -96,8 +96,8 @@ def test_several_candidates_are_evaluated_at_once_until_one_decides():
         asked.append(len(candidates))
         return [function(c) for c in candidates]
 
-    found = separate(rivals, ENVELOPE, speeds=(1.4,), fast=True, mapped=mapped)
-    assert found == separate(rivals, ENVELOPE, speeds=(1.4,), fast=True)
+    found = separate(rivals, ENVELOPE, speed=1.4, fast=True, mapped=mapped)
+    assert found == separate(rivals, ENVELOPE, speed=1.4, fast=True)
     assert set(asked[:-1]) <= {AT_ONCE}
     assert sum(asked) - AT_ONCE < len(found.alternatives) <= sum(asked)
     assert found.expected_log_odds > BEYOND_DOUBT
@@ -105,13 +105,13 @@ def test_several_candidates_are_evaluated_at_once_until_one_decides():
 
 def test_a_full_search_is_never_worse_than_its_own_catalogue():
     rivals = rivals_named(PRIOR, ("deadband", "backlash"))
-    found = separate(rivals, ENVELOPE, speeds=(1.4,), window_s=40.0)
+    found = separate(rivals, ENVELOPE, speed=1.4, window_s=40.0)
     assert found.expected_log_odds >= max(found.alternatives.values()) - 1e-9
 
 
 def test_the_envelope_is_kept_by_what_is_proposed():
     narrow = Envelope(0.3, heading=0.5)
-    found = separate(rivals_named(PRIOR, ("servo_lag", "delay")), narrow, speeds=(1.4,), fast=True)
+    found = separate(rivals_named(PRIOR, ("servo_lag", "delay")), narrow, speed=1.4, fast=True)
     for model in rivals_named(PRIOR, ("servo_lag", "delay")):
         scene = operating_point(model, found.speed)
         response = flown(scene, found.candidate, found.window, narrow.limits, autopilot_of(scene.base, narrow.limits))
@@ -129,7 +129,7 @@ def test_rivals_that_are_no_rivals_are_refused(names):
 
 def test_an_envelope_no_maneuver_fits_is_refused():
     with pytest.raises(UsageError, match="inside the envelope"):
-        separate(rivals_named(PRIOR, ("servo_lag", "delay")), Envelope(0.3, heading=0.001), speeds=(1.4,), fast=True)
+        separate(rivals_named(PRIOR, ("servo_lag", "delay")), Envelope(0.3, heading=0.001), speed=1.4, fast=True)
 
 
 def diagnosis(tmp_path, **changes):

@@ -22,7 +22,7 @@ from fieldsid.planning.flight.excitation import Excitation, Window
 from fieldsid.planning.output.command_files import unwritten, write_all
 from fieldsid.planning.output.mission import render, steps_of, styles
 from fieldsid.planning.safety.envelope import Envelope
-from fieldsid.planning.safety.monte_carlo import fly_list
+from fieldsid.planning.safety.monte_carlo import fly_ensemble
 
 FULL = replace(ENVELOPE, pitch=0.4, track=20.0)
 COURSE = np.radians(90.0)
@@ -156,10 +156,10 @@ def test_the_risk_of_a_list_is_that_of_flying_it_blind():
     crowd = ensemble_at(judge, setting)
     zigzag = Excitation("zigzag", leg("zigzag:amplitude=0.2,turn=0.5,duration=26").candidate.parameters)
     made = leg_of(judge, setting, zigzag, crowd)
-    blind = fly_list(crowd, made.nominal, setting.envelope, judge.autopilot, judge.run_up).outside(setting.envelope)
+    blind = fly_ensemble(crowd, made.nominal, setting.envelope, judge.autopilot, judge.run_up).outside(setting.envelope)
     assert made.replay_risk == pytest.approx(float(np.mean(blind)))
     assert made.replay_risk > made.break_probability
-    straight = fly_list(crowd, np.zeros(0), setting.envelope, Autopilot(*_gains(judge)), judge.run_up)
+    straight = fly_ensemble(crowd, np.zeros(0), setting.envelope, Autopilot(*_gains(judge)), judge.run_up)
     assert float(np.mean(straight.outside(setting.envelope))) == 0.0
 
 
