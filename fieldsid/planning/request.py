@@ -15,7 +15,7 @@ from fieldsid.maneuvers import RATE_HZ
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
 from fieldsid.planning.belief.prior_model import checked_prior, load_believed, named_prior
-from fieldsid.planning.design.best_leg import RUN_UP_S
+from fieldsid.planning.design.objective import RUN_UP_S
 from fieldsid.planning.design.plan import WINDOW, Plan, Request, make_plan
 from fieldsid.planning.discriminate.discriminate import LONGEST_WINDOW_S, Separation
 from fieldsid.planning.discriminate.rivals import rivals_from, rivals_named

@@ -18,8 +18,8 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[1]), str(Path(__file__).res
 from plan_flights import believed, exact, flown, paper_day, scatter  # noqa: E402
 
 from fieldsid.maneuvers import pick_maneuver  # noqa: E402
-from fieldsid.planning.design.best_leg import Setting, best_leg, pulses  # noqa: E402
-from fieldsid.planning.design.objective import make_objective  # noqa: E402
+from fieldsid.planning.design.best_leg import best_leg, pulses  # noqa: E402
+from fieldsid.planning.design.objective import Setting, make_objective  # noqa: E402
 from fieldsid.planning.flight.excitation import Excitation, Window  # noqa: E402
 from fieldsid.planning.safety.envelope import Envelope  # noqa: E402
 
@@ -30,7 +30,7 @@ FIN = 0.26
 def entrants(day, heading: float) -> dict[str, Excitation]:
     """The paper's pulses, a PRBS as long and as large, and what is planned within the pulses' heading and within 60 deg."""
     prbs = pick_maneuver("prbs")
-    judge = make_objective(exact(day), day.speed, Envelope(FIN), WINDOW, {}, 10.0)
+    judge = make_objective(Setting(exact(day), Envelope(FIN), WINDOW, {}), day.speed)
     made = {
         "pulses": pulses(judge),
         "prbs": Excitation("prbs", prbs.checked({"amplitude": FIN, "bit": 1.0, "duration": 21.0})),
@@ -43,7 +43,7 @@ def entrants(day, heading: float) -> dict[str, Excitation]:
 
 def compare(day, seeds: range, method: str) -> list[tuple[str, dict[str, float], dict[str, float], float]]:
     """Rows of (name, predicted standard errors, those of many fits, largest heading in rad)."""
-    judge = make_objective(exact(day), day.speed, Envelope(FIN), WINDOW, {}, 10.0)
+    judge = make_objective(Setting(exact(day), Envelope(FIN), WINDOW, {}), day.speed)
     reach = float(np.max(np.abs(flown(day, pulses(judge), WINDOW, 0)["yaw_rad"])))
     rows = []
     # The prior is off and wide: its draws need some room above what the pulses reach on the truth.

@@ -17,8 +17,8 @@ from fieldsid.maneuvers import parse_spec
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
 from fieldsid.planning.belief.prior_model import named_prior
-from fieldsid.planning.design.best_leg import Setting, best_leg, circle_legs, pulses
-from fieldsid.planning.design.objective import make_objective
+from fieldsid.planning.design.best_leg import best_leg, circle_legs, pulses
+from fieldsid.planning.design.objective import Setting, make_objective
 from fieldsid.planning.design.plan import Request, make_plan
 from fieldsid.planning.flight.excitation import Excitation, Window
 from fieldsid.planning.safety.envelope import Envelope
@@ -38,12 +38,12 @@ def planned():
 
 
 def errors_of(day, candidate):
-    judge = make_objective(exact(day), day.speed, Envelope(FIN), WINDOW, {}, 10.0)
+    judge = make_objective(Setting(exact(day), Envelope(FIN), WINDOW, {}), day.speed)
     return judge.expected(candidate).std_errors()
 
 
 def paper_pulses(day):
-    return pulses(make_objective(exact(day), day.speed, Envelope(FIN), WINDOW, {}, 10.0))
+    return pulses(make_objective(Setting(exact(day), Envelope(FIN), WINDOW, {}), day.speed))
 
 
 @pytest.mark.parametrize("disturbance", [0.0, 0.01])

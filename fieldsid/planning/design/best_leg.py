@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
 
 from fieldsid.errors import UsageError
 from fieldsid.maneuvers import pick_maneuver
-from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.belief.prior_model import draws_of, scales_of
 from fieldsid.planning.design.leg import CIRCLE, Expected, Leg, turn_back_s
-from fieldsid.planning.design.objective import Objective, information_of, make_objective
+from fieldsid.planning.design.objective import Objective, Setting, information_of, make_objective
 from fieldsid.planning.design.optimise import SMALLEST, Scored, as_switched, at_best_amplitude, catalogue, switching
-from fieldsid.planning.flight.excitation import LONGEST_WINDOW_S, Excitation, Window, fits, flown
+from fieldsid.planning.flight.excitation import LONGEST_WINDOW_S, Excitation, fits, flown
 from fieldsid.planning.flight.operating_point import operating_point
 from fieldsid.planning.flight.rule_flight import fly_operating_points
-from fieldsid.planning.safety.envelope import MOST_TURNS, Envelope
+from fieldsid.planning.safety.envelope import MOST_TURNS
 from fieldsid.planning.safety.monte_carlo import Ensemble, draw_ensemble, fly_ensemble
 from fieldsid.runtime.parallel_map import parallel_map
 
@@ -27,21 +26,6 @@ DESIGN_PROBABILITY_SHARE = 0.7
 """Share of the accepted probability that a plan may use, so that other draws of the prior stay within it as well."""
 COARSE_DRAWS, DRAWS, ERROR_DRAWS = 200, 500, 12
 FINALISTS = 3
-RUN_UP_S = 10.0
-"""Default straight run before the window of each leg."""
-
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """The settings that all legs of a plan share; `open_loop` excludes maneuvers whose rule depends on the motion."""
-
-    model: Model
-    envelope: Envelope
-    window: Window
-    want: Mapping[str, float]
-    run_up_s: float = RUN_UP_S
-    seed: int = 1
-    open_loop: bool = False
 
 
 def best_leg(setting: Setting, speed: float, known: Sequence[Excitation] = ()) -> Leg:
@@ -50,8 +34,8 @@ def best_leg(setting: Setting, speed: float, known: Sequence[Excitation] = ()) -
     A maneuver whose rule depends on the motion is chosen only where its expected fin angles can be flown open loop. Raises
     UsageError when no maneuver stays within the envelope.
     """
-    objective = make_objective(setting.model, speed, setting.envelope, setting.window, setting.want, setting.run_up_s)
-    ensemble = ensemble_at(objective, setting)
+    objective = make_objective(setting, speed)
+    ensemble = ensemble_at(objective)
     if risk_of(objective, ensemble.first(COARSE_DRAWS), np.zeros(0))[0] > setting.envelope.share:
         raise _nothing_inside(objective)  # not even the autopilot on a straight run stays inside
     # the best maneuvers of other speeds, each at its best amplitude here
@@ -60,23 +44,23 @@ def best_leg(setting: Setting, speed: float, known: Sequence[Excitation] = ()) -
     seeds = [s for s in (as_switched(objective, c.candidate) for c in scored) if s is not None]
     scored.append(switching(objective, seeds, setting.seed))
     scored.sort(key=lambda s: s.cost)
-    leg = _best_of(objective, setting, ensemble, scored)
+    leg = _best_of(objective, ensemble, scored)
     if not leg.flown_from_list_in(setting.envelope):
-        leg = _best_of(objective, setting, ensemble, [s for s in scored if s.candidate.record.rule is None])
+        leg = _best_of(objective, ensemble, [s for s in scored if s.candidate.record.rule is None])
     costs = {s.candidate.spec: float(np.exp(s.cost)) for s in scored[:6]}
     return replace(leg, alternatives=costs)
 
 
-def _best_of(objective: Objective, setting: Setting, ensemble: Ensemble, scored: Sequence[Scored]) -> Leg:
+def _best_of(objective: Objective, ensemble: Ensemble, scored: Sequence[Scored]) -> Leg:
     """Return the leg of the best of some maneuvers (`scored`, best first), reduced to stay within the envelope; or UsageError."""
     few = ensemble.first(COARSE_DRAWS)
-    reduced = (enforce_envelope(objective, setting, few, s.candidate) for s in scored)
+    reduced = (enforce_envelope(objective, few, s.candidate) for s in scored)
     finalists = islice((c for c in reduced if c is not None), FINALISTS)
     inside = [Scored(c, objective.cost(c, margin=10.0)) for c in finalists]
-    best = enforce_envelope(objective, setting, ensemble, min(inside, key=lambda s: s.cost).candidate) if inside else None
+    best = enforce_envelope(objective, ensemble, min(inside, key=lambda s: s.cost).candidate) if inside else None
     if best is None:
         raise _nothing_inside(objective)
-    return leg_of(objective, setting, best, ensemble)
+    return leg_of(objective, best, ensemble)
 
 
 def _nothing_inside(objective: Objective) -> UsageError:
@@ -88,8 +72,9 @@ def _nothing_inside(objective: Objective) -> UsageError:
     )
 
 
-def ensemble_at(objective: Objective, setting: Setting) -> Ensemble:
+def ensemble_at(objective: Objective) -> Ensemble:
     """Return the draws of the prior that the legs at an objective's speed are simulated with."""
+    setting = objective.setting
     return draw_ensemble(setting.model, objective.scene.speed, objective.window, DRAWS, setting.seed + 1)
 
 
@@ -100,11 +85,9 @@ def risk_of(objective: Objective, ensemble: Ensemble, candidate: Excitation | Fl
     return float(np.mean(flights.outside(objective.envelope))), excursions
 
 
-def leg_of(
-    objective: Objective, setting: Setting, candidate: Excitation, ensemble: Ensemble | None = None, purpose: str = "parameters"
-) -> Leg:
+def leg_of(objective: Objective, candidate: Excitation, ensemble: Ensemble | None = None, purpose: str = "parameters") -> Leg:
     """Return the leg of an excitation: expected errors, those of the paper's pulses for comparison, excursions and risk."""
-    scene, ensemble = objective.scene, ensemble or ensemble_at(objective, setting)
+    scene, ensemble = objective.scene, ensemble or ensemble_at(objective)
     risk, excursions = risk_of(objective, ensemble, candidate)
     nominal = _nominal(objective, candidate)
     open_loop_risk = risk_of(objective, ensemble, nominal)[0] if nominal.size else float("nan")
@@ -113,10 +96,10 @@ def leg_of(
         speed=scene.speed,
         candidate=candidate,
         window=objective.window,
-        run_up_s=setting.run_up_s,
+        run_up_s=objective.setting.run_up_s,
         turn_s=turn,
         autopilot=objective.autopilot,
-        expected=expected_errors(objective, setting, candidate, ensemble),
+        expected=expected_errors(objective, candidate, ensemble),
         excursions=excursions,
         break_probability=risk,
         purpose=purpose,
@@ -137,14 +120,12 @@ def _nominal(objective: Objective, candidate: Excitation) -> FloatArray:
     return np.where(flight.recovering[:, 0], np.nan, flight.fin[:, 0])[: window.time.size]
 
 
-def expected_errors(
-    objective: Objective, setting: Setting, candidate: Excitation, ensemble: Ensemble
-) -> dict[str, Expected]:  # fmt: skip
+def expected_errors(objective: Objective, candidate: Excitation, ensemble: Ensemble) -> dict[str, Expected]:
     """Return the expected error of every parameter after one pass of a candidate, with its spread over draws of the prior.
 
     The paper's pulses, which it is compared with, are kept inside the envelope as it is.
     """
-    speed = objective.scene.speed
+    setting, speed = objective.setting, objective.scene.speed
     mean = objective.expected(candidate)
     spread = []
     for drawn in draws_of(setting.model, ERROR_DRAWS, setting.seed + 2):
@@ -152,7 +133,7 @@ def expected_errors(
         response = flown(scene, candidate, objective.window, objective.envelope.limits, objective.autopilot)
         spread.append(information_of(scene, response).std_errors())
     usual = pulses(objective)
-    reference = None if usual is None else enforce_envelope(objective, setting, ensemble.first(COARSE_DRAWS), usual)
+    reference = None if usual is None else enforce_envelope(objective, ensemble.first(COARSE_DRAWS), usual)
     baseline = {} if reference is None else objective.expected(reference).std_errors()
     scales = scales_of(setting.model, objective.scene.base, objective.envelope.fin)
     values = {**objective.scene.model.values, **objective.scene.model.at_speed(speed)}
@@ -177,14 +158,14 @@ def pulses(objective: Objective) -> Excitation | None:
     return Excitation(maneuver.name, maneuver.checked(values))
 
 
-def enforce_envelope(objective: Objective, setting: Setting, ensemble: Ensemble, candidate: Excitation) -> Excitation | None:
+def enforce_envelope(objective: Objective, ensemble: Ensemble, candidate: Excitation) -> Excitation | None:
     """Return the candidate with its angles reduced until enough draws stay within the envelope; None where that is impossible."""
     share, inside, outside = 1.0, 0.0, 1.0
     for step in range(7):
         trial = with_reduced_angles(candidate, share)
         if trial is None:
             break
-        if risk_of(objective, ensemble, trial)[0] <= setting.envelope.share * DESIGN_PROBABILITY_SHARE:
+        if risk_of(objective, ensemble, trial)[0] <= objective.envelope.share * DESIGN_PROBABILITY_SHARE:
             inside = share
             if share == 1.0:
                 break
@@ -221,15 +202,16 @@ def circle_legs(setting: Setting, speeds: Sequence[float]) -> list[Leg]:
 
 def _circle(setting: Setting, speed: float, mirrored: float) -> Leg:
     free = replace(setting.envelope, heading=LARGEST_TURN)
-    probe = make_objective(setting.model, speed, free, setting.window, {}, setting.run_up_s)
+    turning = replace(setting, envelope=free, want={})
+    probe = make_objective(turning, speed)
     rate = abs(probe.scene.base.authority) * free.fin / max(probe.scene.base.damping, 0.02)
     maneuver = pick_maneuver("turning_circle")
     pull_out, around = 8.0, setting.window
     length = float(np.clip(SLACK * SETTLED_TURN / rate + pull_out, 20.0, LONGEST_WINDOW_S - around.lead - around.recover))
     values = {"amplitude": free.fin, "turn": SETTLED_TURN, "pull_out": pull_out, "mirrored": mirrored, "duration": length}
     window = replace(around, length=length + around.lead + around.recover)
-    objective = make_objective(setting.model, speed, free, window, {}, setting.run_up_s)
-    leg = leg_of(objective, setting, Excitation(maneuver.name, maneuver.checked(values)), purpose=CIRCLE)
+    objective = make_objective(replace(turning, window=window), speed)
+    leg = leg_of(objective, Excitation(maneuver.name, maneuver.checked(values)), purpose=CIRCLE)
     leg = replace(leg, heading=LARGEST_TURN)
     if leg.break_probability > free.share:
         raise _no_room(leg, setting)

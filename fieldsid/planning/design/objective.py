@@ -105,20 +105,53 @@ LARGEST_ERROR = 1e6
 for a parameter that is not identifiable."""
 
 
+RUN_UP_S = 10.0
+"""Default straight run before the window of each leg."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """The settings that all legs of a plan share; `open_loop` excludes maneuvers whose rule depends on the motion.
+
+    `want` holds relative accuracy goals, empty for equal ones.
+    """
+
+    model: Model
+    envelope: Envelope
+    window: Window
+    want: Mapping[str, float]
+    run_up_s: float = RUN_UP_S
+    seed: int = 1
+    open_loop: bool = False
+
+
 @dataclass(frozen=True, slots=True)
 class Objective:
     """The objective of excitations at one speed.
 
     `scenes` are the operating points of the prior's mean and of its corners, `weights` 1 / (scale x relative accuracy goal) of
-    each parameter: a largest weighted error of 1 means that every goal is just met. `run_up` is in m.
+    each parameter: a largest weighted error of 1 means that every goal is just met.
     """
 
+    setting: Setting
     scenes: tuple[OperatingPoint, ...]
-    envelope: Envelope
-    window: Window
     autopilot: Autopilot
     weights: Mapping[str, float]
-    run_up: float
+
+    @property
+    def envelope(self) -> Envelope:
+        """The limits of a flight."""
+        return self.setting.envelope
+
+    @property
+    def window(self) -> Window:
+        """The part of a leg that is identified on."""
+        return self.setting.window
+
+    @property
+    def run_up(self) -> float:
+        """Length of the straight run before the window, m."""
+        return self.setting.run_up_s * self.scene.speed
 
     @property
     def scene(self) -> OperatingPoint:
@@ -147,10 +180,9 @@ class Objective:
         return information_of(self.scene, flown(self.scene, candidate, self.window, self.envelope.limits, self.autopilot))
 
 
-def make_objective(
-    model: Model, speed: float, envelope: Envelope, window: Window, want: Mapping[str, float], run_up_s: float
-) -> Objective:
-    """Return the objective of excitations at one speed (m/s); `want` holds relative accuracy goals, empty for equal ones."""
+def make_objective(setting: Setting, speed: float) -> Objective:
+    """Return the objective of excitations at one speed (m/s)."""
+    model, envelope = setting.model, setting.envelope
     names = NAMES[model.axis]
     scene = operating_point(model, speed)
     damping, authority = names.damping, names.authority
@@ -159,9 +191,9 @@ def make_objective(
     scales = scales_of(model, scene.base, envelope.fin)
     # at constant speed, thrust and depth the effects of these signals are not identifiable
     unexcited = {c.name for e in scene.effects if e.needs for c in e.coefficients}
-    goals = dict(want) or {n: 1.0 for n in scales if n not in unexcited}
+    goals = dict(setting.want) or {n: 1.0 for n in scales if n not in unexcited}
     weights = {n: 1.0 / (scales[n] * goal) for n, goal in goals.items()}
-    return Objective(scenes, envelope, window, autopilot_of(scene.base, envelope.limits), weights, run_up_s * speed)
+    return Objective(setting, scenes, autopilot_of(scene.base, envelope.limits), weights)
 
 
 def _outward(scene: OperatingPoint) -> float:

@@ -15,8 +15,9 @@ from fieldsid.models.allocation import PlaneFins
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
 from fieldsid.planning.belief.prior_model import checked_prior
-from fieldsid.planning.design.best_leg import RUN_UP_S, Setting, best_leg, circle_legs
+from fieldsid.planning.design.best_leg import best_leg, circle_legs
 from fieldsid.planning.design.leg import Abort, Leg, aborts_of, turn_back_s
+from fieldsid.planning.design.objective import RUN_UP_S, Setting
 from fieldsid.planning.flight.excitation import Excitation, Window
 from fieldsid.planning.flight.operating_point import operating_point
 from fieldsid.planning.safety.envelope import Envelope, check_room, check_speeds, limits_said

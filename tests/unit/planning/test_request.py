@@ -24,7 +24,7 @@ from fieldsid.planning.belief.prior_model import (
     named_prior,
     scales_of,
 )
-from fieldsid.planning.design.objective import make_objective
+from fieldsid.planning.design.objective import Setting, make_objective
 from fieldsid.planning.design.optimise import LEFT_OUT, SHORTEST_HOLD_S, _start_of, merge_short_holds
 from fieldsid.planning.flight.excitation import Excitation, Window, fits
 from fieldsid.planning.flight.operating_point import operating_point
@@ -164,7 +164,7 @@ def test_a_window_without_room_for_the_excitation_is_refused():
 @pytest.mark.parametrize("length", [9.0, 10.0, 12.0])
 def test_a_maneuver_is_made_to_fit_a_short_window_or_left_out(length):
     """Pulses without a rest between them are still too long there: the rest cannot be shortened for ever."""
-    judge = make_objective(named_prior("torpedo", Axis.YAW), 1.4, Envelope(0.26), Window(length), {}, 10.0)
+    judge = make_objective(Setting(named_prior("torpedo", Axis.YAW), Envelope(0.26), Window(length), {}), 1.4)
     with in_time(20):
         started = [_start_of(m, judge) for m in all_maneuvers().values() if m.name not in LEFT_OUT]
     assert any(s is not None for s in started)
@@ -225,7 +225,7 @@ def test_a_channel_that_a_models_runs_did_not_measure_tells_nothing(tmp_path):
     assert (believed.noise.angle, believed.noise.rate) == (prior.noise.angle, UNMEASURED)
     pulses = Excitation("square_pulses", pick_maneuver("square_pulses").defaults)
     errors = [
-        make_objective(m, 1.4, Envelope(0.26), Window(), {}, 10.0).expected(pulses).std_errors()["a22"]
+        make_objective(Setting(m, Envelope(0.26), Window(), {}), 1.4).expected(pulses).std_errors()["a22"]
         for m in (believed, silent)
     ]
     assert errors[0] > 1.3 * errors[1]

@@ -16,8 +16,8 @@ from fieldsid.errors import UsageError
 from fieldsid.maneuvers import Autopilot
 from fieldsid.models.axis import Axis
 from fieldsid.planning.belief.prior_model import named_prior
-from fieldsid.planning.design.best_leg import Setting, ensemble_at, leg_of
-from fieldsid.planning.design.objective import make_objective
+from fieldsid.planning.design.best_leg import ensemble_at, leg_of
+from fieldsid.planning.design.objective import Setting, make_objective
 from fieldsid.planning.flight.excitation import Excitation, Window
 from fieldsid.planning.output.command_files import unwritten, write_all
 from fieldsid.planning.output.mission import render, steps_of, styles
@@ -152,10 +152,10 @@ def test_a_rule_whose_list_would_leave_the_envelope_is_not_written_and_said(tmp_
 def test_the_risk_of_a_list_is_that_of_flying_it_blind():
     model = named_prior("torpedo", Axis.YAW)
     setting = Setting(model, Envelope(0.26, 1.0, heading=np.radians(60.0)), Window(33.0), {})
-    judge = make_objective(model, 1.4, setting.envelope, setting.window, {}, 10.0)
-    crowd = ensemble_at(judge, setting)
+    judge = make_objective(setting, 1.4)
+    crowd = ensemble_at(judge)
     zigzag = Excitation("zigzag", leg("zigzag:amplitude=0.2,turn=0.5,duration=26").candidate.parameters)
-    made = leg_of(judge, setting, zigzag, crowd)
+    made = leg_of(judge, zigzag, crowd)
     blind = fly_ensemble(crowd, made.nominal, setting.envelope, judge.autopilot, judge.run_up).outside(setting.envelope)
     assert made.replay_risk == pytest.approx(float(np.mean(blind)))
     assert made.replay_risk > made.break_probability
