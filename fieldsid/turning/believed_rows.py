@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fieldsid.errors import ModelError
+from fieldsid.plant.laws.regression import CONFIDENCE_LEVEL
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.turning.maneuvering.belief import Belief, BelievedTurn
 from fieldsid.turning.model_error import MIN_COVERED_SHARE
@@ -16,7 +17,7 @@ from fieldsid.turning.steady.steady_turn import blended_radius
 
 LEAST_EFFECTIVE = 10.0
 """Effective draws: with fewer the error of the median is above 0.4 standard deviations and that of the spread above a fifth."""
-MAX_UNSETTLED = 0.05
+MAX_UNSETTLED = 1.0 - CONFIDENCE_LEVEL
 """Share of draws without a settled turn above which a turn does not count as identified."""
 
 

@@ -28,7 +28,7 @@ Map = Callable[[Callable[[Excitation], Pairs], Sequence[Excitation]], list[Pairs
 
 LONGEST_WINDOW_S = 60.0
 """Length of the window unless another is requested: slow differences discriminate rivals as well."""
-MOST_LOG_ODDS = 300.0
+MOST_LOG_ODDS = float(np.log(np.finfo(np.float64).max))
 FAST_HZ, BEYOND_DOUBT = 10.0, 50.0
 AT_ONCE = 2
 """Candidates that are evaluated together before the fast search checks whether one of them is decisive."""

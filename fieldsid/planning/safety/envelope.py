@@ -14,7 +14,7 @@ from fieldsid.errors import UsageError
 from fieldsid.logs.convert.units import GRAVITY
 from fieldsid.maneuvers import AMPLITUDE_HIGH, Limits
 from fieldsid.models.axis import Axis
-from fieldsid.numerics.arrays import BoolArray, FloatArray
+from fieldsid.numerics.arrays import ROUNDING_SHARE, BoolArray, FloatArray
 from fieldsid.records.keys import Key, Number
 
 LARGEST_FIN = AMPLITUDE_HIGH
@@ -25,8 +25,6 @@ LEAST_FIN = 0.01
 """Smallest fin limit, rad: the size of trims and of the play in a linkage."""
 ACCEPTED_SHARE = 0.05
 """Default share of the draws of the prior that may leave the envelope."""
-ROUNDING = 1e-9
-"""Share of a limit by which sums of many samples may exceed it."""
 NOT_LIMITED = "NOT LIMITED"
 _NO_LIMIT = ", or leave it out where there is no limit"
 OPTIONS: Mapping[str, tuple[str, str, float, str]] = {
@@ -175,7 +173,7 @@ def used(excursions: Mapping[str, FloatArray], envelope: Envelope) -> FloatArray
 
 def outside(excursions: Mapping[str, FloatArray], envelope: Envelope) -> BoolArray:
     """Return a mask (m,) of the flights that leave the envelope; one that just reaches a limit does not."""
-    return np.asarray(used(excursions, envelope) > 1.0 + ROUNDING)
+    return np.asarray(used(excursions, envelope) > 1.0 + ROUNDING_SHARE)
 
 
 def check_speeds(speeds: tuple[float, ...], low: float | None, high: float | None) -> None:

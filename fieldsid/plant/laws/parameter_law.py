@@ -16,9 +16,9 @@ import numpy.typing as npt
 
 from fieldsid.display import Brief
 from fieldsid.logs.run import Note
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.arrays import ROUNDING_SHARE, FloatArray
 from fieldsid.numerics.tail_probabilities import student_tail
-from fieldsid.plant.laws.regression import ROUNDING_SHARE, Regression, fit_power_law, fit_powers, rounding_of, t_factor
+from fieldsid.plant.laws.regression import Regression, fit_power_law, fit_powers, rounding_of, t_factor
 from fieldsid.records.keys import Interval, Key, Number
 from fieldsid.rounding import nine_digits, p_value
 

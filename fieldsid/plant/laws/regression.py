@@ -11,15 +11,13 @@ import numpy.typing as npt
 
 from fieldsid.display import Brief
 from fieldsid.errors import DataError
-from fieldsid.numerics.arrays import FloatArray, known
+from fieldsid.numerics.arrays import ROUNDING_SHARE, FloatArray, known
 from fieldsid.numerics.tail_probabilities import student_quantile
 from fieldsid.records.check import ShapeError, finite_number
 from fieldsid.records.keys import Key, Number
 from fieldsid.records.laws import LARGEST_COEFFICIENT, LARGEST_LOGARITHM
 
 CONFIDENCE_LEVEL = 0.95
-ROUNDING_SHARE = 1e-9
-"""Relative precision of the values, of the largest one: residuals below it are rounding errors."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)

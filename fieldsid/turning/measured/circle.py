@@ -14,9 +14,9 @@ import numpy as np
 
 from fieldsid.display import Brief
 from fieldsid.errors import DataError
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.arrays import ROUNDING_SHARE, FloatArray
 from fieldsid.numerics.white_noise import MEDIAN_OF_NORMAL
-from fieldsid.plant.laws.regression import ROUNDING_SHARE, t_factor
+from fieldsid.plant.laws.regression import t_factor
 from fieldsid.records.keys import Key, Number
 
 HUBER = 1.345

@@ -55,10 +55,6 @@ TYPICAL_DRIFT_LOG_SD = 0.5
 In the ensemble of `model_error.py` the loss was 9 .. 38 % and the drift angle 2 .. 5 deg."""
 
 
-MIN_VARIANCE = 1e-18
-"""Lower limit of the variances by which a covariance is scaled, for coefficients that are known exactly."""
-
-
 @dataclass(frozen=True, slots=True, repr=False)
 class SurgeModel(Brief):
     """a_u (1/m), k_r (m), k_d (1/m), l_r (m) with their covariance (4, 4); what was measured; the fit's scatter m/s."""
@@ -123,7 +119,8 @@ def draw_speed_loss(model: SurgeModel | None, typical_curvature: float, count: i
 
 def _root(covariance: FloatArray) -> FloatArray:
     """Return the lower triangular root (n, n) of a covariance, also of one that is indefinite by rounding."""
-    scale = np.sqrt(np.maximum(np.diag(covariance), MIN_VARIANCE))
+    diagonal = np.diag(covariance)
+    scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))  # the variance of a coefficient that is known exactly is zero
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T) / np.outer(scale, scale))
     upper = np.asarray(np.linalg.qr((vectors * np.sqrt(np.maximum(values, 0.0))).T, mode="r"))
     return np.asarray(scale[:, None] * (upper * np.where(np.diag(upper) < 0.0, -1.0, 1.0)[:, None]).T)
