@@ -73,11 +73,6 @@ class LinearPlant:
         parts: dict[str, Any] = {n: getattr(self, n)[[index]] for n in PARTS}
         return replace(self, **parts, hull=None if self.hull is None else self.hull[[index]])
 
-    def joined(self, other: LinearPlant) -> LinearPlant:
-        """Return the draws of both."""
-        parts: dict[str, Any] = {n: np.concatenate([getattr(self, n), getattr(other, n)]) for n in PARTS}
-        return replace(self, **parts)
-
     def distinct(self) -> LinearPlant:
         """Return the estimate only where all draws are equal, else the plant itself."""
         same = self.hull is None and all(bool((getattr(self, n) == getattr(self, n)[:1]).all()) for n in PARTS)
@@ -220,10 +215,8 @@ def between(near: Sequence[tuple[LinearPlant, float]]) -> LinearPlant:
 def family_at(source: ParameterSource, speed: float, limits: FinLimits, draws: int, seed: int) -> LinearPlant:
     """Return the uncertainty set at a speed: the draws of all neighbouring models."""
     plants = [p for p, _ in plants_at(source, speed, limits, draws, seed)]
-    family = plants[0]
-    for other in plants[1:]:
-        family = family.joined(other)
-    return family
+    parts: dict[str, Any] = {n: np.concatenate([getattr(p, n) for p in plants]) for n in PARTS}
+    return replace(plants[0], **parts)
 
 
 def _plant_of_points(source: ParameterSource, speed: float, limits: FinLimits, draws: int, seed: int) -> LinearPlant:

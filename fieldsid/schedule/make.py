@@ -54,20 +54,7 @@ def design_schedule(
     an impossible request and ModelError where no gain stabilises the loop.
     """
     wish, limits = wish or Wish(), limits or FinLimits()
-    check_wish(wish)
-    limits.refuse_impossible()
-    knots = _knots(source, speeds)
-    if depth and source.axis is not Axis.PITCH:
-        raise UsageError("depth is held through pitch", found="axis: yaw", hint="give the pitch models")
-    refuse_fin_limit("a fin's limit", fin_limit)
-    if fins is not None and not fins.follows(fin_limit):
-        raise UsageError(
-            "the fin's limit is more than the fins reach",
-            found=f"--fin-max {fin_limit:g}, {fins.reach:.4g} rad by `fins` of vehicle.yaml",
-            hint=f"write `--fin-max {fins.reach:.4g}`, or leave it out",
-        )
-    source.require(knots)
-    _refuse_fin_too_small(source, knots, fin_limit, limits, wish.step_of(source.axis))
+    knots = _checked(source, fin_limit, speeds, wish, limits, fins, depth=depth)
     plants, refused = plants_of(source, limits, runs, length), False
     try:
         rows, answer = design_rows(plants, knots, wish, fin_limit, depth=depth)
@@ -87,15 +74,33 @@ def design_schedule(
         actuator=plants.actuator,
         provenance=_provenance(plants, wish, knots, depth=depth)
         | {"belief_refused": refused, "length_m": length}
-        | _fins_entry(fins),
+        | ({} if fins is None else {"fins": body_of(fins)}),
         stated=body_of(limits),
         notes=() if plants.note is None else (plants.note,),
         answer=Answer(answer, wish.step_of(source.axis), wish.settling, wish.bandwidth, wish.overshoot, wish.fin_use),
     )
 
 
-def _fins_entry(fins: PlaneFins | None) -> dict[str, Any]:
-    return {} if fins is None else {"fins": body_of(fins)}
+def _checked(
+    source: ParameterSource, fin_limit: float, speeds: Sequence[float], wish: Wish, limits: FinLimits, fins: PlaneFins | None,
+    *, depth: bool,
+) -> list[float]:  # fmt: skip
+    """Return the speeds (m/s) of a request; raises UsageError for one that is impossible, whatever the gains."""
+    check_wish(wish)
+    limits.refuse_impossible()
+    knots = _knots(source, speeds)
+    if depth and source.axis is not Axis.PITCH:
+        raise UsageError("depth is held through pitch", found="axis: yaw", hint="give the pitch models")
+    refuse_fin_limit("a fin's limit", fin_limit)
+    if fins is not None and not fins.follows(fin_limit):
+        raise UsageError(
+            "the fin's limit is more than the fins reach",
+            found=f"--fin-max {fin_limit:g}, {fins.reach:.4g} rad by `fins` of vehicle.yaml",
+            hint=f"write `--fin-max {fins.reach:.4g}`, or leave it out",
+        )
+    source.require(knots)
+    _refuse_fin_too_small(source, knots, fin_limit, limits, wish.step_of(source.axis))
+    return knots
 
 
 def _refusal_note(error: ModelError) -> Note:

@@ -15,7 +15,7 @@ from fieldsid.logs.several.sifting import Refused
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Effect
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.plant.parameter_source import ParameterSource
+from fieldsid.plant.parameter_source import LEAST_SHARE, ParameterSource
 from fieldsid.plant.remedies import fin_limit_hint, limiting_damping_hint, refuse_fin_limit
 from fieldsid.rounding import TWO_SIDED_95
 from fieldsid.turning.believed_rows import believed_rows, doubts_of_draws
@@ -130,8 +130,6 @@ def _formula_rows(
     for speed in speeds:
         base = source.base_draws(speed, draws, rng)
         a, b, c = base[names.damping], base[names.authority], base[names.trim]
-        a = np.maximum(a, 0.05 * a[0])
-        b = np.sign(b[0]) * np.maximum(np.abs(b), 0.05 * abs(b[0]))
         for side, sign in SIDES.items():
             fin = _usable(rudder, c / b, sign * float(np.sign(b[0])), fin_zero, rng)
             turn = u_turn(speed, a, b, fin)
@@ -244,7 +242,7 @@ def _usable(rudder: float, offset: FloatArray, sign: float, fin_zero: float, rng
     else:
         fin = rudder + rng.uniform(-1.0, 1.0, offset.size) * abs(offset[0])
         fin[0] = rudder
-    return np.maximum(fin, 0.05 * rudder)
+    return np.maximum(fin, LEAST_SHARE * rudder)
 
 
 def _reach(source: ParameterSource, speed: float, rudder: float, rate: float, quarter_s: float) -> DataCoverage:

@@ -1,8 +1,7 @@
 """The compiled closed loop: a fin with angle and rate limit, lag and delay; the plant or the hull by the midpoint rule.
 
-A plant is one of models/hull.py, a hull one in surge, sway and yaw (turning/maneuvering/equations.py).
-
-The speed falls in the turn, u' = a_u (u0^2 - u^2 (1 + f delta^2) - t r^2), the plant's coefficients follow powers of u/u0, and
+A plant is that of models/hull.py; a hull, in surge, sway and yaw, is that of turning/maneuvering/equations.py. The speed of a
+plant falls in the turn, u' = a_u (u0^2 - u^2 (1 + f delta^2) - t r^2), its coefficients follow powers of u/u0, and
 the gains are those of the schedule at that speed. Anti-windup: the integral is constant while the fin is at its limit and the
 error has the sign that would increase it (conditional integration). A loop starts from its steady state under the reference zero.
 """
@@ -157,12 +156,13 @@ def delayed(sent: FloatArray, i: int, late: float, start: float) -> float:
 
 
 @inner
-def hull_of(hulls: FloatArray, case: int, offset: float, out: FloatArray) -> None:
-    """Fill out (22,) with the coefficients of a hull, none where there are no hulls, with the fin's offset (rad)."""
+def hull_of(hulls: FloatArray, case: int, offset: float, speed: float, out: FloatArray) -> float:
+    """Fill out (22,) with the coefficients of a hull, if there is one, with the fin's offset (rad); return its fin's lift."""
     if hulls.shape[0] > 0:
         for j in range(out.shape[0]):
             out[j] = hulls[case, j]
         out[OFFSET] = offset
+    return rudder_lift(out, speed)
 
 
 @jit
@@ -172,10 +172,9 @@ def close_loop(
 ) -> None:  # fmt: skip
     """Fill out (n, t, 4) with angle, fin, depth and speed of n plants under the gains of table (k, 8).
 
-    hulls (n, 22) are the coefficients of vehicles in surge, sway and yaw, of which the plants are the linearisation and have the
-    fin; (0, 22) without. push (t,) is a disturbance moment in rad/s^2. In a dive the reference is depth gain (z - its depth),
-    limited, and the flight begins level at the depth that the loop holds for the depth zero; else it is `reference` rad. From the
-    sample at which a plant diverges on its angle is inf.
+    hulls (n, 22), or (0, 22): vehicles in surge, sway and yaw, of which the plants are the linearisation and have the fin. push
+    (t,) is a disturbance moment in rad/s^2. In a dive the reference is depth gain (z - its depth), limited, and the flight begins
+    at the depth that the loop holds for the depth zero; else it is `reference` rad. Where a plant diverges its angle is inf.
     """
     now, of_hull, hull, core = np.empty(table.shape[1]), hulls.shape[0] > 0, np.ones(hulls.shape[1]), plants.core[0].copy()
     for case in range(out.shape[0]):
@@ -183,8 +182,7 @@ def close_loop(
         late, most, keep = plants.delay_steps[case], plants.largest_move[case], plants.decay[case]
         kinds, a, b = kinds_of(plants.core[case]), plants.damping[case], plants.authority[case]
         sign, sway = 1.0 if b < 0.0 else -1.0, 0.0  # a positive fin of a hull's equations turns to port
-        hull_of(hulls, case, sign * offset, hull)
-        lift = rudder_lift(hull, speed)
+        lift = hull_of(hulls, case, sign * offset, speed, hull)
         gains_at(table, speed, now)
         at_speed(plants, case, 1.0, core)
         y, integral, start, z = start_of(stiffness, b, offset, now, dive)
