@@ -127,14 +127,6 @@ def fin_command(now: FloatArray, target: float, y: float, p: float, integral: fl
 
 
 @inner
-def at_speed(plants: Plants, case: int, ratio: float, core: FloatArray) -> tuple[float, float]:
-    """Return damping and authority of a plant at `ratio` times its initial speed, and fill core (C,) with its constants there."""
-    core_at(plants.core[case], plants.core_powers[case], ratio, core)
-    damping = plants.damping[case] * power(ratio, plants.damping_power[case])
-    return damping, plants.authority[case] * power(ratio, plants.authority_power[case])
-
-
-@inner
 def midpoint_step(
     k: Core, kinds: Kinds, a: float, stiffness: float, moment: float, fin: float, step: float, state: tuple[float, float, float]
 ) -> tuple[float, float, float, float]:
@@ -148,11 +140,12 @@ def midpoint_step(
 
 
 @inner
-def delayed(sent: FloatArray, i: int, late: float, start: float) -> float:
-    """Return the command of `late` steps before step i, of those sent (t,) up to it; `start` before the first."""
+def delayed(out: FloatArray, case: int, i: int, late: float, start: float) -> float:
+    """Return the command of `late` steps before step i, from the fin's column of out (n, t, 4); `start` before the first."""
     full = int(late)
-    newer, older = (sent[i - full] if i >= full else start), (sent[i - full - 1] if i > full else start)
-    return newer + (late - full) * (older - newer)
+    newer = out[case, i - full, FIN] if i >= full else start
+    older = out[case, i - full - 1, FIN] if i > full else start
+    return float(newer + (late - full) * (older - newer))
 
 
 @inner
@@ -176,7 +169,7 @@ def close_loop(
     (t,) is a disturbance moment in rad/s^2. In a dive the reference is depth gain (z - its depth), limited, and the flight begins
     at the depth that the loop holds for the depth zero; else it is `reference` rad. Where a plant diverges its angle is inf.
     """
-    now, of_hull, hull, core = np.empty(table.shape[1]), hulls.shape[0] > 0, np.ones(hulls.shape[1]), plants.core[0].copy()
+    now, of_hull, hull = np.empty(table.shape[1]), hulls.shape[0] > 0, np.ones(hulls.shape[1])
     for case in range(out.shape[0]):
         stiffness, offset, drag = plants.stiffness[case], plants.offset[case], plants.drag[case]
         late, most, keep = plants.delay_steps[case], plants.largest_move[case], plants.decay[case]
@@ -184,7 +177,7 @@ def close_loop(
         sign, sway = 1.0 if b < 0.0 else -1.0, 0.0  # a positive fin of a hull's equations turns to port
         lift = hull_of(hulls, case, sign * offset, speed, hull)
         gains_at(table, speed, now)
-        at_speed(plants, case, 1.0, core)
+        core = plants.core[case].copy()  # for `core[:] =` numba would compile the text of its shape error, for 2 s
         y, integral, start, z = start_of(stiffness, b, offset, now, dive)
         u, p, x, fin, path = speed, 0.0, 0.0, start, 0.0
         follows = 1.0 - np.exp(-step / dive.lag) if dive.lag > 0.0 else 1.0
@@ -200,7 +193,7 @@ def close_loop(
             # the fin receives the command of `late` steps ago; the fin's column of out stores the commands until then
             if late > 0.0 or of_hull:
                 out[case, i, FIN] = command
-                command = delayed(out[case, :, FIN], i, late, start)
+                command = delayed(out, case, i, late, start)
             new = servo(fin, command, 1.0 - keep, most)
             if of_hull:
                 fins = sign * fin, sign * servo(fin, command, 1.0 - np.sqrt(keep), 0.5 * most)
@@ -208,7 +201,9 @@ def close_loop(
                 y += step * middle
             else:
                 if drag > 0.0:
-                    a, b = at_speed(plants, case, u / speed, core)
+                    core_at(plants.core[case], plants.core_powers[case], u / speed, core)
+                    a = plants.damping[case] * power(u / speed, plants.damping_power[case])
+                    b = plants.authority[case] * power(u / speed, plants.authority_power[case])
                 mean, before, was = 0.5 * (fin + new) + offset, y, path
                 y, p, x, middle = midpoint_step(named(core), kinds, a, stiffness, b * mean + push[i], mean, step, (y, p, x))
                 path += follows * (0.5 * (before + y) - dive.level - path)
