@@ -19,8 +19,10 @@ def state_of(value: Any) -> Any:
         return {name.lstrip("_"): state_of(getattr(value, name)) for name in value.STATE}
     if isinstance(value, Mapping):
         return {name: state_of(v) for name, v in value.items()}
-    if isinstance(value, (np.ndarray, list, tuple)):
-        return [state_of(v) for v in (value.ravel().tolist() if isinstance(value, np.ndarray) else value)]
+    if isinstance(value, np.ndarray):
+        return [v if isfinite(v) else None for v in value.ravel().tolist()]
+    if isinstance(value, (list, tuple)):
+        return [state_of(v) for v in value]
     return None if isinstance(value, float) and not isfinite(value) else value
 
 
