@@ -16,7 +16,6 @@ from fieldsid.dynamics.steady_kernel import MAX_RATE_RAD_S
 from fieldsid.models.hull import Core, Kinds, core_at, kinds_of, named, power, slope, surge_slope
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import inner, jit
-from fieldsid.plant.yaw_plant import LEAST_SURGE_M_S
 from fieldsid.turning.maneuvering.equations import OFFSET, rudder_lift, servo
 from fieldsid.turning.maneuvering.equations import midpoint_step as hull_step
 
@@ -24,6 +23,8 @@ GAINS = SPEED, KP, KI, KD, BIAS, REFERENCE_GAIN, FIN_LIMIT, DEPTH_GAIN = tuple(r
 """Columns of the gains' rows."""
 MOTION = ANGLE, FIN, DEPTH, SURGE = tuple(range(4))
 """Columns of the motion."""
+SLOWEST_SHARE = 0.05
+"""Least speed of a plant in its turn, over the initial one: the settling of a draw that comes to it depends on it."""
 
 
 class Plants(NamedTuple):
@@ -209,5 +210,5 @@ def close_loop(
                 path += follows * (0.5 * (before + y) - dive.level - path)
                 z -= u * 0.5 * (was + path) * step
                 to_surge = surge_slope(u, speed, drag, plants.fin_loss[case], plants.turn_loss[case], mean, middle)
-                u = max(u + step * to_surge, LEAST_SURGE_M_S)
+                u = max(u + step * to_surge, SLOWEST_SHARE * speed)
             fin = new
