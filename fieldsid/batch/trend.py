@@ -39,13 +39,11 @@ LARGEST_RELATIVE_ERROR = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
-    """A change of a parameter: the first run after it and its start, means before and after, standard error of the difference."""
+class Drift:
+    """A steady change of a parameter, by a line over the runs, with the standard error of the difference."""
 
-    run: Annotated[str, Key("The first run after it.")]
-    start_utc: Annotated[str, Key("That run's start.")]
-    before: Annotated[float, Key("Mean before, at the trend's speed.")]
-    after: Annotated[float, Key("Mean after.")]
+    before: Annotated[float, Key("Value before, of a steady change at the first run, at the trend's speed.")]
+    after: Annotated[float, Key("Value after, of a steady change at the last run.")]
     std_error: Annotated[float, Key("Standard error of the difference.")]
 
     @property
@@ -55,17 +53,11 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
-class Drift:
-    """A steady change of a parameter: values at the first and last run by a line, and the standard error of the difference."""
+class Change(Drift):
+    """A change of a parameter at a date, between the means before and after: the first run after it and its start."""
 
-    before: Annotated[float, Key("Value at the first run, at the trend's speed.")]
-    after: Annotated[float, Key("Value at the last run.")]
-    std_error: Annotated[float, Key("Standard error of the difference.")]
-
-    @property
-    def share(self) -> Annotated[Number, Key()]:
-        """The change as a share of the value before; NaN where it was zero."""
-        return (self.after - self.before) / self.before if self.before else float("nan")
+    run: Annotated[str, Key("The first run after it.")]
+    start_utc: Annotated[str, Key("That run's start.")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +126,7 @@ def _trend(rows: Sequence[Row], name: str, speeds: FloatArray, middle: float, po
     means = [float(np.average(x[p], weights=weight[p])) for p in parts]
     variances = [1.0 / float(weight[p].sum()) for p in parts]
     changes = tuple(
-        Change(str(kept[at]["run"]), str(kept[at]["start_utc"]), means[i], means[i + 1], sqrt(variances[i] + variances[i + 1]))
+        Change(means[i], means[i + 1], sqrt(variances[i] + variances[i + 1]), str(kept[at]["run"]), str(kept[at]["start_utc"]))
         for i, at in enumerate(starts.tolist())
     )
     level = np.concatenate([np.full(p.stop - p.start, m) for p, m in zip(parts, means, strict=True)])

@@ -12,7 +12,7 @@ from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.records.keys import Interval, Key, Number, Side
-from fieldsid.rounding import number, with_error
+from fieldsid.rounding import with_error
 
 TRIM_ANGLE = "trim_angle"
 """The fin angle in rad that is equivalent to the trim moment: it does not depend on the speed where the fin is bent."""
@@ -162,8 +162,3 @@ class Change(Plotted):
         words = [p.says for p in sorted(shown, key=lambda p: order[p.state])]
         words += [f"{e} only after" for e in self.added] + [f"{e} only before" for e in self.removed]
         return words
-
-
-def shown(value: float, error: float) -> str:
-    """Return a value with its error, the value alone where the error is not known."""
-    return with_error(value, error) if error > 0 else number(value)

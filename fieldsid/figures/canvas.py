@@ -32,7 +32,6 @@ THIRD = "#009E73"
 FOURTH = "#CC79A7"
 WARM = "#E69F00"
 QUIET = "0.75"
-SERIES = (SIMULATED, SECOND, THIRD, FOURTH, WARM, "#56B4E9", "0.2")
 DPI = 120
 LETTERS_PER_INCH = 11.5
 """Letters of a title in an inch of the sheet."""

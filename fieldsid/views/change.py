@@ -10,6 +10,7 @@ from fieldsid.display import Figures, Frames, View
 from fieldsid.figures.sketch import sketch
 from fieldsid.page import Block, Page
 from fieldsid.records.keys import body_of
+from fieldsid.rounding import with_error
 from fieldsid.views._words import table, warned
 
 if TYPE_CHECKING:
@@ -49,13 +50,13 @@ def blocks_of(found: Change, title: str = "") -> Iterator[Block | str]:
 
 
 def _rows(p: ParameterChange) -> Iterator[tuple[str, ...]]:
-    from fieldsid.change.record import CHANGED, TRIM_ANGLE, shown
+    from fieldsid.change.record import CHANGED, TRIM_ANGLE
 
     is_trim = p.name == TRIM_ANGLE
     name = p.word if p.word == p.name else "trim, deg" if is_trim else f"{p.word} {p.name}"
     scale = degrees(1.0) if is_trim else 1.0
     for i, a in enumerate(p.speeds):
-        values = (shown(scale * a.old, scale * a.old_std_error), shown(scale * a.new, scale * a.new_std_error))
+        values = (with_error(scale * a.old, scale * a.old_std_error), with_error(scale * a.new, scale * a.new_std_error))
         change = _amount(p, a.change, a.std_error) + (" *" if a.is_beyond_errors else "  ")
         yield name if i == 0 else "", f"{a.speed:.2f}" if isfinite(a.speed) else "all", *values, change
     if len(p.speeds) > 1:
@@ -63,10 +64,10 @@ def _rows(p: ParameterChange) -> Iterator[tuple[str, ...]]:
 
 
 def _amount(p: ParameterChange, change: float, error: float) -> str:
-    from fieldsid.change.record import TRIM_ANGLE, shown
+    from fieldsid.change.record import TRIM_ANGLE
 
     factor = 100.0 if p.is_relative else degrees(1.0) if p.name == TRIM_ANGLE else 1.0
-    return f"{'+' if change > 0 else ''}{shown(factor * change, factor * error)}{' %' if p.is_relative else ''}"
+    return f"{'+' if change > 0 else ''}{with_error(factor * change, factor * error)}{' %' if p.is_relative else ''}"
 
 
 def frames(found: Change) -> Frames:

@@ -26,6 +26,8 @@ ALIKE, MOST = 8.0, 0.15
 ALIKE_REDRAWN, MOST_REDRAWN = 30.0, 1.5
 """The same where another version of the library has drawn: it moves letters, ticks and margins by a pixel or two."""
 DRAWN_BY = "Software"
+SERIES = (canvas.SIMULATED, canvas.SECOND, canvas.THIRD, canvas.FOURTH, canvas.WARM, "#56B4E9", "0.2")
+"""The colours of lines and marks."""
 GREYS = (0, 51, 64, 115, 153, 191, 204, 229, 242, 255)
 """Those of lines, dots, bars, bands and grids, and what lies between them and white."""
 
@@ -69,7 +71,7 @@ def _reduced(image: Image.Image) -> bytes:
 def _palette() -> Image.Image:
     """Return a palette of greys, and of the colours that figures are drawn in with their blends towards white."""
     greys = [[v] * 3 for v in GREYS]
-    colours = [[round(255 * v) for v in to_rgb(c)] for c in (*canvas.SERIES, COLOURS["limit"])]
+    colours = [[round(255 * v) for v in to_rgb(c)] for c in (*SERIES, COLOURS["limit"])]
     blends = [[round(255 - share * (255 - v)) for v in colour] for colour in colours for share in (1.0, 0.5, 0.18)]
     image = Image.new("P", (1, 1))
     image.putpalette([v for colour in (*greys, *blends) for v in colour])
