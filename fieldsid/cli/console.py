@@ -14,7 +14,7 @@ from contextvars import ContextVar
 from copy import copy
 from functools import partial
 from logging import INFO, Handler, LogRecord, getLogger
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from rich.console import Console, ConsoleOptions, Group, JustifyMethod, RenderableType, RenderResult
 from rich.measure import Measurement
@@ -24,6 +24,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from fieldsid.artifacts import plain
+from fieldsid.cli.exit_codes import GATE_FAILED
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.voice import voice
 from fieldsid.logs.run import Note
@@ -32,6 +33,8 @@ from fieldsid.records.keys import Result, body_of
 from fieldsid.text.one_line import one_line
 
 T = TypeVar("T")
+Body: TypeAlias = Mapping[str, Any]
+"""The JSON object of a result."""
 WIDTH = 80
 _VERDICT: ContextVar[str] = ContextVar("verdict", default="")
 NARROW, FAR, LEAST_WORDS = 60, 1000, 12
@@ -69,13 +72,13 @@ def messages() -> Console:
 
 
 def emit(
-    result: Result | Mapping[str, Any],
+    result: Result | Body,
     *,
     render: Page | Callable[[Console], None],
     headline: Headline | None = None,
     notes: Iterable[Note] = (),
     is_file: bool = False,
-) -> Mapping[str, Any]:
+) -> Body:
     """Print a result, or the JSON body of one, and return the body with the headline: as one JSON object, or as text.
 
     As text: the headline, then the notes as warnings, then `render`, which is a page or a function that prints; with `--quiet`
@@ -248,6 +251,16 @@ def complain(*lines: str) -> None:
     """Print on stderr why the exit code is not 0, also with `--quiet`."""
     for line in lines:
         messages().print(words(line), soft_wrap=True)
+
+
+def gated(body: Body, why: Iterable[str] = (), *, failed: bool) -> Body:
+    """Return the JSON body of a result; where a gate of the command failed, say why on stderr and end it with exit code 1."""
+    if failed:
+        import typer
+
+        complain(*why)
+        raise typer.Exit(GATE_FAILED)
+    return body
 
 
 def warn(notes: Iterable[Note], *, of: str = "") -> None:

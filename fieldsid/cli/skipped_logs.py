@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import typer
-
-from fieldsid.cli.console import complain
+from fieldsid.cli.console import Body, complain, gated
 from fieldsid.errors import FieldsidError
 from fieldsid.results.result import Skipped
 from fieldsid.text.one_line import one_line
@@ -40,12 +38,11 @@ class Skips:
         """Return the runs without those that were skipped after they had been read."""
         return [run for run in runs if run.name not in self._runs]
 
-    def end(self, body: Mapping[str, Any], used: int) -> Mapping[str, Any]:
+    def end(self, body: Body, used: int) -> Body:
         """Return the JSON body of a command; where logs were skipped, say how many and end the command with exit code 1.
 
         used: the number of logs that were used.
         """
-        if not self.records:
-            return body
-        complain(f"{len(self.records)} of {len(self.records) + used} logs skipped, for the reasons above")
-        raise typer.Exit(1)
+        count = len(self.records)
+        why = f"{count} of {count + used} logs skipped, for the reasons above"
+        return gated(body, [why], failed=count > 0)

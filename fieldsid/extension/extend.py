@@ -6,7 +6,7 @@ they differ in the addition only.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -23,17 +23,19 @@ from fieldsid.diagnosis.search.given_model import refitted_from
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import MAX_ERROR_RATIO
 from fieldsid.display import Brief, Plotted
+from fieldsid.dynamics.at_bound import at_bound
 from fieldsid.effects import pick_effect, refuse_clash
 from fieldsid.errors import DataError, UsageError
 from fieldsid.fitting.fit_runs import records_of
 from fieldsid.fitting.predict.predict import as_flown
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.several.sifting import Refused
-from fieldsid.models.effect import Effect, effect_held
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Effect, as_fitted, effect_held
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record, left_out
 from fieldsid.noise.white_floor import told_floor
-from fieldsid.records.keys import Key
+from fieldsid.records.keys import INLINE, Key, Number
 
 FITTED_TO_ALL = Note(
     "fitted_to_all",
@@ -94,17 +96,39 @@ class Gain(Brief):
         return pair.train.over(self.noise_floor), pair.validation.over(self.noise_floor)
 
 
+@dataclass(frozen=True, slots=True)
+class AddedCoefficient:
+    """A coefficient of an effect that was added."""
+
+    value: Annotated[float, Key("The estimate.")]
+    std_error: Annotated[Number, Key("Its standard error.")]
+    unit: Annotated[str, Key("Its unit.")]
+    at_bound: Annotated[bool, Key("Whether it ended on a bound: then no error is right.")]
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Extension(Plotted):
     """The extended model, what the addition changed, and its gain in log evidence."""
 
     model: Model
-    gain: Gain
-    evidence: float
-    notes: tuple[Note, ...] = ()
+    gain: Annotated[Gain, INLINE]
+    evidence: Annotated[float, Key("Gain in log evidence.", "log_evidence")]
+    notes: Annotated[tuple[Note, ...], Key("What else there is to know.")] = ()
 
     @property
-    def pays(self) -> bool:
+    def axis(self) -> Annotated[Axis, Key()]:
+        """The plane."""
+        return self.model.axis
+
+    @property
+    def coefficients(self) -> Annotated[Mapping[str, AddedCoefficient], Key()]:
+        """The coefficients of the added effects, by name."""
+        model, bound = self.model, at_bound(self.model)
+        shared = (c for n in self.gain.added for c in as_fitted(pick_effect(n), model.values).shared)
+        return {c.name: AddedCoefficient(model.values[c.name], model.std_error(c.name), c.unit, c.name in bound) for c in shared}
+
+    @property
+    def pays(self) -> Annotated[bool, Key()]:
         """Whether the error falls by more than a negligible factor; where all data were fitted, the evidence must rise too."""
         before, after = self.gain.over_floor
         return after < MAX_ERROR_RATIO * before and (self.gain.unseen or self.evidence > 0.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from fieldsid.errors import UsageError
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from fieldsid.extension.extend import Extension
     from fieldsid.fitting.fit import Fit
     from fieldsid.logs import ChannelMap, Run
+    from fieldsid.logs.several.sifting import Refused
     from fieldsid.models.axis import Axis
     from fieldsid.vehicle import Vehicle
 
@@ -35,13 +36,16 @@ def identify(
     forgetting: float = 1.0,
     mapping: ChannelMap | File | None = None,
     vehicle: Vehicle | File | None = None,
+    done: Callable[[], None] = lambda: None,
+    unfit: Refused[Run] | None = None,
 ) -> Several[Fit]:
     """Return the fit of the yaw or pitch model to each run, or with `joint` a single fit to all of them.
 
     axis: by default the one that the runs excite. Of each run the part that excites the axis is used; all of it with `whole`, or
     the part from start to end in s. bandwidth: that of the state-variable filter in rad/s. forgetting: the factor of `svf_rls`.
-    Raises DataError for runs that do not allow the fit, UsageError for a method that does not take the effects or several runs,
-    for an unknown effect and for runs that excite both axes or none, and as `load` does.
+    done: called after each fit. unfit: called with each of several runs that cannot be fitted, and the error, which is raised
+    without it. Raises DataError for runs that do not allow the fit, UsageError for a method that does not take the effects or
+    several runs, for an unknown effect and for runs that excite both axes or none, and as `load` does.
     """
     from fieldsid.fitting.identify import identify as fit_runs
     from fieldsid.fitting.problem.estimator import Options
@@ -58,6 +62,8 @@ def identify(
             whole=whole or start is not None or end is not None,
             options=Options(bandwidth, forgetting),
             vehicle=vehicle_of(vehicle),
+            done=done,
+            unfit=unfit,
         )
     )
 

@@ -22,6 +22,7 @@ from fieldsid.face.speeds import speeds_of
 
 if TYPE_CHECKING:
     from fieldsid.logs import ChannelMap, Run
+    from fieldsid.logs.several.sifting import Refused
     from fieldsid.plant.laws.axis_laws import Laws
     from fieldsid.schedule.record import Schedule
     from fieldsid.schedule.verify import Verification
@@ -52,13 +53,15 @@ def turn_radius(
     fin_zero: float = 0.0175,
     mapping: ChannelMap | File | None = None,
     vehicle: Vehicle | File | None = None,
+    unfit: Refused[Run] | None = None,
 ) -> TurnPrediction:
     """Return the turning radius over speed, port and starboard apart, with 95 % bands.
 
     speeds: in m/s or as `0.5:2.5:0.1`; by default those of the models. rudder_max: in rad; by default the vehicle's limit, else
     the largest angle in the models' runs. measured: runs of turning circles to compare with and to learn from. runs: runs that
     the turn is fitted to, for the loss of speed; by default those that the model files name. fin_zero: fin offsets (rad) below it
-    are ignored. Raises UsageError, ModelError for an unstable model, DataError for a measured run without a circle.
+    are ignored. unfit: called with each run that cannot be used, and the error, which is raised without it. Raises UsageError,
+    ModelError for an unstable model, DataError for a measured run without a circle.
     """
     from fieldsid.turning.radius import turn_radius as radius_over_speed
 
@@ -76,6 +79,7 @@ def turn_radius(
         measured=runs_mapped(measured, mapping, models=source.paths),
         method=method,
         fin_zero=fin_zero,
+        unfit=unfit,
         length=known.length_m,
     )
 

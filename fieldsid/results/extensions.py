@@ -2,26 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from fieldsid.extension.extend import Gain
+from fieldsid.extension.extend import Extension, Gain
 from fieldsid.extension.lineage import Generation, Parent
-from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis
 from fieldsid.records.keys import INLINE, Key, Number, Result
 from fieldsid.results.result import OfLogs
-
-
-@dataclass(frozen=True, slots=True)
-class AddedCoefficient:
-    """A coefficient of an effect that was added."""
-
-    value: Annotated[float, Key("The estimate.")]
-    std_error: Annotated[Number, Key("Its standard error.")]
-    unit: Annotated[str, Key("Its unit.")]
-    at_bound: Annotated[bool, Key("Whether it ended on a bound: then no error is right.")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,17 +27,12 @@ class Extended(OfLogs):
 
     SCHEMA = "fieldsid/extend/1"
 
-    gain: Annotated[Gain, INLINE]
-    axis: Annotated[Axis, Key("The plane.")]
-    log_evidence: Annotated[float, Key("Gain in log evidence.")]
-    pays: Annotated[bool, Key("Whether the error falls by more than a trifle.")]
+    found: Annotated[Extension, INLINE]
     kept: Annotated[bool, Key("Whether the model was written: it pays, or `--keep`.")]
     kept_by: Annotated[str | None, Key("What it was kept for: `unseen`, `evidence` or `--keep`; null where it was not.")]
     model: Annotated[str, Key("The file that was written; the parent where nothing was kept.")]
     effects: Annotated[tuple[str, ...], Key("The effects in that model.")]
     parent: Annotated[Parent, Key("The model it was made from.")]
-    coefficients: Annotated[Mapping[str, AddedCoefficient], Key("The coefficients of the added effects, by name.")]
-    notes: Annotated[tuple[Note, ...], Key("What else there is to know.")]
     left: Annotated[LeftOver, Key("What the model as it now is leaves.")]
     next: Annotated[str, Key("The command that goes on from there.")]
 

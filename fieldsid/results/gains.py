@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from fieldsid.models.axis import Axis
+from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.records.keys import INLINE, Key, Number, Result
 from fieldsid.schedule.controller import Gains
+from fieldsid.schedule.linear_plant import not_counted
 from fieldsid.schedule.record import Schedule
-from fieldsid.schedule.verdict import Gate
+from fieldsid.schedule.verdict import Gate, against_constant, rests_on, verdict_of
 from fieldsid.schedule.verify import Verification
 
 
@@ -72,3 +74,23 @@ class Exported(Result):
     file: Annotated[str | None, Key("The file that was written, or that is shown changed.")] = None
     difference: Annotated[str, Key("How a file that exists changes, as a unified difference.")] = ""
     backup: Annotated[str | None, Key("That file as it was; null where nothing was replaced.")] = None
+
+
+def verified(checked: Verification, source: ParameterSource, gates: tuple[Gate, ...], figure: str | None) -> Verified:
+    """Return a verification as the command tells it; source: the models that it was made on."""
+    schedule = checked.schedule
+    verdict, says = verdict_of(checked, schedule, gates)
+    return Verified(
+        verdict=verdict,
+        says=says,
+        rests_on=rests_on(checked, schedule, source),
+        not_counted=not_counted(source.models),
+        against_constant=against_constant(checked),
+        constant_gains=checked.constant_row.gains,
+        axis=schedule.axis,
+        controller=schedule.kind,
+        worst=checked.worst,
+        checked=checked,
+        gates=gates,
+        figure=figure,
+    )

@@ -9,10 +9,9 @@ from typing import Annotated, Any, Literal
 from fieldsid.batch.trend import Trend
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis
-from fieldsid.records.keys import Key, Result
+from fieldsid.records.keys import INLINE, Key, Result
 from fieldsid.results.result import Skipped
-from fieldsid.trial_folder.journal import Entry
-from fieldsid.trial_folder.state import Item
+from fieldsid.trial_folder.state import FolderState
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +39,8 @@ class Status(Result):
 
     SCHEMA = "fieldsid/status/1"
 
-    folder: Annotated[str, Key("The folder.")]
+    state: Annotated[FolderState, INLINE]
     verdict: Annotated[str, Key("What it holds, in one line.")]
-    files: Annotated[tuple[Item, ...], Key("The files that the program knows.")]
-    stale: Annotated[tuple[str, ...], Key("Those that rest on something that has changed since.")]
-    journal: Annotated[tuple[Entry, ...], Key("The commands that were run in it, the oldest first.")]
-    unreadable_journal_lines: Annotated[int, Key("Lines of the journal that are none, as a power cut leaves them.")]
     warnings: Annotated[tuple[Note, ...], Key("What does not go together, as a fin that went beyond the limit of vehicle.yaml.")]
     next: Annotated[NextStep, Key("What to do next.")]
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import chdir
 from itertools import takewhile
 from pathlib import Path
 
 from fieldsid.comparison.left_by import left_by_addition
 from fieldsid.comparison.sufficient import is_noise
-from fieldsid.errors import FieldsidError
-from fieldsid.logs.load import load_run, maps_anything, needs_mapping, to_map
-from fieldsid.logs.run import Run
+from fieldsid.logs.load import maps_anything, needs_mapping, to_map
 from fieldsid.logs.segments import may_show, plane_of
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.logs.several.sifting import attempt
@@ -21,7 +19,7 @@ from fieldsid.records.named_inputs import sha256_of
 from fieldsid.rounding import MANY
 from fieldsid.trial_folder.journal import Entry, is_trial, made_by
 from fieldsid.trial_folder.make import LOGS, MAPPING, RUNS
-from fieldsid.trial_folder.patterns import shortened
+from fieldsid.trial_folder.patterns import repeated, shortened
 from fieldsid.trial_folder.state import LOG, MODEL, RUN, FolderState, Item, state_of
 from fieldsid.vehicle import find_vehicle
 
@@ -53,7 +51,7 @@ def step_before(command: str, state: FolderState) -> tuple[str, str]:
     ):
         return step
     if command == "turn-radius" and state.models and not chosen_models(state, Axis.YAW.value):
-        runs = [i for i in state.of_kind(RUN) if any(may_show(run, Axis.YAW) for run in _read_if_possible(state, i))]
+        runs = [i for i, run in state.readable_runs() if may_show(run, Axis.YAW)]
         if not runs:
             return "there is no model of the yaw, and no run with a rudder", ""
         return "there is no model of the yaw yet", _line("identify", "--axis", "yaw", *_joint(runs))
@@ -96,7 +94,7 @@ def _remake(state: FolderState, item: Item) -> str:
     mappings = [name for name in named if name.endswith((".yaml", ".yml"))]
     logs = [name for name in named if name not in mappings]
     if item.kind == RUN and logs:  # a run that was piped in does not name its log
-        return _line("import", *logs, *_repeat_option("--mapping", mappings), "-o", folder, "--force")
+        return _line("import", *logs, *repeated("--mapping", mappings), "-o", folder, "--force")
     if item.kind == MODEL:
         mapping = item.body.get("mapping")
         read = [*run_words(state), *([] if mapping is None else ["--mapping", str(mapping["path"])])]
@@ -104,11 +102,6 @@ def _remake(state: FolderState, item: Item) -> str:
     if item.kind == "diagnosis":
         return _line("diagnose", *run_words(state), "--axis", axis, "-o", item.path, "--force")
     return _line("history", item.path)
-
-
-def _repeat_option(option: str, values: Iterable[str]) -> list[str]:
-    """Return an option of one value, repeated for each value."""
-    return [word for value in values for word in (option, value)]
 
 
 def _compare_trials(state: FolderState) -> tuple[str, str] | None:
@@ -175,8 +168,8 @@ def _identify_or_extend(state: FolderState) -> tuple[str, str] | None:
     lacking = [e for e in named if e not in best.effects]
     if lacking and not extended:
         fitted, judged = diagnosed_runs(state, best)
-        typed = _unless_default(state, best.path, *fitted, *_repeat_option("--validate", judged))
-        return f"the diagnosis names {', '.join(lacking)}", _line("extend", *typed, *_repeat_option("--add", lacking))
+        typed = _unless_default(state, best.path, *fitted, *repeated("--validate", judged))
+        return f"the diagnosis names {', '.join(lacking)}", _line("extend", *typed, *repeated("--add", lacking))
     return _diagnose_extended(state, best)
 
 
@@ -351,12 +344,4 @@ def _axis(state: FolderState) -> str:
     """Return the plane of the models, else the plane that most runs excite."""
     if state.models:
         return state.models[0].axis or "yaw"
-    return plane_of([run for i in state.of_kind(RUN) for run in _read_if_possible(state, i)])
-
-
-def _read_if_possible(state: FolderState, item: Item) -> list[Run]:
-    """Return a list with the run; empty where it cannot be read, which the command that uses it will report."""
-    try:
-        return [load_run(state.place(item), state.mapping_of(state.place(item)), recognise=True)]
-    except FieldsidError:
-        return []
+    return plane_of([run for _, run in state.readable_runs()])

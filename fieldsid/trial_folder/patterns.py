@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from glob import escape
 from itertools import groupby
-from os.path import commonprefix
+from os.path import commonprefix, isfile
 from pathlib import Path
 
 FEW = 3
@@ -28,9 +28,15 @@ def pattern_of(files: Sequence[Path], folder: Path = Path()) -> list[str]:
 def shortened(words: Sequence[str], folder: Path) -> str:
     """Return a command line that was run in a folder, quoted, its many files as patterns."""
 
-    def kind(word: str) -> Path | None:
-        return Path(word).parent if not word.startswith("-") and (folder / word).is_file() else None
+    def kind(word: str) -> tuple[Path, str] | None:
+        path = Path(word)
+        return None if word.startswith("-") or not isfile(folder / path) else (path.parent, path.suffix)  # noqa: PTH113 - says no
 
-    groups = [(parent, list(group)) for parent, group in groupby(words, key=kind)]
-    parts = [[shlex.quote(w) for w in g] if parent is None else pattern_of([Path(w) for w in g], folder) for parent, g in groups]
+    groups = [(of_one, list(group)) for of_one, group in groupby(words, key=kind)]
+    parts = [[shlex.quote(w) for w in g] if of_one is None else pattern_of([Path(w) for w in g], folder) for of_one, g in groups]
     return " ".join(word for part in parts for word in part)
+
+
+def repeated(option: str, values: Iterable[str | Path]) -> list[str]:
+    """Return an option of one value, repeated for each value."""
+    return [word for value in values for word in (option, str(value))]

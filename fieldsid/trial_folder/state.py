@@ -12,9 +12,11 @@ from typing import Annotated, Any
 
 from fieldsid.display import Brief
 from fieldsid.errors import ArtifactError, LogError
+from fieldsid.logs.load import load_run
 from fieldsid.logs.reader import reader_of
 from fieldsid.logs.readers.several_tables import holds_one_run
-from fieldsid.logs.run import OF_LIMITS, SIMULATED
+from fieldsid.logs.run import OF_LIMITS, SIMULATED, Run
+from fieldsid.logs.several.sifting import attempt
 from fieldsid.logs.unknown_file import own_kind
 from fieldsid.records.keys import Key, Words
 from fieldsid.records.named_inputs import first_allowed
@@ -84,12 +86,19 @@ class FolderState(Brief):
     are trials themselves, as before and after a swap; their files do not belong to this folder.
     """
 
-    folder: Path
-    items: tuple[Item, ...]
-    entries: tuple[Entry, ...]
-    broken_lines: int
+    folder: Annotated[Path, Key("The folder.")]
+    items: Annotated[tuple[Item, ...], Key("The files that the program knows.", "files")]
+    entries: Annotated[tuple[Entry, ...], Key("The commands that were run in it, the oldest first.", "journal")]
+    broken_lines: Annotated[
+        int, Key("Lines of the journal that are none, as a power cut leaves them.", "unreadable_journal_lines")
+    ]
     unreadable: tuple[str, ...] = ()
     sides: tuple[str, ...] = ()
+
+    @property
+    def stale(self) -> Annotated[tuple[str, ...], Key()]:
+        """Those that rest on something that has changed since."""
+        return tuple(i.path for i in self.items if i.stale)
 
     def of_kind(self, kind: str) -> tuple[Item, ...]:
         """Return the files of one kind."""
@@ -118,6 +127,14 @@ class FolderState(Brief):
             if sources and any(s.path == log.resolve() for s in item.sources):
                 return sources[0].path
         return None
+
+    def readable_runs(self) -> Iterator[tuple[Item, Run]]:
+        """Yield each run that can be read: a command that uses another reports what is wrong with it."""
+        for item in self.of_kind(RUN):
+            place = self.place(item)
+            run = attempt(lambda path: load_run(path, self.mapping_of(path), recognise=True), place)
+            if isinstance(run, Run):
+                yield item, run
 
     @property
     def models(self) -> tuple[Item, ...]:

@@ -10,7 +10,7 @@ import pytest
 
 from fieldsid.cli.headlines.missing import Searched, headline_of_diagnosis, headline_of_extension
 from fieldsid.diagnosis.records import Candidate, Diagnosis, Errors, NextManeuver, Pair
-from fieldsid.extension.extend import Gain
+from fieldsid.extension.extend import Extension, Gain
 from fieldsid.extension.lineage import Parent
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis
@@ -97,7 +97,6 @@ def test_an_extension_says_what_judged_it_where_that_are_the_runs_it_was_fitted_
 def extended(gain: Gain) -> Extended:
     """What an extension that is kept comes to."""
     return Extended(
-        gain=gain, axis=Axis.YAW, log_evidence=9.0, pays=True, kept=True, kept_by="unseen", model="", effects=gain.added,
-        parent=Parent(Path("m.yaml"), "", "intact"), coefficients={}, notes=(), skipped_runs=(), next="",
-        left=LeftOver(1.0, 1.0, more_than_noise=False),
+        found=Extension(None, gain, 9.0), kept=True, kept_by="unseen", model="", effects=gain.added,
+        parent=Parent(Path("m.yaml"), "", "intact"), skipped_runs=(), next="", left=LeftOver(1.0, 1.0, more_than_noise=False),
     )  # fmt: skip

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from fieldsid.comparison.compare import Comparison
     from fieldsid.extension.lineage import Loop
     from fieldsid.results.comparisons import ComparedSeveral
+    from fieldsid.results.result import OfLogs
 
 MOST_PLACES = 3
 
@@ -30,7 +31,7 @@ def several_models(
     skips: Skips,
     logs: Sequence[Path],
     draw: Callable[[Mapping[str, Callable[[], Any]]], Sequence[str]],
-) -> tuple[ComparedSeveral, Page, Headline]:
+) -> tuple[OfLogs, Page, Headline]:
     """Return which of several models follows the runs best, from their comparisons and the runs each was fitted to."""
     from fieldsid.cli.headlines.models import headline_of_several
     from fieldsid.records.named_inputs import inputs_of

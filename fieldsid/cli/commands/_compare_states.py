@@ -6,9 +6,9 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from fieldsid.cli.console import emit
+from fieldsid.cli.console import Body, emit
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import typed_with
 from fieldsid.cli.session import draw_figures
@@ -17,6 +17,11 @@ from fieldsid.figures.sketch import sketch
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import own_kind
 from fieldsid.page import Page, counted, written
+from fieldsid.records.named_inputs import inputs_of, sha256_of
+from fieldsid.records.reading import read_yaml
+from fieldsid.trial_folder.next_step import chosen_models
+from fieldsid.trial_folder.state import state_of
+from fieldsid.vehicle import find_vehicle
 from fieldsid.views.change import blocks_of
 
 if TYPE_CHECKING:
@@ -40,7 +45,7 @@ def is_side(path: Path) -> bool:
         return False
 
 
-def compare_states(old: Path, new: Path, output: Path | None, *, force: bool) -> Mapping[str, Any]:
+def compare_states(old: Path, new: Path, output: Path | None, *, force: bool) -> Body:
     """Compare two states axis by axis, print which parameters and effects have changed, and return the JSON body.
 
     Raises UsageError where no axis has models on both sides, or where both sides have the same models.
@@ -92,8 +97,6 @@ def _side(path: Path) -> Side:
 
     if path.is_file():
         return Side(path, {load_model(path).axis.value: [path]})
-    from fieldsid.trial_folder.next_step import chosen_models
-    from fieldsid.trial_folder.state import state_of
 
     state = state_of(path)
     files = {axis: [path / name for name in chosen_models(state, axis)] for axis in ("yaw", "pitch")}
@@ -102,9 +105,6 @@ def _side(path: Path) -> Side:
 
 def _shared_logs(sides: Sequence[Side]) -> list[str]:
     """Return the names of the logs that models of both sides were fitted to; raises UsageError for the same models twice."""
-    from fieldsid.records.named_inputs import sha256_of
-    from fieldsid.records.reading import read_yaml
-
     files = [[p for names in s.files.values() for p in names] for s in sides]
     if {sha256_of(p) for p in files[0]} == {sha256_of(p) for p in files[1]}:
         raise UsageError(
@@ -119,7 +119,6 @@ def _change_of(sides: Sequence[Side], axis: str) -> Change:
     from fieldsid.cli.user_effects import read_source
     from fieldsid.face.arguments import UNKNOWN
     from fieldsid.face.trial import compare_models
-    from fieldsid.vehicle import find_vehicle
 
     before, after = (read_source(s.files[axis]) for s in sides)
     folders = [s.given if s.given.is_dir() else Path() for s in reversed(sides)]
@@ -145,6 +144,5 @@ def _next_command(found: Change, sides: Sequence[Side]) -> str | None:
 
 
 def _inputs(model: Path) -> list[str]:
-    from fieldsid.records.named_inputs import inputs_of
 
     return [str(p) for p in inputs_of(model)]

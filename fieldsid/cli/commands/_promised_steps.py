@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from fieldsid.cli.console import emit
+from fieldsid.cli.console import Body, emit
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted
 from fieldsid.cli.voice import angles
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from fieldsid.change.promise import KeptStep
 
 
-def compare_steps(gains: Path, runs: Sequence[Path], reading: Mapping[str, Any]) -> Mapping[str, Any]:
+def compare_steps(gains: Path, runs: Sequence[Path], reading: Body) -> Body:
     """Compare each step flown in the runs with the bounds that `schedule verify` gives, print that and return the JSON body.
 
     reading: the keyword arguments of `read_runs` (mapping, start, end). A run without a usable step is skipped, except where it

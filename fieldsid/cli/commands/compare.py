@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING
 
-import typer
-
-from fieldsid.cli.console import complain, emit
-from fieldsid.cli.inputs import fitted_to
-from fieldsid.cli.options import FigurePlace, Figures, Force, FromS, MappingFile, ToS, argument, option
+from fieldsid.cli import options
+from fieldsid.cli.console import Body, emit, gated
+from fieldsid.cli.inputs import files_of, fitted_to, model_first, read_ready
 from fieldsid.cli.progress import refuse_place
 from fieldsid.cli.session import draw_figures
 from fieldsid.cli.voice import angles
@@ -24,26 +22,37 @@ from fieldsid.views._words import merit_blocks
 from fieldsid.views.comparison import MOST_PLACES, blocks_of, verdict
 
 if TYPE_CHECKING:
+    from fieldsid.cli.headlines.headline import Headline
+    from fieldsid.cli.skipped_logs import Skips
     from fieldsid.comparison.compare import Comparison
+    from fieldsid.logs.run import Note
     from fieldsid.results.comparisons import ComparedRun
+    from fieldsid.results.result import OfLogs
 
 
-def command(
-    model: Annotated[Path, argument("MODEL", "A model file, the folder of the models before a swap, or gains that were flown.")],
-    runs: Annotated[
-        list[Path], argument("RUN...", "Runs or log files, more models before them; or the model or folder after a swap.")
-    ],
-    start: FromS = None,
-    end: ToS = None,
-    mapping: MappingFile = None,
-    min_fit: Annotated[
-        float | None, option("--min-fit", "PERCENT", "Gate: exit 1 when a run's angle or rate fit is below this.")
-    ] = None,
-    top: Annotated[int, option("--top", "", "Conditions to show for each run.", min=1)] = MOST_PLACES,
-    output: FigurePlace = None,
-    figures: Figures = True,
-    force: Force = False,
-) -> Mapping[str, Any]:
+class Options(options.Part):
+    """What `sysid compare` takes."""
+
+    model: Path = options.argument("MODEL", "A model file, the folder of the models before a swap, or gains that were flown.")
+    runs: list[Path] = options.argument(
+        "RUN...", "Runs or log files, more models before them; or the model or folder after a swap."
+    )
+    min_fit: float | None = options.option("--min-fit PERCENT", "Gate: exit 1 when a run's angle or rate fit is below this.")
+    top: int = options.option("--top", "Conditions to show for each run.", default=MOST_PLACES, min=1)
+    output: Path | None = options.option(
+        "-o --output PLACE", "Folder for the figures, or the name of one: .png, .svg or .pdf.", options.WRITTEN
+    )
+    figures: bool = options.FIGURES
+    force: bool = options.FORCE
+
+    @property
+    def place(self) -> Path | None:
+        """Where figures are drawn, None where none are."""
+        return self.output if self.figures else None
+
+
+@options.takes(Options)
+def command(given: Options) -> Body:
     """Compare a model with runs by free simulation, and show where it fails.
 
     The model is simulated from the run's fin alone; refitted are the initial state, the speed as far as the third of a percent
@@ -61,77 +70,87 @@ def command(
     Example: sysid compare before/models after/models -o figures/
     """
     from fieldsid.cli.commands._compare_states import compare_states, is_side
-
-    refuse_place(output, force=force)
     from fieldsid.logs.unknown_file import own_kind
 
-    reading: dict[str, Any] = {"mapping": mapping, "start": start, "end": end}
-    if own_kind(model) == "schedule":
+    refuse_place(given.output, force=given.force)
+    if own_kind(given.model) == "schedule":
         from fieldsid.cli.commands._promised_steps import compare_steps
 
-        return compare_steps(model, runs, reading)
-    sides = [p for p in (model, *runs) if is_side(p)]
-    others, output = [p for p in runs if p not in sides], output if figures else None
-    if len(sides) == len(runs) + 1 == 2:
-        if any(option is not None for option in (start, end, mapping, min_fit)):
+        return compare_steps(given.model, given.runs, given.reading)
+    sides = [p for p in (given.model, *given.runs) if is_side(p)]
+    others = [p for p in given.runs if p not in sides]
+    if len(sides) == len(given.runs) + 1 == 2:
+        if any(option is not None for option in (*given.reading.values(), given.min_fit)):
             raise UsageError(
                 "`--from`, `--to`, `--mapping` and `--min-fit` are for runs", found="two models and no run", hint="leave them out"
             )
-        return compare_states(sides[0], sides[1], output, force=force)
+        return compare_states(sides[0], sides[1], given.place, force=given.force)
     if len(sides) > 1 and (not others or any(p.is_dir() for p in sides)):
-        given = ", ".join(str(p) for p in (*sides, *others))
-        raise UsageError("several models are compared over runs", found=given, hint="sysid compare M1.yaml M2.yaml RUN")
-    from fieldsid.cli.inputs import files_of, model_first, read_ready
+        named = ", ".join(str(p) for p in (*sides, *others))
+        raise UsageError("several models are compared over runs", found=named, hint="sysid compare M1.yaml M2.yaml RUN")
+    if len(sides) > 1:
+        return _compare_runs(given, sides, others)
+    model, runs = model_first(given.model, given.runs)
+    return _compare_runs(given, [model], runs)
+
+
+def _compare_runs(given: Options, paths: Sequence[Path], runs: Sequence[Path]) -> Body:
+    """Compare one model or several with runs, print that and return the JSON body."""
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.models.model import load_model
     from fieldsid.models.record import left_out
 
-    model, runs = model_first(model, runs)
-    paths, runs = (sides, others) if len(sides) > 1 else ([model], runs)
     models = [load_model(p) for p in paths]
     if len({m.axis for m in models}) > 1:
         present = ", ".join(f"{p.name}: {m.axis.value}" for p, m in zip(paths, models, strict=True))
         raise UsageError("the models are not of one axis", found=present, hint="compare those of one axis")
     skips, known = Skips(), dict(zip(paths, models, strict=True))
-    (logs,) = read_ready([runs], skips, "fieldsid.comparison.compare", known, **reading)
+    (logs,) = read_ready([runs], skips, "fieldsid.comparison.compare", known, **given.reading)
     from fieldsid.comparison.compare import compare
-    from fieldsid.records.named_inputs import inputs_of
-    from fieldsid.results.comparisons import Compared, compared_run
 
     notes, files = left_out(logs, models[0].axis), files_of(logs)
     found, *more = (compare(m, logs, unfit=None if i else skips.skip) for i, m in enumerate(models))
-    fitted = [fitted_to(p, m, logs) for p, m in zip(paths, models, strict=True)]
+    fitted = [fitted_to(p, m, logs) for p, m in known.items()]
+    draw = partial(draw_figures, given.place, force=given.force)
     if more:
         from fieldsid.cli.commands._compare_several import several_models
 
-        draw = partial(draw_figures, output, force=force)
-        several, page, headline = several_models(paths, [found, *more], fitted, skips, files, draw)
-        body = emit(several, render=page, headline=headline, notes=notes)
-        _gate([run for m in body["models"] for run in m["runs"]], min_fit)
-        return skips.end(body, len(found))
-    plots = {f"{model.stem}_on_{c.run}": sketch("compare", c, f"{model.name} on {verdict([c], DEGREES)}") for c in found}
-    drawn: Sequence[str | None] = draw_figures(output, plots, force=force) or [None] * len(found)
-    compared = tuple(compared_run(c, file, fitted[0]) for c, file in zip(found, drawn, strict=True))
-    axis, skipped = models[0].axis, tuple(skips.records)
-    result = Compared(model=str(model), axis=axis, runs=compared, warnings=notes, skipped_runs=skipped)
+        result, page, headline = several_models(paths, [found, *more], fitted, skips, files, draw)
+    else:
+        result, page, headline = _one_model(paths[0], found, fitted[0], skips, files, notes, draw, given.top)
+    body = emit(result, render=page, headline=headline, notes=notes)
+    below = _below(body.get("runs") or [run for m in body["models"] for run in m["runs"]], given.min_fit)
+    return skips.end(gated(body, below, failed=bool(below)), len(found))
+
+
+def _one_model(
+    model: Path, found: Sequence[Comparison], fitted: Collection[str], skips: Skips, logs: Sequence[Path],
+    notes: tuple[Note, ...], draw: Callable[[dict[str, Callable[[], object]]], Sequence[str]], top: int,
+) -> tuple[OfLogs, Page, Headline]:  # fmt: skip
+    """Return how a model follows the runs, from its comparisons and the runs it was fitted to."""
     from fieldsid.cli.headlines.models import headline_of_compare
+    from fieldsid.records.named_inputs import inputs_of
+    from fieldsid.results.comparisons import Compared, compared_run
 
-    headline = headline_of_compare(result, found, files, inputs_of(model))
-    body = emit(result, render=_page(found, compared, top), headline=headline, notes=notes)
-    _gate(body["runs"], min_fit)
-    return skips.end(body, len(compared))
+    plots = {f"{model.stem}_on_{c.run}": sketch("compare", c, f"{model.name} on {verdict([c], DEGREES)}") for c in found}
+    drawn: Sequence[str | None] = draw(plots) or [None] * len(found)
+    compared = tuple(compared_run(c, file, fitted) for c, file in zip(found, drawn, strict=True))
+    result = Compared(
+        model=str(model), axis=found[0].model.axis, runs=compared, warnings=notes, skipped_runs=tuple(skips.records)
+    )
+    return result, _page(found, compared, top), headline_of_compare(result, found, logs, inputs_of(model))
 
 
-def _gate(entries: Sequence[Mapping[str, Any]], least: float | None) -> None:
-    """End the command with exit code 1 where a run's angle or rate fit (per cent) is below the least one accepted."""
+def _below(entries: Sequence[Body], least: float | None) -> list[str]:
+    """Return a sentence on each run whose angle or rate fit (per cent) is below the least one accepted."""
     if least is None:
-        return
+        return []
     found = [(e["run"], name, e[f"{name}_fit_percent"]) for e in entries for name in e["over_floor"]]
-    failed = [(run, name, fit) for run, name, fit in found if not fit >= least]
-    for run, name, fit in failed:
-        complain(f"gate failed: {run} has {name} fit {number_against(fit, least)} %, below {least:g} %")
-    if failed:
-        raise typer.Exit(1)
+    return [
+        f"gate failed: {run} has {name} fit {number_against(fit, least)} %, below {least:g} %"
+        for run, name, fit in found
+        if not fit >= least
+    ]
 
 
 def _page(found: Sequence[Comparison], runs: Sequence[ComparedRun], top: int) -> Page:

@@ -9,12 +9,12 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext, redirect_stderr, redirect_stdout
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING
 
 from fieldsid.cli.app import run
-from fieldsid.cli.console import WIDTH, emit
+from fieldsid.cli.console import WIDTH, Body, emit
 from fieldsid.cli.headlines.trial import headline_of_demo
-from fieldsid.cli.options import Force, OutputDir, flag, option
+from fieldsid.cli.options import FOLDER, FORCE, flag, option
 from fieldsid.cli.progress import compiling
 from fieldsid.cli.session import Session
 from fieldsid.cli.voice import voice
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from fieldsid.results.trial import Step as StepResult
 
 HIDDEN = "servo_lag"
-FOLDER = "sysid-demo"
+OWN_FOLDER = "sysid-demo"
 
 OPENING = (
     "A small vehicle waits on deck. Its dynamics hold one effect more than the textbook's model; the commands below do not know "
@@ -47,11 +47,11 @@ BRIEF, VERBOSE, SILENT = "brief", "verbose", "silent"
 
 
 def command(
-    effect: Annotated[str, option("--effect", "NAME", "The effect to hide: see `sysid effects list`.")] = HIDDEN,
-    output: OutputDir = None,
-    verbose: Annotated[bool, flag("--verbose -v", "Print each command with all that it says, and what it means.")] = False,
-    force: Force = False,
-) -> Mapping[str, Any]:
+    effect: str = option("--effect NAME", "The effect to hide: see `sysid effects list`.", default=HIDDEN),
+    output: Path | None = FOLDER,
+    verbose: bool = flag("--verbose -v", "Print each command with all that it says, and what it means."),
+    force: bool = FORCE,
+) -> Body:
     """Take a tour of all commands: a line for each with its result, or with `--verbose` all that they say and what it means.
 
     The program plans a maneuver, flies it and a few others with a vehicle whose dynamics hold one effect more than the
@@ -115,8 +115,8 @@ def _folder(output: Path | None, *, force: bool) -> Path:
     Raises ArtifactError where the given one is not empty, unless forced.
     """
     if output is None:
-        numbered = (Path(f"{FOLDER}-{i}") for i in range(2, 10_000))
-        return next(p for p in (Path(FOLDER), *numbered) if not p.exists())
+        numbered = (Path(f"{OWN_FOLDER}-{i}") for i in range(2, 10_000))
+        return next(p for p in (Path(OWN_FOLDER), *numbered) if not p.exists())
     if output.is_dir() and any(output.iterdir()) and not force:
         raise ArtifactError(
             f"`{output}` is not empty",

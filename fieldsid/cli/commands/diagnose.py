@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING
 
 from fieldsid.cli import options
-from fieldsid.cli.console import emit
+from fieldsid.cli.console import Body, emit
+from fieldsid.cli.inputs import AXIS_OPTION, files_of, mapping_behind, read_ready
 from fieldsid.cli.progress import compiling_first, refuse_existing, refuse_figure, trying
 from fieldsid.cli.session import draw_figure
 from fieldsid.cli.voice import angles
 from fieldsid.display import page_of
 from fieldsid.errors import UsageError
+from fieldsid.models.axis import Axis
 from fieldsid.page import Block, Page, written
 from fieldsid.records.keys import body_of
 from fieldsid.views._words import times
@@ -22,27 +24,26 @@ if TYPE_CHECKING:
     from fieldsid.diagnosis import Diagnosis
     from fieldsid.diagnosis.records import Pair
     from fieldsid.logs.run import Run
-    from fieldsid.models.axis import Axis
     from fieldsid.models.model import Model, Noise
     from fieldsid.results.diagnoses import Applied, Diagnosed
 
 
-def command(
-    runs: options.RunFiles,
-    axis: options.ExcitedAxis = None,
-    validate: options.ValidateRuns = None,
-    model: Annotated[Path | None, options.option("--model", "MODEL", "A model whose effects are known already.")] = None,
-    mapping: options.MappingFile = None,
-    output: options.OutputFile = None,
-    figure: options.FigureFile = None,
-    thorough: Annotated[
-        bool, options.flag("--thorough", "Go on for as long as there is something to try, half a minute where much is left.")
-    ] = False,
-    apply: Annotated[
-        bool, options.flag("--apply", "Add what is named, an effect at a time, each a model in `models/` with its errors.")
-    ] = False,
-    force: options.Force = False,
-) -> Mapping[str, Any]:
+class Options(options.Mapped, options.Judged, options.Runs):
+    """What `sysid diagnose` takes."""
+
+    axis: Axis | None = options.EXCITED_AXIS
+    model: Path | None = options.option("--model MODEL", "A model whose effects are known already.")
+    thorough: bool = options.flag(
+        "--thorough", "Go on for as long as there is something to try, half a minute where much is left."
+    )
+    apply: bool = options.flag("--apply", "Add what is named, an effect at a time, each a model in `models/` with its errors.")
+    output: Path | None = options.FILE
+    figure: Path | None = options.FIGURE
+    force: bool = options.FORCE
+
+
+@options.takes(Options)
+def command(given: Options) -> Body:
     """Say which physical effect the model is missing, how sure that is, and what else it could be.
 
     Every effect of the catalogue, and every one of your own in `effects/`, is added to a model fitted to all runs together, and
@@ -51,21 +52,22 @@ def command(
 
     Example: sysid diagnose runs/pulses_*.parquet --axis yaw --validate runs/zigzag.parquet
     """
-    from fieldsid.cli.inputs import AXIS_OPTION, files_of, mapping_behind, read_ready
     from fieldsid.cli.skipped_logs import Skips
 
-    refuse_existing(output, force=force)
-    refuse_figure(figure, force=force)
-    known = _known_model(model, axis)
+    model, force = given.model, given.force
+    refuse_existing(given.output, force=force)
+    refuse_figure(given.figure, force=force)
+    known = _known_model(model, given.axis)
     skips, models = Skips(), {model: known} if model else {}
-    training, unseen = read_ready([runs, validate or []], skips, "fieldsid.diagnosis", models, mapping=mapping)
+    groups = [given.runs, given.validate or []]
+    training, unseen = read_ready(groups, skips, "fieldsid.diagnosis", models, mapping=given.mapping)
     from fieldsid.diagnosis import diagnose
     from fieldsid.face.arguments import axis_excited
     from fieldsid.results.diagnoses import Diagnosed
 
-    axis = known.axis if known else axis or axis_excited(training, AXIS_OPTION)
+    axis = known.axis if known else given.axis or axis_excited(training, AXIS_OPTION)
     with compiling_first(), trying("diagnosing") as report:
-        found = diagnose(training, axis, unseen, model=known, report=report, thorough=thorough, unfit=skips.skip)
+        found = diagnose(training, axis, unseen, model=known, report=report, thorough=given.thorough, unfit=skips.skip)
     training, unseen = skips.without_skipped(training), skips.without_skipped(unseen)
     logs = files_of([*training, *unseen])
     result = Diagnosed(
@@ -76,14 +78,14 @@ def command(
         known=() if known is None else known.effects,
         skipped_runs=tuple(skips.records),
     )
-    file = _save_diagnosis(result, output, [*logs, *models], force=force)
-    result = replace(result, file=file, figure=draw_figure(figure, found.plot, force=force))
-    if apply:
-        used = mapping or mapping_behind(models, logs)
+    file = _save_diagnosis(result, given.output, [*logs, *models], force=force)
+    result = replace(result, file=file, figure=draw_figure(given.figure, found.plot, force=force))
+    if given.apply:
+        used = given.mapping or mapping_behind(models, logs)
         result = replace(result, applied=_add_effects(found, (known, model), training, unseen, used, force=force))
     from fieldsid.cli.headlines.missing import Searched, headline_of_diagnosis
 
-    headline = headline_of_diagnosis(result, Searched(files_of(training), files_of(unseen), model, thorough))
+    headline = headline_of_diagnosis(result, Searched(files_of(training), files_of(unseen), model, given.thorough))
     body = emit(result, render=_page(result), headline=headline, notes=found.notes)
     return skips.end(body, len(training) + len(unseen))
 
@@ -121,7 +123,6 @@ def _add_effects(
     """
     from fieldsid.cli.commands.extend import step_files
     from fieldsid.cli.headlines.missing import MODELS
-    from fieldsid.cli.inputs import files_of
     from fieldsid.extension.extend import extend_in_steps, whole_of
     from fieldsid.extension.lineage import save_steps
     from fieldsid.models.model import save_model

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING
 
 import typer
 
-from fieldsid.cli.console import emit
+from fieldsid.cli.console import Body, emit
 from fieldsid.cli.headlines.missing import headline_of_catalogue, headline_of_effect, headline_of_new_effect
 from fieldsid.cli.headlines.typed import pasted
-from fieldsid.cli.options import Force, argument, option
+from fieldsid.cli.options import FORCE, argument, option
 from fieldsid.cli.progress import refuse_existing
 from fieldsid.cli.user_effects import OWN_EFFECTS, load_own_effects
 from fieldsid.errors import UsageError
@@ -28,7 +28,7 @@ command = typer.Typer(help="List the physical effects, show one, start one of yo
 
 
 @command.command("list", short_help="List every effect by stage.")
-def list_(axis: Annotated[Axis | None, option("--axis", "", "Only the effects of this plane.")] = None) -> Mapping[str, Any]:
+def list_(axis: Axis | None = option("--axis", "Only the effects of this plane.")) -> Body:
     """List every effect by its stage of the signal path: actuator, hydrodynamics, sensor.
 
     Example: sysid effects list --axis yaw
@@ -42,7 +42,7 @@ def list_(axis: Annotated[Axis | None, option("--axis", "", "Only the effects of
 
 
 @command.command("show", short_help="Show all that is known of one effect.")
-def show(name: Annotated[str, argument("NAME", "Name of an effect, as in `sysid effects list`.")]) -> Mapping[str, Any]:
+def show(name: str = argument("NAME", "Name of an effect, as in `sysid effects list`.")) -> Body:
     """Show one effect: equation, coefficients, telltale, what excites it, what it is mistaken for, source.
 
     Example: sysid effects show servo_lag
@@ -56,11 +56,11 @@ def show(name: Annotated[str, argument("NAME", "Name of an effect, as in `sysid 
 
 @command.command("new", short_help="Start an effect of your own.")
 def new(
-    name: Annotated[str, argument("NAME", "Name that yours shall have: a small letter, then letters, digits, _.")],
-    axis: Annotated[Axis, option("--axis", "", "The plane that it acts on.")] = Axis.YAW,
-    output: Annotated[Path | None, option("-o --output", "FILE", "YAML file to write; effects/NAME.yaml if not given.")] = None,
-    force: Force = False,
-) -> Mapping[str, Any]:
+    name: str = argument("NAME", "Name that yours shall have: a small letter, then letters, digits, _."),
+    axis: Axis = option("--axis", "The plane that it acts on.", default=Axis.YAW),
+    output: Path | None = option("-o --output FILE", "YAML file to write; effects/NAME.yaml if not given."),
+    force: bool = FORCE,
+) -> Body:
     """Write a file for an effect of your own, to be edited: a YAML file with a moment as an expression.
 
     Every command that is run in the folder that `effects/` is in knows it, and a model that holds it takes it along.

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING
 
-from fieldsid.cli.console import emit
+from fieldsid.artifacts import replacing
+from fieldsid.cli import options
+from fieldsid.cli.console import Body, emit
 from fieldsid.cli.headlines.missing import headline_of_extension, headline_of_undoing, left_in_words
-from fieldsid.cli.headlines.typed import pasted, repeated
+from fieldsid.cli.headlines.typed import pasted
 from fieldsid.cli.headlines.words import next_use
-from fieldsid.cli.options import Force, MappingFile, ModelFile, OutputFile, ValidateRuns, argument, flag, option
+from fieldsid.cli.inputs import files_of, mapping_behind, model_first, read_ready
 from fieldsid.cli.progress import compiling_first, refuse_existing, trying
 from fieldsid.cli.skipped_logs import Skips
 from fieldsid.cli.voice import angles
@@ -20,24 +22,25 @@ from fieldsid.comparison.sufficient import is_noise
 from fieldsid.display import page_of
 from fieldsid.errors import ArtifactError, UsageError
 from fieldsid.page import Page, paragraph, written
+from fieldsid.trial_folder.patterns import repeated
 
 if TYPE_CHECKING:
     from fieldsid.extension.extend import Extension
     from fieldsid.models.model import Model
-    from fieldsid.results.extensions import AddedCoefficient, Extended, LeftOver
+    from fieldsid.results.extensions import Extended, LeftOver
 
 
-def command(
-    model: ModelFile,
-    runs: Annotated[list[Path] | None, argument("RUN...", "The runs that the model and the effects are fitted to.")] = None,
-    add: Annotated[list[str] | None, option("--add", "EFFECT", "An effect to add: see `sysid effects list`; may repeat.")] = None,
-    validate: ValidateRuns = None,
-    keep: Annotated[bool, flag("--keep", "Keep the addition even where the error on unseen runs does not fall.")] = False,
-    undo: Annotated[bool, flag("--undo", "Go back: give the model that this one was extended from.")] = False,
-    mapping: MappingFile = None,
-    output: OutputFile = None,
-    force: Force = False,
-) -> Mapping[str, Any]:
+class Options(options.ToFile, options.Mapped, options.Judged, options.OneModel):
+    """What `sysid extend` takes."""
+
+    runs: options.Paths = options.argument("RUN...", "The runs that the model and the effects are fitted to.", None)
+    add: list[str] | None = options.option("--add EFFECT", "An effect to add: see `sysid effects list`; may repeat.")
+    keep: bool = options.flag("--keep", "Keep the addition even where the error on unseen runs does not fall.")
+    undo: bool = options.flag("--undo", "Go back: give the model that this one was extended from.")
+
+
+@options.takes(Options)
+def command(given: Options) -> Body:
     """Add an effect to a model, refit everything, and watch the error fall.
 
     Before and after are both refitted to the runs and judged by their free run on the `--validate` runs; without them a part of
@@ -47,26 +50,31 @@ def command(
 
     Example: sysid extend model.yaml runs/pulses_*.parquet --add servo_lag --validate runs/zigzag.parquet
     """
-    if undo:
-        if runs or add or validate or keep:
+    if given.undo:
+        if given.runs or given.add or given.validate or given.keep:
             raise UsageError(
-                "`--undo` takes the model alone", found="runs or other options with it", hint=f"sysid extend {model} --undo"
+                "`--undo` takes the model alone", found="runs or other options with it", hint=f"sysid extend {given.model} --undo"
             )
-        return _restore_parent(model, output, force=force)
-    from fieldsid.cli.inputs import files_of, mapping_behind, model_first, read_ready
-    from fieldsid.face.arguments import names_of
+        return _restore_parent(given.model, given.output, force=given.force)
     from fieldsid.models.model import load_model
 
-    path, runs = model_first(model, runs or [])
+    path, runs = model_first(given.model, given.runs or [])
     if not runs:
         raise UsageError(
             "there is no run to fit to", found=f"sysid extend {path}", hint=f"sysid extend {path} RUN... --add EFFECT"
         )
-    skips, validate = Skips(), validate or []
-    known, names = load_model(path), list(dict.fromkeys(n for given in add or [] for n in names_of(given)))
-    targets = step_files(path, names, output, force=force) if names else []
+    return _extend(given, path, load_model(path), runs)
+
+
+def _extend(given: Options, path: Path, known: Model, runs: Sequence[Path]) -> Body:
+    """Extend the model of a file, write the model of each step where it is kept, print that and return the JSON body."""
+    from fieldsid.face.arguments import names_of
+
+    skips, validate = Skips(), given.validate or []
+    names = list(dict.fromkeys(n for listed in given.add or [] for n in names_of(listed)))
+    targets = step_files(path, names, given.output, force=given.force) if names else []
     check, module = partial(_check_request, known, names), "fieldsid.extension.extend"
-    training, unseen = read_ready([runs, validate], skips, module, {path: known}, check=check, mapping=mapping)
+    training, unseen = read_ready([runs, validate], skips, module, {path: known}, check=check, mapping=given.mapping)
     from fieldsid.extension.extend import extend_in_steps, whole_of
     from fieldsid.extension.lineage import INTACT, Parent, kept_by, save_steps
     from fieldsid.records.named_inputs import sha256_of
@@ -76,29 +84,24 @@ def command(
         steps = extend_in_steps(known, names, training, unseen, report=report, unfit=skips.skip)
     found = whole_of(steps)
     training, unseen = skips.without_skipped(training), skips.without_skipped(unseen)
-    kept = found.pays or keep
+    kept = found.pays or given.keep
     if kept:
-        used = mapping or mapping_behind([path], files_of([*training, *unseen]))
-        save_steps(steps, targets, path, (training, unseen), mapping=used, force=force)
+        used = given.mapping or mapping_behind([path], files_of([*training, *unseen]))
+        save_steps(steps, targets, path, (training, unseen), mapping=used, force=given.force)
     now = targets[-1] if kept else path
     left, next_ = _remaining_error(found, now, known, runs, validate, kept=kept)
     result = Extended(
-        gain=found.gain,
-        axis=known.axis,
-        log_evidence=found.evidence,
-        pays=found.pays,
+        found=found,
         kept=kept,
         kept_by=kept_by(found) if kept else None,
         model=str(now),
         effects=found.model.effects if kept else known.effects,
         parent=Parent(path, sha256_of(path), INTACT),
-        coefficients=_coefficients(found),
-        notes=found.notes,
         left=left,
         next=next_,
         skipped_runs=tuple(skips.records),
     )
-    body = emit(result, render=_page(result, found), headline=headline_of_extension(result), notes=result.notes)
+    body = emit(result, render=_page(result), headline=headline_of_extension(result), notes=found.notes)
     return skips.end(body, len(runs) + len(validate) - len(skips.records))
 
 
@@ -137,27 +140,11 @@ def _remaining_error(
     return left, pasted("diagnose", runs, "--axis", parent.axis.value, "--model", str(model), *judged, *longer)
 
 
-def _coefficients(found: Extension) -> dict[str, AddedCoefficient]:
-    from fieldsid.dynamics.at_bound import at_bound
-    from fieldsid.effects import pick_effect
-    from fieldsid.models.effect import as_fitted
-    from fieldsid.results.extensions import AddedCoefficient
-
-    model = found.model
-    bound = at_bound(model)
-    return {
-        c.name: AddedCoefficient(model.values[c.name], model.std_error(c.name), c.unit, c.name in bound)
-        for n in found.gain.added
-        for c in as_fitted(pick_effect(n), model.values).shared
-    }
-
-
-def _restore_parent(path: Path, output: Path | None, *, force: bool) -> Mapping[str, Any]:
+def _restore_parent(path: Path, output: Path | None, *, force: bool) -> Body:
     """Give back the model that one was extended from, copied to the output where that is given; print and return the body.
 
     Raises UsageError for a model without a parent, ArtifactError where the parent is missing or, unless forced, has changed.
     """
-    from fieldsid.artifacts import replacing
     from fieldsid.extension.lineage import CHANGED, MISSING, history_of, parent_of
     from fieldsid.models.model import load_model
     from fieldsid.results.extensions import Undone
@@ -184,6 +171,6 @@ def _restore_parent(path: Path, output: Path | None, *, force: bool) -> Mapping[
     return emit(undone, render=page, headline=headline_of_undoing(undone))
 
 
-def _page(result: Extended, found: Extension) -> Page:
-    blocks = (*page_of(found, angles()).blocks, *paragraph([left_in_words(result.left)]))
+def _page(result: Extended) -> Page:
+    blocks = (*page_of(result.found, angles()).blocks, *paragraph([left_in_words(result.left)]))
     return Page("", blocks=blocks, closing=written(model=result.model))

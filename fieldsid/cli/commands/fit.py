@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any
+from pathlib import Path
 
-from fieldsid.cli.console import emit
-from fieldsid.cli.options import Figures, Force, ModelFiles, OutputFile, flag
+from fieldsid.cli import options
+from fieldsid.cli.console import Body, emit
 from fieldsid.cli.progress import refuse_existing
 from fieldsid.cli.session import draw_figure
 from fieldsid.page import Page, written
 from fieldsid.views.laws import blocks_of
 
 
-def command(
-    models: ModelFiles,
-    unweighted: Annotated[bool, flag("--unweighted", "Let every point count alike, standard errors or not.")] = False,
-    output: OutputFile = None,
-    figures: Figures = True,
-    force: Force = False,
-) -> Mapping[str, Any]:
+class Options(options.Models):
+    """What `sysid fit` takes."""
+
+    unweighted: bool = options.flag("--unweighted", "Let every point count alike, standard errors or not.")
+    output: Path | None = options.FILE
+    figures: bool = options.FIGURES
+    force: bool = options.FORCE
+
+
+@options.takes(Options)
+def command(given: Options) -> Body:
     """Fit the laws that carry a model from one speed to the next: authority against u^2, damping and trim against u.
 
     Takes model files of one axis, or one CSV table with speed_m_s and any of a22,b2,C0,c22,c23,d2,Cb (`<name>_std_error` where
@@ -35,13 +38,14 @@ def command(
     from fieldsid.plant.parameter_source import load_parameter_source
     from fieldsid.results.turning import FittedLaws
 
-    figure = output.with_suffix(".png") if output is not None and figures else None
+    output, force = given.output, given.force
+    figure = output.with_suffix(".png") if output is not None and given.figures else None
     refuse_existing(output, figure, force=force)
-    models = models_among(models)
+    models = models_among(given.models)
     source = load_parameter_source(models)
     if source.is_fit_file:
         raise UsageError("this is a fit file already", found=str(models[0]), hint="give models or a table")
-    laws = source.fitted(weighted=not unweighted)
+    laws = source.fitted(weighted=not given.unweighted)
     file = None
     if output is not None:
         inputs = [p for p in source.paths if p.is_file()]

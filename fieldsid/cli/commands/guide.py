@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING
 
-from fieldsid.cli.console import emit
+from fieldsid.cli.console import Body, emit
 from fieldsid.cli.options import argument
 
 if TYPE_CHECKING:
@@ -21,10 +20,8 @@ KEEPS_STYLES = "FRX"
 
 
 def command(
-    topic: Annotated[
-        str | None, argument("TOPIC", "A page, such as `trial` or `effects/servo_lag`; the contents if not given.")
-    ] = None,
-) -> Mapping[str, Any]:
+    topic: str | None = argument("TOPIC", "A page, such as `trial` or `effects/servo_lag`; the contents if not given.", None),
+) -> Body:
     """Show a page of the guide: on a terminal in a pager, else as text.
 
     The pages are Markdown files that are installed with the program, so that no network is needed. An effect, a command, the code

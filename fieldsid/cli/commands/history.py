@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from fieldsid.cli.console import emit, say
-from fieldsid.cli.options import FigureFile, Force, ModelFile
+from fieldsid.cli import options
+from fieldsid.cli.console import Body, emit, say
 from fieldsid.cli.progress import refuse_figure
 from fieldsid.cli.session import draw_figure
 from fieldsid.cli.voice import angles
@@ -29,7 +30,15 @@ KEPT = {
 }
 
 
-def command(model: ModelFile, figure: FigureFile = None, force: Force = False) -> Mapping[str, Any]:
+class Options(options.OneModel):
+    """What `sysid history` takes."""
+
+    figure: Path | None = options.FIGURE
+    force: bool = options.FORCE
+
+
+@options.takes(Options)
+def command(given: Options) -> Body:
     """Show how a model came about: its parents, the effects added, and how the error fell towards the noise floor.
 
     Every file's hash is checked against what its child and its data were when it was made.
@@ -38,6 +47,7 @@ def command(model: ModelFile, figure: FigureFile = None, force: Force = False) -
     """
     from fieldsid.cli.user_effects import read_model
 
+    model, figure, force = given.model, given.figure, given.force
     refuse_figure(figure, force=force)
     known = read_model(model)
     from fieldsid.extension.lineage import history_of

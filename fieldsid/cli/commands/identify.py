@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from fieldsid.cli import options
-from fieldsid.cli.console import emit, one_of_each_kind, progress
+from fieldsid.cli.console import Body, emit, one_of_each_kind, progress
 from fieldsid.cli.progress import compiling_first, refuse_closed
 from fieldsid.cli.session import draw_figures
 from fieldsid.cli.voice import angles
@@ -16,11 +17,14 @@ from fieldsid.display import line_of
 from fieldsid.figures.sketch import sketch
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import ShortNames, short_names
+from fieldsid.models.axis import Axis
 from fieldsid.page import Block, Page, Whole, paragraph, written
 from fieldsid.views._words import merit_blocks, parameter_block
 
 if TYPE_CHECKING:
+    from fieldsid.cli.skipped_logs import Skips
     from fieldsid.fitting.fit import Fit
+    from fieldsid.logs.run import Run
     from fieldsid.results.fits import FittedModel
 
 
@@ -28,25 +32,20 @@ MOST_DRAWN = 6
 """Number of runs of one model that are drawn, with two figures each: nobody looks through sixty."""
 
 
-def command(
-    runs: options.RunFiles,
-    axis: options.ExcitedAxis = None,
-    method: options.Method = "auto",
-    effects: options.EffectNames = None,
-    joint: Annotated[
-        bool, options.flag("--joint", "One model for all runs: damping and trim shared, authority by speed.")
-    ] = False,
-    whole: Annotated[bool, options.flag("--whole", "Use whole runs, not only the part that excites the axis.")] = False,
-    start: options.FromS = None,
-    end: options.ToS = None,
-    bandwidth: options.Bandwidth = 4.0,
-    forgetting: options.Forgetting = 1.0,
-    mapping: options.MappingFile = None,
-    vehicle: options.VehicleFile = None,
-    output: options.OutputDir = None,
-    figures: options.Figures = True,
-    force: options.Force = False,
-) -> Mapping[str, Any]:
+class Options(options.ToFolder, options.OfVehicle, options.Part, options.Runs):
+    """What `sysid identify` takes."""
+
+    axis: Axis | None = options.EXCITED_AXIS
+    method: str = options.METHOD
+    effects: str | None = options.option("--effects A,B", "Effects in the model: see `sysid effects list`.")
+    joint: bool = options.flag("--joint", "One model for all runs: damping and trim shared, authority by speed.")
+    whole: bool = options.flag("--whole", "Use whole runs, not only the part that excites the axis.")
+    bandwidth: float = options.BANDWIDTH
+    forgetting: float = options.FORGETTING
+
+
+@options.takes(Options)
+def command(given: Options) -> Body:
     """Identify the yaw or pitch model of each run, or one model of all of them.
 
     With `-o` each model is written to DIR/RUN_AXIS.yaml, with figures, of many runs those of the ones it follows least. `auto` is
@@ -58,55 +57,48 @@ def command(
     from fieldsid.cli.inputs import AXIS_OPTION, files_of, read_ready
     from fieldsid.cli.skipped_logs import Skips
 
-    refuse_closed(output)
+    refuse_closed(given.output)
     skips = Skips()
-    (known,) = read_ready([runs], skips, "fieldsid.fitting.identify", {}, mapping=mapping, start=start, end=end)
-    from fieldsid.face.arguments import axis_excited, names_of, vehicle_of
-    from fieldsid.fitting.identify import check_joint, identify
-    from fieldsid.fitting.problem.estimator import Options
+    (known,) = read_ready([given.runs], skips, "fieldsid.fitting.identify", {}, **given.reading)
+    from fieldsid.face.arguments import axis_excited
     from fieldsid.results.fits import Identified, fitted_model
 
-    axis = axis or axis_excited(known, AXIS_OPTION)
-    if joint:
-        check_joint([run.name for run in known], len(runs))
-    with compiling_first(), progress("fitting", 1 if joint else len(known)) as step:
-        fits = identify(
-            known,
-            axis,
-            method=method,
-            effects=names_of(effects),
-            joint=joint,
-            vehicle=vehicle_of(vehicle),
-            whole=whole or start is not None or end is not None,
-            options=Options(bandwidth, forgetting),
-            done=step,
-            unfit=skips.skip,
-        )
+    axis = given.axis or axis_excited(known, AXIS_OPTION)
+    fits = _fits(given, known, axis, skips)
     used = skips.without_skipped(known)
-    groups = [used] if joint else [[run] for run in used]
+    groups = [used] if given.joint else [[run] for run in used]
     files = [files_of(group) for group in groups]
-    models = _save_models(fits, files, mapping, output, force=force)
-    draw_figures(output if figures else None, {k: v for fit in fits for k, v in _plots(fit).items()}, force=force)
+    models = _save_models(fits, files, given)
+    plots = {k: v for fit in fits for k, v in _plots(fit).items()}
+    draw_figures(given.output if given.figures else None, plots, force=given.force)
     entries = tuple(fitted_model(fit, model, of) for fit, model, of in zip(fits, models, groups, strict=True))
     result = Identified(axis=axis, fits=entries, skipped_runs=tuple(skips.records))
     from fieldsid.cli.headlines.models import headline_of_identify
 
-    page, headline = _page(fits, entries, figures=figures), headline_of_identify(result, files)
+    page, headline = _page(fits, entries, figures=given.figures), headline_of_identify(result, files)
     return skips.end(emit(result, render=page, headline=headline, notes=_warnings(entries)), len(used))
 
 
-def _save_models(
-    fits: Sequence[Fit], sources: Sequence[list[Path]], mapping: Path | None, folder: Path | None, *, force: bool
-) -> Sequence[Path | None]:
+def _fits(given: Options, known: Sequence[Run], axis: Axis, skips: Skips) -> Sequence[Fit]:
+    """Return the fit to each run, or to all of them; a run that cannot be fitted is skipped."""
+    from fieldsid.face.fits import identify
+    from fieldsid.fitting.identify import check_joint
+
+    if given.joint:
+        check_joint([run.name for run in known], len(given.runs))
+    with compiling_first(), progress("fitting", 1 if given.joint else len(known)) as step:
+        how = {"runs": known, "axis": axis, "mapping": None, "done": step, "unfit": skips.skip}
+        return identify(**options.arguments_of(identify, given, **how))
+
+
+def _save_models(fits: Sequence[Fit], sources: Sequence[list[Path]], given: Options) -> Sequence[Path | None]:
     """Write the model of each fit to the folder and return the files; None for each where there is no folder."""
-    if folder is None:
+    if (folder := given.output) is None:
         return [None] * len(fits)
     from fieldsid.models.model import save_model
 
-    pairs = zip(fits, sources, strict=True)
-    return [
-        save_model(fit.model, folder / f"{_stem(fit)}.yaml", inputs=inputs, mapping=mapping, force=force) for fit, inputs in pairs
-    ]
+    save = partial(save_model, mapping=given.mapping, force=given.force)
+    return [save(fit.model, folder / f"{_stem(fit)}.yaml", inputs=logs) for fit, logs in zip(fits, sources, strict=True)]
 
 
 def _plots(fit: Fit) -> dict[str, Callable[[], Any]]:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated
 
 from fieldsid.cli.options import argument, option
 
 
 def command(
-    name: Annotated[str, argument("NAME", "Name of the trial, and of the folder to make.")],
-    template: Annotated[str, option("--template", "KIND", "Kind of vehicle: torpedo or surface.")] = "torpedo",
+    name: str = argument("NAME", "Name of the trial, and of the folder to make."),
+    template: str = option("--template KIND", "Kind of vehicle: torpedo or surface.", default="torpedo"),
 ) -> None:
     """Make a trial folder with a vehicle.yaml, a mapping.yaml and notes to fill in; nothing is ever replaced.
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from fieldsid.cli.options import Force, Join, LogAndTables, MappingFile, MsgPath, option
+from fieldsid.cli import options
+from fieldsid.cli.console import emit, tracked
 from fieldsid.page import Block, Page, Whole, paragraph
 
 if TYPE_CHECKING:
@@ -13,32 +14,36 @@ if TYPE_CHECKING:
     from fieldsid.results.logs import Inspected
 
 
-def command(
-    logs: LogAndTables,
-    join: Join = False,
-    mapping: MappingFile = None,
-    msg_path: MsgPath = None,
-    write_mapping: Annotated[
-        Path | None, option("--write-mapping", "FILE", "Write the mapping, for `sysid import --mapping`.")
-    ] = None,
-    force: Force = False,
-) -> None:
+class Options(options.Options):
+    """What `sysid inspect` takes."""
+
+    logs: list[Path] = options.argument(
+        "LOG", "A log: CSV, Parquet, ROS 1 or ROS 2 bag, a folder of the tables of one run; with `--join` its tables."
+    )
+    join: bool = options.JOIN
+    mapping: Path | None = options.MAPPING
+    msg_path: Path | None = options.MSG_PATH
+    write_mapping: Path | None = options.option("--write-mapping FILE", "Write the mapping, for `sysid import --mapping`.")
+    force: bool = options.FORCE
+
+
+@options.takes(Options)
+def command(given: Options) -> None:
     """Say what is in a log, which mapping it may need, and what would spoil an identification.
 
     Example: sysid inspect run7.mcap --write-mapping mapping.yaml
     """
-    from fieldsid.cli.console import emit, tracked
     from fieldsid.cli.headlines.logs import headline_of_inspection
     from fieldsid.cli.inputs import one_run
     from fieldsid.logs.inspection import inspect_log, write_proposal
     from fieldsid.results.logs import inspected
 
-    log, *joined = one_run("inspect", logs, join=join)
+    log, *joined = one_run("inspect", given.logs, join=given.join)
     for path, on_share in tracked([log], "reading"):
-        found = inspect_log(path, mapping=mapping, msg_path=msg_path, joined=joined, progress=on_share)
-    written = write_proposal(found, write_mapping, force=force) if write_mapping is not None else None
+        found = inspect_log(path, mapping=given.mapping, msg_path=given.msg_path, joined=joined, progress=on_share)
+    written = None if given.write_mapping is None else write_proposal(found, given.write_mapping, force=given.force)
     result = inspected(found, written)
-    headline = headline_of_inspection(result, mapping)
+    headline = headline_of_inspection(result, given.mapping)
     emit(result, render=_page(found, result), headline=headline)
 
 

@@ -9,16 +9,15 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from fieldsid.cli.console import emit, out, say
-from fieldsid.cli.exit_codes import GATE_FAILED
+from fieldsid.cli import options
+from fieldsid.cli.console import Body, emit, gated, out, say
 from fieldsid.cli.live.feed import Feed
-from fieldsid.cli.options import AxisOption, Bandwidth, Forgetting, MappingFile, VehicleFile, argument, flag, option
+from fieldsid.cli.options import argument, flag, option
 from fieldsid.cli.voice import voice
 from fieldsid.errors import UsageError
+from fieldsid.models.axis import Axis
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -34,35 +33,34 @@ SOURCE, GOAL, SECOND_PROCESS = "Where the samples come from", "What is to be rea
 SAVE_EVERY_S = 1.0
 
 
-def command(
-    axis: AxisOption,
-    log: Annotated[Path | None, argument("LOG", "A log to replay or follow; `-` reads JSON lines from standard input.")] = None,
-    speed: Annotated[
-        float, option("--speed", "FACTOR", "How many times as fast as logged to replay; 0 does not wait.", SOURCE, min=0.0)
-    ] = 1.0,
-    follow: Annotated[bool, flag("--follow -f", "Go on as the log grows: CSV, MCAP, a bag's folder.", SOURCE)] = False,
-    udp: Annotated[
-        int | None, option("--udp", "PORT", "Take JSON lines as UDP on this machine.", SOURCE, min=1, max=65535)
-    ] = None,
-    idle: Annotated[float | None, option("--idle", "S", "End when nothing has come for so long.", SOURCE, min=0.1)] = None,
-    plan: Annotated[Path | None, option("--plan", "YAML", "The accuracy to reach is what this plan promised.", GOAL)] = None,
-    want: Annotated[str | None, option("--want", "A=5%,...", "The accuracy to reach; 5 % of each but the trim.", GOAL)] = None,
-    state: Annotated[Path | None, option("--state", "FILE", "Go on from this file, if there; saved every second.")] = None,
-    every: Annotated[float, option("--every", "S", "Seconds of the log between two looks.", min=0.1)] = 1.0,
-    until_enough: Annotated[
-        bool, flag("--until-enough", "End at enough data; exit code 1 where that is not reached.", GOAL)
-    ] = False,
-    gains: Annotated[bool, flag("--gains", "Design gains for the speed that is flown, once settled.", SECOND_PROCESS)] = False,
-    schedule: Annotated[
-        Path | None, option("--schedule", "YAML", "The gains loaded, and what they were designed for.", SECOND_PROCESS)
-    ] = None,
-    depth: Annotated[bool, flag("--depth", "With the depth loop above pitch.", SECOND_PROCESS)] = False,
-    diagnose: Annotated[bool, flag("--diagnose", "Diagnose what was flown whenever a maneuver ends.", SECOND_PROCESS)] = False,
-    vehicle: VehicleFile = None,
-    bandwidth: Bandwidth = 4.0,
-    forgetting: Forgetting = 1.0,
-    mapping: MappingFile = None,
-) -> Mapping[str, Any]:
+class Options(options.Options):
+    """What `sysid live` takes."""
+
+    axis: Axis = options.AXIS
+    log: Path | None = argument("LOG", "A log to replay or follow; `-` reads JSON lines from standard input.", None)
+    speed: float = option(
+        "--speed FACTOR", "How many times as fast as logged to replay; 0 does not wait.", SOURCE, default=1.0, min=0.0
+    )
+    follow: bool = flag("--follow -f", "Go on as the log grows: CSV, MCAP, a bag's folder.", SOURCE)
+    udp: int | None = option("--udp PORT", "Take JSON lines as UDP on this machine.", SOURCE, min=1, max=65535)
+    idle: float | None = option("--idle S", "End when nothing has come for so long.", SOURCE, min=0.1)
+    plan: Path | None = option("--plan YAML", "The accuracy to reach is what this plan promised.", GOAL)
+    want: str | None = option("--want A=5%,...", "The accuracy to reach; 5 % of each but the trim.", GOAL)
+    state: Path | None = option("--state FILE", "Go on from this file, if there; saved every second.")
+    every: float = option("--every S", "Seconds of the log between two looks.", default=1.0, min=0.1)
+    until_enough: bool = flag("--until-enough", "End at enough data; exit code 1 where that is not reached.", GOAL)
+    gains: bool = flag("--gains", "Design gains for the speed that is flown, once settled.", SECOND_PROCESS)
+    schedule: Path | None = option("--schedule YAML", "The gains loaded, and what they were designed for.", SECOND_PROCESS)
+    depth: bool = flag("--depth", "With the depth loop above pitch.", SECOND_PROCESS)
+    diagnose: bool = flag("--diagnose", "Diagnose what was flown whenever a maneuver ends.", SECOND_PROCESS)
+    vehicle: Path | None = options.VEHICLE
+    bandwidth: float = options.BANDWIDTH
+    forgetting: float = options.FORGETTING
+    mapping: Path | None = options.MAPPING
+
+
+@options.takes(Options)
+def command(given: Options) -> Body:
     """Identify while the vehicle flies, sample by sample, and say when there is enough data.
 
     Replays a log, follows one that grows, or takes JSON lines: `{"time_s": 1.25, "rudder_deg": 5, "yaw_deg": 91}`.
@@ -73,21 +71,22 @@ def command(
 
     Example: sysid live run7.csv --axis yaw --speed 10 --plan plan.yaml
     """
-    _check_source(log, udp, follow=follow)
-    feed = Feed(axis, log, speed if speed > 0.0 else inf, follow, udp, inf if idle is None else idle, mapping)
-    goals, goals_from = _goals(axis, plan, want)
-    analysis = _analysis(feed, (schedule, vehicle, depth) if gains or schedule else None, diagnose=diagnose)
+    _check_source(given)
+    goals, goals_from = _goals(given)
     from fieldsid.online.progress import Watch
 
+    factor, idle_s = given.speed if given.speed > 0.0 else inf, inf if given.idle is None else given.idle
+    feed = Feed(given.axis, given.log, factor, given.follow, given.udp, idle_s, given.mapping)
+    analysis = _analysis(feed, given)
     watch = Watch(goals(float("nan")))
-    identifier, known_until = _identifier(feed, state, watch, bandwidth, forgetting)
-    live = _Live(feed, identifier, watch, goals, goals_from, state, analysis)
-    body: Mapping[str, Any] = {}
+    identifier, known_until = _identifier(feed, watch, given)
+    live = _Live(feed, identifier, watch, goals, goals_from, given.state, analysis)
+    body: Body = {}
     with _display() as show:
         try:
-            for body in live.looks(every, known_until):
+            for body in live.looks(given.every, known_until):
                 show(body)
-                if until_enough and body["verdict"] == "enough":
+                if given.until_enough and body["verdict"] == "enough":
                     break
         except KeyboardInterrupt:
             if not body:
@@ -98,29 +97,27 @@ def command(
             live.save()
     if not voice().is_json:
         _end(body)
-    if until_enough and body["verdict"] != "enough":
-        raise typer.Exit(GATE_FAILED)
-    return body
+    return gated(body, failed=given.until_enough and body["verdict"] != "enough")
 
 
-def _check_source(log: Path | None, udp: int | None, *, follow: bool) -> None:
-    if (log is None) == (udp is None):
+def _check_source(given: Options) -> None:
+    if (given.log is None) == (given.udp is None):
         raise UsageError(
             "give either a log or `--udp PORT`",
-            found="both" if log is not None else "neither",
+            found="both" if given.log is not None else "neither",
             hint="`sysid live run7.csv --axis yaw`, or `sysid live - --axis yaw` for lines on standard input",
         )
-    if follow and (log is None or str(log) == "-"):
-        raise UsageError(
-            "`--follow` needs a log", found="`--udp`" if log is None else "`-`", hint="name the log, or leave it out"
-        )
+    if given.follow and (given.log is None or str(given.log) == "-"):
+        found = "`--udp`" if given.log is None else "`-`"
+        raise UsageError("`--follow` needs a log", found=found, hint="name the log, or leave it out")
 
 
-def _goals(axis: AxisOption, plan: Path | None, want: str | None) -> tuple[Callable[[float], Mapping[str, Goal]], str]:
+def _goals(given: Options) -> tuple[Callable[[float], Mapping[str, Goal]], str]:
     """Return the goals at a speed in m/s, and where they are from."""
     from fieldsid.online.goals import planned_goals, requested_goals
     from fieldsid.online.progress import DEFAULT_ACCURACY, default_goals
 
+    axis, plan, want = given.axis, given.plan, given.want
     if plan is not None and want is not None:
         raise UsageError("`--plan` and `--want` both say what is to be reached", found=want, hint="leave one of them out")
     if plan is not None:
@@ -135,24 +132,20 @@ def _goals(axis: AxisOption, plan: Path | None, want: str | None) -> tuple[Calla
     return (lambda _speed: default_goals(axis)), f"{100.0 * DEFAULT_ACCURACY:.0f} % of each value"
 
 
-def _analysis(feed: Feed, gains: tuple[Path | None, Path | None, bool] | None, *, diagnose: bool) -> BackgroundAnalysis | None:
-    """Return what designs gains and diagnoses in other processes; None where neither is asked for.
-
-    gains: the schedule, the vehicle, and whether to design the depth loop; None for no gains.
-    """
-    if gains is None and not diagnose:
+def _analysis(feed: Feed, given: Options) -> BackgroundAnalysis | None:
+    """Return what designs gains and diagnoses in other processes; None where neither is asked for."""
+    designs = given.gains or given.schedule is not None
+    if not designs and not given.diagnose:
         return None
     from fieldsid.cli.live.background_analysis import BackgroundAnalysis, wanted_at
 
     feed.keeps = True
     waits = feed.is_log and not feed.follow and not isfinite(feed.factor)
-    wanted = None if gains is None else wanted_at(feed.axis, *gains)
-    return BackgroundAnalysis(feed.axis, feed.flown, wanted, diagnoses=diagnose, waits=waits)
+    wanted = wanted_at(feed.axis, given.schedule, given.vehicle, given.depth) if designs else None
+    return BackgroundAnalysis(feed.axis, feed.flown, wanted, diagnoses=given.diagnose, waits=waits)
 
 
-def _identifier(
-    feed: Feed, state: Path | None, watch: Watch, bandwidth: float, forgetting: float
-) -> tuple[OnlineIdentifier, float]:
+def _identifier(feed: Feed, watch: Watch, given: Options) -> tuple[OnlineIdentifier, float]:
     """Return the identifier, from its state file where there is one, and the time (s) up to which it has used the source.
 
     The time is -inf where it has used nothing of this source.
@@ -160,8 +153,9 @@ def _identifier(
     from fieldsid.online.identifier import OnlineIdentifier
     from fieldsid.online.state_file import load_state
 
+    state = given.state
     if state is None or not state.exists():
-        return OnlineIdentifier(feed.axis, bandwidth=bandwidth, forgetting=forgetting), -inf
+        return OnlineIdentifier(feed.axis, bandwidth=given.bandwidth, forgetting=given.forgetting), -inf
     identifier, source = load_state(state, feed.axis, watch)
     say(f"going on from `{state}`: {identifier.estimate().used} samples up to {identifier.time:.1f} s of `{source}`")
     if feed.is_log and source == feed.name and isfinite(identifier.time):
@@ -184,7 +178,7 @@ class _Live:
     state: Path | None
     analysis: BackgroundAnalysis | None
 
-    def looks(self, every: float, after: float) -> Iterator[Mapping[str, Any]]:
+    def looks(self, every: float, after: float) -> Iterator[Body]:
         """Yield a look after every so many seconds of the log and one at its end; save the state every SAVE_EVERY_S seconds.
 
         after: the time in s up to which samples are passed over.
@@ -209,7 +203,7 @@ class _Live:
         if fresh or self.feed.unreadable > unreadable or self.analysis is not None:
             yield self.look(ended=True)
 
-    def look(self, *, ended: bool = False) -> Mapping[str, Any]:
+    def look(self, *, ended: bool = False) -> Body:
         """Return the JSON body of the estimate as it is now; ended: the source has ended."""
         from fieldsid.online.look import look_body
 
@@ -232,14 +226,14 @@ class _Live:
 
 
 @contextmanager
-def _display() -> Iterator[Callable[[Mapping[str, Any]], None]]:
+def _display() -> Iterator[Callable[[Body], None]]:
     """Yield a function that shows a look: a line of JSON, a screen on a terminal, else a line of text; nothing with `--quiet`."""
     from fieldsid.cli.live.screen import event_lines, line, screen
 
     if voice().is_json:
         import json
 
-        def print_json(body: Mapping[str, Any]) -> None:
+        def print_json(body: Body) -> None:
             sys.stdout.write(json.dumps(body, allow_nan=False) + "\n")
             sys.stdout.flush()
 
@@ -252,7 +246,7 @@ def _display() -> Iterator[Callable[[Mapping[str, Any]], None]]:
     if not console.is_terminal:
         printed: list[str] = []
 
-        def print_line(body: Mapping[str, Any]) -> None:
+        def print_line(body: Body) -> None:
             console.print(line(body), soft_wrap=True)
             for text in event_lines(body):
                 if text not in printed:
@@ -267,7 +261,7 @@ def _display() -> Iterator[Callable[[Mapping[str, Any]], None]]:
         yield lambda body: live.update(screen(body), refresh=True)
 
 
-def _end(body: Mapping[str, Any]) -> None:
+def _end(body: Body) -> None:
     from fieldsid.cli.live.screen import Parameters, event_lines, headline_of
 
     def render(to: Console) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from fieldsid.cli.console import emit, progress, say
-from fieldsid.cli.options import LIMITS, WRITTEN, Figures, Force, OutputDir, Text, VehicleFile, flag, option
+from fieldsid.cli import options
+from fieldsid.cli.console import Body, emit, progress, say
+from fieldsid.cli.options import LIMITS, WRITTEN, Text, arguments_of, flag, option
 from fieldsid.cli.progress import compiling, refuse_closed, refuse_existing
 from fieldsid.cli.session import draw_figure
 from fieldsid.cli.voice import angles
@@ -21,62 +22,47 @@ if TYPE_CHECKING:
     from fieldsid.models.model import Noise
     from fieldsid.planning.design.leg import Expected
     from fieldsid.planning.design.plan import Plan
+    from fieldsid.planning.request import Made
 
 GOAL, FLOWN, KNOWN = "What to learn", "How it is flown", "What is known before"
 """Groups of the options that only this command has, on its page of help."""
 
 
-def command(
-    axis: Annotated[Axis | None, option("--axis", "AXIS", "The plane to plan for; yaw, or that of a diagnosis.", GOAL)] = None,
-    speeds: Annotated[
-        Text, option("--speeds", "M_S,..", "`1.0,1.4,1.8` or `1.0:1.8:0.4`; the prior's own if not given.", GOAL)
-    ] = None,
-    vehicle: VehicleFile = None,
-    model: Annotated[Path | None, option("--model", "YAML", "What is known before: a model or a prior file.", KNOWN)] = None,
-    prior: Annotated[Text, option("--prior", "NAME", "A prior that is shipped, torpedo where no model is given.", KNOWN)] = None,
-    want: Annotated[
-        Text, option("--want", "a22=5%,..", "Standard errors to reach, in shares of the value; the trim's of full fin.", GOAL)
-    ] = None,
-    minutes: Annotated[float | None, option("--minutes", "MIN", "Time there is for all legs, turns included.", LIMITS)] = None,
-    area: Annotated[Text, option("--area", "LxW", "Length along the leg and width across it, m.", LIMITS)] = None,
-    depth_band: Annotated[
-        Text, option("--depth-band", "M:M", "Shallowest and deepest, m; entered at the middle.", LIMITS)
-    ] = None,
-    max_heading: Annotated[
-        Text, option("--max-heading", "ANGLE", "Largest deviation of heading; 60deg in yaw, or `none`.", LIMITS)
-    ] = None,
-    max_track: Annotated[float | None, option("--max-track", "M", "Largest distance from the leg's line.", LIMITS)] = None,
-    max_pitch: Annotated[Text, option("--max-pitch", "ANGLE", "Largest pitch; 30deg in pitch, or `none`.", LIMITS)] = None,
-    max_roll: Annotated[Text, option("--max-roll", "ANGLE", "Largest roll, `20deg`.", LIMITS)] = None,
-    fin_max: Annotated[
-        Text, option("--fin-max", "ANGLE", "Fin limit; the vehicle's own if not given, else 0.26 rad.", LIMITS)
-    ] = None,
-    fin_rate: Annotated[
-        Text, option("--fin-rate", "ANGLE", "Fin rate limit per second; the vehicle's own if not given.", LIMITS)
-    ] = None,
-    risk: Annotated[float, option("--risk", "SHARE", "Accepted probability of leaving the envelope.", LIMITS)] = 0.05,
-    window: Annotated[
-        float | None, option("--window", "S", "Length of the part that is identified on; 33, to separate 60.", FLOWN)
-    ] = None,
-    run_up: Annotated[float, option("--run-up", "S", "Straight run before it.", FLOWN)] = 10.0,
-    rate: Annotated[float, option("--rate", "HZ", "The vehicle's command rate, and its log's.", FLOWN)] = 20.0,
-    radius: Annotated[bool, flag("--radius", "Add full-fin circles, so that the turn radius is measured.", GOAL)] = False,
-    open_loop: Annotated[
-        bool, flag("--open-loop", "Leave out maneuvers that follow the motion, such as the zig-zag.", FLOWN)
-    ] = False,
-    separate: Annotated[
-        Text, option("--separate", "A,B", "What tells these effects apart; `none` is the plain model.", GOAL)
-    ] = None,
-    diagnosis: Annotated[Path | None, option("--from", "YAML", "A diagnosis: tell its rivals apart.", GOAL)] = None,
-    course: Annotated[
-        Text, option("--course", "ANGLE", "Compass course of the legs, `90deg`: a MOOS helm then watches headings.", FLOWN)
-    ] = None,
-    write: Annotated[Text, option("--write", "csv,..", "Some of csv, ros2, moos, dune, ardupilot; else all.", WRITTEN)] = None,
-    seed: Annotated[int, option("--seed", "N", "Seed of the search and of the draws.", FLOWN)] = 1,
-    output: OutputDir = None,
-    figures: Figures = True,
-    force: Force = False,
-) -> Mapping[str, Any]:
+class Options(options.OfVehicle):
+    """What `sysid plan` takes; the limits are named as in `EnvelopeLimits`, most others as in `PlanRequest`."""
+
+    axis: Axis | None = option("--axis AXIS", "The plane to plan for; yaw, or that of a diagnosis.", GOAL)
+    speeds: Text = option("--speeds M_S,..", "`1.0,1.4,1.8` or `1.0:1.8:0.4`; the prior's own if not given.", GOAL)
+    model: Path | None = option("--model YAML", "What is known before: a model or a prior file.", KNOWN)
+    prior: Text = option("--prior NAME", "A prior that is shipped, torpedo where no model is given.", KNOWN)
+    want: Text = option("--want a22=5%,..", "Standard errors to reach, in shares of the value; the trim's of full fin.", GOAL)
+    minutes: float | None = option("--minutes MIN", "Time there is for all legs, turns included.", LIMITS)
+    area: Text = option("--area LxW", "Length along the leg and width across it, m.", LIMITS)
+    depth_band: Text = option("--depth-band M:M", "Shallowest and deepest, m; entered at the middle.", LIMITS)
+    heading: Text = option("--max-heading ANGLE", "Largest deviation of heading; 60deg in yaw, or `none`.", LIMITS)
+    track: float | None = option("--max-track M", "Largest distance from the leg's line.", LIMITS)
+    pitch: Text = option("--max-pitch ANGLE", "Largest pitch; 30deg in pitch, or `none`.", LIMITS)
+    roll: Text = option("--max-roll ANGLE", "Largest roll, `20deg`.", LIMITS)
+    fin: Text = option("--fin-max ANGLE", "Fin limit; the vehicle's own if not given, else 0.26 rad.", LIMITS)
+    fin_rate: Text = option("--fin-rate ANGLE", "Fin rate limit per second; the vehicle's own if not given.", LIMITS)
+    share: float = option("--risk SHARE", "Accepted probability of leaving the envelope.", LIMITS, default=0.05)
+    window: float | None = option("--window S", "Length of the part that is identified on; 33, to separate 60.", FLOWN)
+    run_up: float = option("--run-up S", "Straight run before it.", FLOWN, default=10.0)
+    rate: float = option("--rate HZ", "The vehicle's command rate, and its log's.", FLOWN, default=20.0)
+    radius: bool = flag("--radius", "Add full-fin circles, so that the turn radius is measured.", GOAL)
+    open_loop: bool = flag("--open-loop", "Leave out maneuvers that follow the motion, such as the zig-zag.", FLOWN)
+    separate: Text = option("--separate A,B", "What tells these effects apart; `none` is the plain model.", GOAL)
+    diagnosis: Path | None = option("--from YAML", "A diagnosis: tell its rivals apart.", GOAL)
+    course: Text = option("--course ANGLE", "Compass course of the legs, `90deg`: a MOOS helm then watches headings.", FLOWN)
+    write: Text = option("--write csv,..", "Some of csv, ros2, moos, dune, ardupilot; else all.", WRITTEN)
+    seed: int = option("--seed N", "Seed of the search and of the draws.", FLOWN, default=1)
+    output: Path | None = options.FOLDER
+    figures: bool = options.FIGURES
+    force: bool = options.FORCE
+
+
+@options.takes(Options)
+def command(given: Options) -> Body:
     """Plan maneuvers: the fin commands that buy the accuracy you want inside your limits, in the fewest minutes.
 
     The best of the catalogue and of optimised switching signals is flown by hundreds of draws of the prior;
@@ -86,53 +72,60 @@ def command(
 
     Example: sysid plan --axis yaw --speeds 1.0,1.4,1.8 --want a22=5%,b2=3% --area 200x60 -o plan
     """
+    from fieldsid.cli.headlines.trial import headline_of_plan
     from fieldsid.cli.user_effects import check_effects
-    from fieldsid.face.arguments import names_of
-    from fieldsid.planning.jit_warmup import SHARED_KERNELS, compile_planning
-    from fieldsid.planning.request import EnvelopeLimits, PlanRequest, planned
     from fieldsid.results.plans import Planned
 
-    _check_write(write, output)
-    refuse_closed(output)
-    refuse_existing(output / "plan.yaml" if output is not None else None, force=force)
-    limiting = EnvelopeLimits(area, depth_band, max_heading, max_track, max_pitch, max_roll, fin_max, fin_rate, risk)
-    request = PlanRequest(
-        axis, speeds, vehicle, model, prior, want, minutes, limiting, window, run_up, rate, radius,
-        tuple(filter(None, map(str.strip, (separate or "").split(",")))), diagnosis, seed, open_loop, course,
-    )  # fmt: skip
+    made = _planned(given)
+    if given.model is not None:
+        check_effects([(given.model, made.model)])
+    files = () if given.output is None else tuple(map(str, _save(made, given, given.output)))
+    separation: dict[str, Any] = {}
+    if made.found:
+        best = max(made.found, key=lambda s: s.expected_log_odds)
+        separation = {"separation": best, "separations": made.found, "says": tuple(line for s in made.found for line in s.says())}
+    result = Planned(made.plan, files, **separation)
+    page = _page(made.plan, made.model.noise, separation.get("says", ()))
+    return emit(result, render=page, headline=headline_of_plan(result, given.model))
+
+
+def _planned(given: Options) -> Made:
+    """Return the plan that is asked for; a place or a format that cannot be written is refused before the search."""
+    from fieldsid.planning.jit_warmup import SHARED_KERNELS, compile_planning
+    from fieldsid.planning.request import EnvelopeLimits, PlanRequest, planned
+
+    _check_write(given.write, given.output)
+    refuse_closed(given.output)
+    refuse_existing(given.output / "plan.yaml" if given.output is not None else None, force=given.force)
+    limiting = EnvelopeLimits(**arguments_of(EnvelopeLimits, given))
+    separate = tuple(filter(None, map(str.strip, (given.separate or "").split(","))))
+    request = PlanRequest(**arguments_of(PlanRequest, given, limiting=limiting, separate=separate))
     with compiling() as warmup, progress("planning", request.legs) as step:
 
         def compile_kernels() -> None:
             compile_planning()
             warmup.compile_now(SHARED_KERNELS)
 
-        made = planned(request, step, compile_kernels)
-    if model is not None:
-        check_effects([(model, made.model)])
-    files: list[Path] = []
-    if output is not None:
-        from fieldsid.planning.output.command_files import unwritten, write_all
-        from fieldsid.planning.output.figure_data import figure_data
-        from fieldsid.planning.output.plan_file import save_plan
+        return planned(request, step, compile_kernels)
 
-        inputs = [p for p in (model, vehicle, diagnosis) if p is not None]
-        files = [save_plan(made.plan, output / "plan.yaml", inputs=inputs, force=force)]
-        files += write_all(made.plan, output, names_of(write), force=force)
-        for line in unwritten(made.plan):
-            say(line)
-        if figures:
-            files.append(output / "plan.png")
-            views = [figure_data(made.plan, leg, made.model) for leg in made.plan.legs]
-            draw_figure(files[-1], sketch("plan", views), force=force)
-    separation: dict[str, Any] = {}
-    if made.found:
-        best = max(made.found, key=lambda s: s.expected_log_odds)
-        separation = {"separation": best, "separations": made.found, "says": tuple(line for s in made.found for line in s.says())}
-    result = Planned(made.plan, tuple(map(str, files)), **separation)
-    from fieldsid.cli.headlines.trial import headline_of_plan
 
-    page = _page(made.plan, made.model.noise, separation.get("says", ()))
-    return emit(result, render=page, headline=headline_of_plan(result, model))
+def _save(made: Made, given: Options, folder: Path) -> list[Path]:
+    """Write the plan, its commands and its figure, name what is not written, and return the files."""
+    from fieldsid.face.arguments import names_of
+    from fieldsid.planning.output.command_files import unwritten, write_all
+    from fieldsid.planning.output.figure_data import figure_data
+    from fieldsid.planning.output.plan_file import save_plan
+
+    plan, force = made.plan, given.force
+    inputs = [p for p in (given.model, given.vehicle, given.diagnosis) if p is not None]
+    files = [save_plan(plan, folder / "plan.yaml", inputs=inputs, force=force)]
+    files += write_all(plan, folder, names_of(given.write), force=force)
+    for line in unwritten(plan):
+        say(line)
+    if given.figures:
+        files.append(folder / "plan.png")
+        draw_figure(files[-1], sketch("plan", [figure_data(plan, leg, made.model) for leg in plan.legs]), force=force)
+    return files
 
 
 def _check_write(write: str | None, output: Path | None) -> None:

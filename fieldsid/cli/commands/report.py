@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING
 
-from fieldsid.cli.console import emit
-from fieldsid.cli.options import Force, argument, option
+from fieldsid.cli import options
+from fieldsid.cli.console import Body, emit
 from fieldsid.cli.progress import get_ready
 from fieldsid.logs.run import Note
 from fieldsid.page import Page
@@ -17,15 +17,20 @@ if TYPE_CHECKING:
     from fieldsid.trial_folder.state import FolderState
 
 
-def command(
-    files: Annotated[
-        list[Path] | None, argument("[FOLDER|FILE...]", "A trial folder, or files of one; the folder it is run in if not given.")
-    ] = None,
-    output: Annotated[
-        Path | None, option("-o --output", "FILE", "report.html in the folder if not given; .pdf is printed by a browser.")
-    ] = None,
-    force: Force = False,
-) -> Mapping[str, Any]:
+class Options(options.Options):
+    """What `sysid report` takes."""
+
+    files: options.Paths = options.argument(
+        "[FOLDER|FILE...]", "A trial folder, or files of one; the folder it is run in if not given.", None
+    )
+    output: Path | None = options.option(
+        "-o --output FILE", "report.html in the folder if not given; .pdf is printed by a browser."
+    )
+    force: bool = options.FORCE
+
+
+@options.takes(Options)
+def command(given: Options) -> Body:
     """Write what a trial has come to into one file: HTML that needs no network, or PDF.
 
     Verdicts first; the runs with the doctor's findings; each model against its measurement, to zoom and read off; where it fails;
@@ -36,9 +41,9 @@ def command(
 
     Example: sysid report pandan -o pandan.pdf
     """
-    given = files or [Path()]
-    state = _state(given)
-    path = output or state.folder / "report.html"
+    force = given.force
+    state = _state(given.files or [Path()])
+    path = given.output or state.folder / "report.html"
     from fieldsid.reporting.write import check_report, written
     from fieldsid.results.trial import Report, ReportVerdict
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import shlex
 from collections import Counter
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
 
-from fieldsid.cli.console import emit
+from fieldsid.cli.console import Body, emit
 from fieldsid.cli.headlines.trial import headline_of_status
 from fieldsid.cli.options import argument
 from fieldsid.logs.run import Note
@@ -32,8 +30,8 @@ LAST = 3
 
 
 def command(
-    folder: Annotated[Path, argument("FOLDER", "The trial folder; the one it is run in if not given.")] = Path(),
-) -> Mapping[str, Any]:
+    folder: Path = argument("FOLDER", "The trial folder; the one it is run in if not given.", Path()),
+) -> Body:
     """Say what a folder holds, what was made from what, which files are stale, and what to do next.
 
     A file is stale where something that it was made from has changed since, by its hash, or is stale itself. Any folder will do;
@@ -57,16 +55,7 @@ def command(
     why, line = next_step(state)
     if line and folder.resolve() != Path.cwd():
         line = f"cd {shlex.quote(str(folder))} && {line}"
-    result = Status(
-        folder=str(folder),
-        verdict=_verdict(state),
-        files=state.items,
-        stale=tuple(i.path for i in state.items if i.stale),
-        journal=state.entries,
-        unreadable_journal_lines=state.broken_lines,
-        warnings=tuple(notes),
-        next=NextStep(why, line),
-    )
+    result = Status(state, _verdict(state), tuple(notes), NextStep(why, line))
     return emit(result, render=_page(state), headline=headline_of_status(result), notes=notes)
 
 
@@ -75,8 +64,7 @@ def _verdict(state: FolderState) -> str:
     contents = (
         ", ".join(counted(counts[k], *NAMES[k]) for k in NAMES if counts[k] and k not in ("vehicle", "mapping")) or "nothing yet"
     )
-    stale = sum(bool(i.stale) for i in state.items)
-    name = state.folder.resolve().name
+    name, stale = state.folder.resolve().name, len(state.stale)
     return f"{name}: {contents}; " + (f"{stale} stale" if stale else "nothing is stale")
 
 

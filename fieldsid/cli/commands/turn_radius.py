@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING
 
-from fieldsid.cli.console import emit
-from fieldsid.cli.options import Figures, FinMax, Force, MappingFile, ModelFiles, OutputDir, OwnLaw, Speeds, VehicleFile, option
+from fieldsid.angles import FIN, parse_angle
+from fieldsid.cli import options
+from fieldsid.cli.console import Body, emit
 from fieldsid.cli.progress import refuse_closed
 from fieldsid.cli.session import draw_figures
 from fieldsid.cli.skipped_logs import Skips
 from fieldsid.cli.voice import angles
 from fieldsid.display import page_of
+from fieldsid.errors import UsageError
 from fieldsid.figures.sketch import sketch
 from fieldsid.page import Page, written
 from fieldsid.records.keys import body_of
@@ -23,27 +24,36 @@ if TYPE_CHECKING:
     from fieldsid.results.turning import TurnRadius
 
 
-def command(
-    models: ModelFiles,
-    speeds: Speeds = None,
-    rudder_max: FinMax = None,
-    measured: Annotated[
-        list[Path] | None, option("--measured", "RUN", "Run of a turning circle, to compare with and to learn from; may repeat.")
-    ] = None,
-    runs: Annotated[
-        list[Path] | None, option("--runs", "RUN", "Runs that the turn is fitted to; the models' own if not given.")
-    ] = None,
-    method: Annotated[str, option("--method", "NAME", "auto, maneuvering, simulated, u_turn or steady.")] = "auto",
-    law: OwnLaw = None,
-    fin_zero: Annotated[
-        str, option("--fin-zero", "ANGLE", "Fin offsets below this, `1deg`, are not counted in the formula.")
-    ] = "0.0175rad",
-    mapping: MappingFile = None,
-    vehicle: VehicleFile = None,
-    output: OutputDir = None,
-    figures: Figures = True,
-    force: Force = False,
-) -> Mapping[str, Any]:
+def _fin_zero(text: str, option: str) -> float:
+    """Return the size below which a fin's offset is not counted, in rad; raises UsageError."""
+    angle = parse_angle(text, option, FIN)
+    if not 0.0 <= angle <= FIN:
+        words = "the tolerance of a fin's zero lies in 0 .. 45 deg"
+        raise UsageError(words, found=f"{option} {text}", hint=f"`{option} 0` counts every offset")
+    return angle
+
+
+class Options(options.ToFolder, options.OfVehicle, options.Mapped, options.Models):
+    """What `sysid turn-radius` takes."""
+
+    speeds: str | None = options.SPEEDS
+    rudder_max: float | None = options.FIN_MAX
+    measured: options.Paths = options.option(
+        "--measured RUN", "Run of a turning circle, to compare with and to learn from; may repeat."
+    )
+    runs: options.Paths = options.option("--runs RUN", "Runs that the turn is fitted to; the models' own if not given.")
+    method: str = options.option("--method NAME", "auto, maneuvering, simulated, u_turn or steady.", default="auto")
+    law: list[str] | None = options.LAW
+    fin_zero: float = options.option(
+        "--fin-zero ANGLE",
+        "Fin offsets below this, `1deg`, are not counted in the formula.",
+        default="0.0175rad",
+        parse=(_fin_zero,),
+    )
+
+
+@options.takes(Options)
+def command(given: Options) -> Body:
     """Predict the turning radius over speed, port and starboard apart, with 95 % bands.
 
     Models that carry effects, in a fit file too: surge, sway and yaw are fitted to all their runs and the measured turns at
@@ -52,55 +62,30 @@ def command(
 
     Example: sysid turn-radius models/*.yaml --fin-max 0.35 --measured circle.parquet -o turning/
     """
-    from fieldsid.angles import FIN, parse_angle
     from fieldsid.cli.headlines.gains import caveat, headline_of_turn
-    from fieldsid.cli.inputs import mapping_of, models_among, read_runs
+    from fieldsid.cli.inputs import models_among, read_runs
     from fieldsid.cli.user_effects import read_source
-    from fieldsid.face.arguments import fin_limit_of, runs_of_turn, vehicle_of
-    from fieldsid.face.quantities import given
-    from fieldsid.face.speeds import speeds_of
+    from fieldsid.face.gains import turn_radius
     from fieldsid.results.turning import TurnRadius
-    from fieldsid.turning.radius import turn_radius
 
-    refuse_closed(output)
-    limit = given(rudder_max, parse_angle, "--fin-max", FIN)
-    models, known = models_among(models), vehicle_of(vehicle)
-    source, skips = read_source(models, law or ()), Skips()
-    fitted, circles = (
-        read_runs(logs, mapping=mapping, models=source.paths, refused=skips.skip) if logs else () for logs in (runs, measured)
-    )
-    prediction = turn_radius(
-        source,
-        speeds_of(speeds) or source.knots,
-        fin_limit_of(known, source, "rudder") if limit is None else limit,
-        runs=fitted if runs else runs_of_turn(source, mapping_of(mapping)),
-        measured=circles,
-        method=method,
-        fin_zero=_fin_zero(fin_zero),
-        unfit=skips.skip,
-        length=known.length_m,
-    )
+    refuse_closed(given.output)
+    models = models_among(given.models)
+    source, skips = read_source(models, given.law or ()), Skips()
+    how = {"mapping": given.mapping, "models": source.paths, "refused": skips.skip}
+    fitted, circles = (read_runs(logs, **how) if logs else () for logs in (given.runs, given.measured))
+    read = {"models": source, "runs": fitted if given.runs else None, "measured": circles, "unfit": skips.skip}
+    prediction = turn_radius(**options.arguments_of(turn_radius, given, **read))
     result = TurnRadius(prediction=prediction, skipped_runs=tuple(skips.records))
-    if output is not None:
-        _save(result, output, source, force=force)
+    if given.output is not None:
+        _save(result, given.output, source, force=given.force)
         plots = {"turn_radius": sketch("turn", prediction)}
         plots |= {f"circle_{m.turn.run}": sketch("turn", m.turn, draw="track_figure") for m in prediction.measured}
-        result = replace(result, figures=tuple(draw_figures(output if figures else None, plots, force=force)))
+        drawn = draw_figures(given.output if given.figures else None, plots, force=given.force)
+        result = replace(result, figures=tuple(drawn))
     headline, notes = headline_of_turn(prediction, models, caveat(source.models, models)), prediction.notes
     page = Page("", blocks=page_of(prediction, angles()).blocks, closing=written(figure=result.figures))
     body = emit(result, render=page, headline=headline, notes=notes)
-    return skips.end(body, len(runs or []) + len(measured or []) - len(skips.records))
-
-
-def _fin_zero(text: str) -> float:
-    from fieldsid.angles import FIN, parse_angle
-    from fieldsid.errors import UsageError
-
-    angle = parse_angle(text, "--fin-zero", FIN)
-    if not 0.0 <= angle <= FIN:
-        words = "the tolerance of a fin's zero lies in 0 .. 45 deg"
-        raise UsageError(words, found=f"--fin-zero {text}", hint="`--fin-zero 0` counts every offset")
-    return angle
+    return skips.end(body, len(given.runs or []) + len(given.measured or []) - len(skips.records))
 
 
 def _save(result: TurnRadius, folder: Path, source: ParameterSource, *, force: bool) -> None:

@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fieldsid.cli.headlines.headline import Headline
-from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import first_names, next_use
+from fieldsid.cli.headlines.typed import pasted, typed_with
+from fieldsid.cli.headlines.words import first_names, next_use, records_in
 from fieldsid.cli.voice import angles
 from fieldsid.figures.bars import fall
+from fieldsid.logs.several.run_names import stem_of
 from fieldsid.page import counted
 from fieldsid.rounding import times_noise
+from fieldsid.trial_folder.patterns import repeated
 
 if TYPE_CHECKING:
     from fieldsid.diagnosis import Diagnosis
@@ -107,38 +109,27 @@ def _command_on_model(of: Searched, axis: str, then: Callable[[str], str]) -> st
     if (model := of.model or _identified_model(of.runs, axis)) is not None:
         return then(str(model))
     joint = ("--joint",) if len(of.runs) > 1 else ()
-    stem = "joint" if joint else _stem(of.runs[0])
+    stem = "joint" if joint else stem_of(of.runs[0])
     identify = pasted("identify", of.runs, "--axis", axis, *joint, "-o", f"{MODELS}/")
     return f"{identify} && {then(f'{MODELS}/{stem}_{axis}.yaml')}"
 
 
-def _stem(log: Path) -> str:
-    from fieldsid.logs.several.run_names import stem_of
-
-    return stem_of(log)
-
-
 def _identified_model(runs: Sequence[Path], axis: str) -> Path | None:
     """Return the file of a model without effects that was fitted to exactly these runs, from `models` here or next to them."""
-    from fieldsid.logs.unknown_file import own_kind
-    from fieldsid.records.named_inputs import inputs_of
-    from fieldsid.records.reading import read_yaml
-
     wanted = {p.resolve() for p in runs}
-    places = dict.fromkeys([Path(MODELS), *(p.parent.parent / MODELS for p in runs[:1])])
-    for path in (p for place in places for p in sorted(place.glob("*.yaml"))):
-        if own_kind(path) == "model" and {p.resolve() for p in inputs_of(path)} == wanted:
-            body = read_yaml(path)
-            if body.get("axis") == axis and not body.get("effects"):
-                return path
-    return None
+    found = records_in([Path(MODELS), *(p.parent.parent / MODELS for p in runs[:1])], "model")
+    return next((p for p, body, logs in found if logs == wanted and body.get("axis") == axis and not body.get("effects")), None)
 
 
 def headline_of_extension(result: Extended) -> Headline:
     """Return whether the addition is kept, and how the error fell."""
-    gain = result.gain
+    gain = result.found.gain
     word = (
-        "kept" if result.pays else "kept because of --keep" if result.kept else "not kept, nothing was written (--keep overrules)"
+        "kept"
+        if result.found.pays
+        else "kept because of --keep"
+        if result.kept
+        else "not kept, nothing was written (--keep overrules)"
     )
     says = f"{'+'.join(gain.added)} {word}: {fall([gain], angles())}"
     fitted = f"{counted(len(gain.learned_on), 'run')} fitted to ({first_names(gain.learned_on)})"

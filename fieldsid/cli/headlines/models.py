@@ -8,14 +8,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fieldsid.cli.headlines.headline import Headline
-from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import MOST_NAMED, first_names, next_use
+from fieldsid.cli.headlines.typed import pasted, typed_with
+from fieldsid.cli.headlines.words import MOST_NAMED, first_names, next_use, records_in
 from fieldsid.cli.voice import angles
 from fieldsid.comparison.left_by import left_by_addition
 from fieldsid.comparison.sufficient import is_noise, pooled
 from fieldsid.page import counted
-from fieldsid.records.named_inputs import is_there
+from fieldsid.records.named_inputs import inputs_of, is_there
+from fieldsid.records.reading import read_yaml
 from fieldsid.rounding import MANY, noise_fall, number, times_noise
+from fieldsid.trial_folder.patterns import repeated
 from fieldsid.views.comparison import verdict
 
 if TYPE_CHECKING:
@@ -115,22 +117,13 @@ def is_diagnosed(model: Path) -> bool:
 
     A diagnosis of the same runs counts for a model without effects even if it does not name it: it starts from that model.
     """
-    from fieldsid.logs.unknown_file import own_kind
-    from fieldsid.records.named_inputs import inputs_of
-    from fieldsid.records.reading import read_yaml
-
     fitted = {p.resolve() for p in inputs_of(model)} if not read_yaml(model).get("effects") else set()
-
-    def is_about_model(path: Path) -> bool:
-        inputs = {p.resolve() for p in inputs_of(path)}
-        return model.resolve() in inputs or (bool(fitted) and inputs == fitted)
-
+    since = model.stat().st_mtime_ns
     return any(
-        own_kind(path) == "diagnosis"
-        and path.stat().st_mtime_ns >= model.stat().st_mtime_ns
-        and is_about_model(path)
-        and not read_yaml(path).get("effects")
-        for path in model.parent.glob("*.yaml")
+        path.stat().st_mtime_ns >= since
+        and not body.get("effects")
+        and (model.resolve() in inputs or (bool(fitted) and inputs == fitted))
+        for path, body, inputs in records_in([model.parent], "diagnosis")
     )
 
 

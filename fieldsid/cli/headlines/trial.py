@@ -56,8 +56,8 @@ def headline_of_plan(result: Planned, model: Path | None) -> Headline:
 
 def headline_of_status(result: Status) -> Headline:
     """Return what a folder contains and what to do next."""
-    lines = counted(len(result.journal), "line")
-    rests = f"{counted(len(result.files), 'file')}, {lines} of the journal; {result.next.why}"
+    state = result.state
+    rests = f"{counted(len(state.items), 'file')}, {counted(len(state.entries), 'line')} of the journal; {result.next.why}"
     return Headline(result.verdict, rests, result.next.command)
 
 

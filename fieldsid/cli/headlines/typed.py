@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from contextvars import ContextVar
-from itertools import groupby
-from os.path import isfile
 from pathlib import Path
 
 from fieldsid.cli.inputs import mapping_behind
 from fieldsid.cli.trial.parsed import parse
 from fieldsid.cli.trial.shortened import shortened_in_trial
-from fieldsid.trial_folder.patterns import FEW, pattern_of
+from fieldsid.trial_folder.patterns import repeated, shortened
 
 _WORDS: ContextVar[tuple[str, ...]] = ContextVar("words", default=())
 
@@ -24,26 +21,17 @@ def remember(words: Sequence[str]) -> None:
 
 def typed_with(*more: str) -> str:
     """Return the running command line with more words added, without `--json`."""
-    words = [w for w in _WORDS.get() if w != "--json"]
-    groups = [list(group) for _, group in groupby(words, key=lambda w: not w.startswith("-") and isfile(w))]  # noqa: PTH113 - says no
-    parts = [part for g in groups for part in ([g] if len(g) > FEW and isfile(g[0]) else g)]  # noqa: PTH113 - of what cannot be reached
-    return pasted(*parts, *more)
+    return pasted(*(w for w in _WORDS.get() if w != "--json"), *more)
 
 
 def pasted(*words: str | Path | Sequence[str | Path]) -> str:
-    """Return a command line of `sysid`; a list of files becomes its names, or the pattern that matches exactly them.
+    """Return a command line of `sysid`; several files of one folder become the pattern that matches exactly them.
 
     In a trial folder the words that the folder supplies are left out.
     """
-    parts: list[str] = ["sysid"]
     flat = [_near(w) for word in words for w in ([word] if isinstance(word, (str, Path)) else word)]
-    reading = _reading(flat)
-    words, flat = (*words, *reading), [*flat, *reading]
-    if (short := shortened_in_trial(flat)) != flat:
-        return shlex.join(["sysid", *short])
-    for word in words:
-        parts += [shlex.quote(_near(word))] if isinstance(word, (str, Path)) else pattern_of([Path(_near(p)) for p in word])
-    return " ".join(parts)
+    flat += _reading(flat)
+    return shortened(["sysid", *shortened_in_trial(flat)], Path())
 
 
 def _reading(words: Sequence[str]) -> list[str]:
@@ -62,12 +50,7 @@ def _reading(words: Sequence[str]) -> list[str]:
     mapping = typed.values.get("mapping")
     if mapping is None and not records & taken:
         mapping = mapping_behind(sorted(records), read)
-    return [] if mapping is None else ["--mapping", str(mapping)]
-
-
-def repeated(option: str, files: Sequence[str | Path]) -> list[str]:
-    """Return the words of an option repeated for each file."""
-    return [word for file in files for word in (option, str(file))]
+    return [] if mapping is None else repeated("--mapping", [mapping])
 
 
 def _near(word: str | Path) -> str:

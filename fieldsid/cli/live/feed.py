@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from fieldsid.cli.options import AxisOption
 from fieldsid.logs.mapping.vocabulary import TIME
+from fieldsid.models.axis import Axis
 
 if TYPE_CHECKING:
     from io import BufferedIOBase
@@ -28,7 +28,7 @@ class Feed:
     keeps: keep the samples of standard input or of the port, for `flown`.
     """
 
-    axis: AxisOption
+    axis: Axis
     log: Path | None
     factor: float
     follow: bool

@@ -156,19 +156,10 @@ def _turn_radius(parsed: Parsed, state: FolderState) -> list[str]:
 
 
 def _circles(state: FolderState) -> list[str]:
-    """Return the runs that settle on a circle; one that cannot be read is left out: a command that uses it reports that."""
-    from fieldsid.logs import load_run
+    """Return the runs that settle on a circle."""
     from fieldsid.turning.measured.measured_turn import is_circle
 
-    found = []
-    for item in state.of_kind(RUN):
-        try:
-            run = load_run(state.place(item), state.mapping_of(state.place(item)), recognise=True)
-        except FieldsidError:
-            continue
-        if is_circle(run):
-            found.append(item.path)
-    return found
+    return [item.path for item, run in state.readable_runs() if is_circle(run)]
 
 
 def _gains(state: FolderState) -> list[str]:
