@@ -156,11 +156,16 @@ class OfVehicle(Options):
 
 
 class ToFolder(Options):
-    """A command that writes files and figures to a folder."""
+    """A command that writes files and figures to a folder, or to another place."""
 
     output: Path | None = FOLDER
     figures: bool = FIGURES
     force: bool = FORCE
+
+    @property
+    def drawn_to(self) -> Path | None:
+        """Where figures are drawn, None where none are."""
+        return self.output if self.figures else None
 
 
 class ToFile(Options):

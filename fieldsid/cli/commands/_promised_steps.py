@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ from fieldsid.cli.console import Body, emit
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted
 from fieldsid.cli.voice import angles
-from fieldsid.errors import DataError
+from fieldsid.logs.several.sifting import attempt, sifted
 from fieldsid.page import Block, Page, counted
 
 if TYPE_CHECKING:
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
 def compare_steps(gains: Path, runs: Sequence[Path], reading: Body) -> Body:
     """Compare each step flown in the runs with the bounds that `schedule verify` gives, print that and return the JSON body.
 
-    reading: the keyword arguments of `read_runs` (mapping, start, end). A run without a usable step is skipped, except where it
-    is the only one: then raises DataError.
+    reading: the keyword arguments of `read_runs` (mapping, start, end). A run without a usable step is skipped; raises DataError
+    where none has one.
     """
     from fieldsid.change.promise import kept_steps
     from fieldsid.cli.inputs import read_runs
@@ -36,20 +37,12 @@ def compare_steps(gains: Path, runs: Sequence[Path], reading: Body) -> Body:
     schedule, skips = load_schedule(gains), Skips()
     source = load_parameter_source(designed_from(schedule, str(gains)))
     logs = read_runs(runs, models=source.paths, refused=skips.skip, **reading)
-    plants, compared_runs = plants_behind(schedule, source, runs_of_models(source)), 0
-    steps: list[KeptStep] = []
-    for run in logs:
-        try:
-            steps += kept_steps(schedule, plants, run)
-        except DataError as error:
-            if len(logs) == 1:
-                raise
-            skips.skip(run, error)
-        else:
-            compared_runs += 1
+    plants = plants_behind(schedule, source, runs_of_models(source))
+    compared = sifted(logs, (attempt(partial(kept_steps, schedule, plants), run) for run in logs), skips.skip)
+    steps = [step for _, found in compared for step in found]
     result = AsPromised(gains=str(gains), axis=schedule.axis, steps=tuple(steps), skipped_runs=tuple(skips.records))
     headline = _headline(gains, source.paths, runs, steps)
-    return skips.end(emit(result, render=_page(steps), headline=headline), compared_runs)
+    return skips.end(emit(result, render=_page(steps), headline=headline), len(compared))
 
 
 def _headline(gains: Path, models: Sequence[Path], runs: Sequence[Path], steps: Sequence[KeptStep]) -> Headline:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from fieldsid.results.result import OfLogs
 
 
-class Options(options.Part):
+class Options(options.ToFolder, options.Part):
     """What `sysid compare` takes."""
 
     model: Path = options.argument("MODEL", "A model file, the folder of the models before a swap, or gains that were flown.")
@@ -42,13 +42,6 @@ class Options(options.Part):
     output: Path | None = options.option(
         "-o --output PLACE", "Folder for the figures, or the name of one: .png, .svg or .pdf.", options.WRITTEN
     )
-    figures: bool = options.FIGURES
-    force: bool = options.FORCE
-
-    @property
-    def place(self) -> Path | None:
-        """Where figures are drawn, None where none are."""
-        return self.output if self.figures else None
 
 
 @options.takes(Options)
@@ -84,7 +77,7 @@ def command(given: Options) -> Body:
             raise UsageError(
                 "`--from`, `--to`, `--mapping` and `--min-fit` are for runs", found="two models and no run", hint="leave them out"
             )
-        return compare_states(sides[0], sides[1], given.place, force=given.force)
+        return compare_states(sides[0], sides[1], given.drawn_to, force=given.force)
     if len(sides) > 1 and (not others or any(p.is_dir() for p in sides)):
         named = ", ".join(str(p) for p in (*sides, *others))
         raise UsageError("several models are compared over runs", found=named, hint="sysid compare M1.yaml M2.yaml RUN")
@@ -111,7 +104,7 @@ def _compare_runs(given: Options, paths: Sequence[Path], runs: Sequence[Path]) -
     notes, files = left_out(logs, models[0].axis), files_of(logs)
     found, *more = (compare(m, logs, unfit=None if i else skips.skip) for i, m in enumerate(models))
     fitted = [fitted_to(p, m, logs) for p, m in known.items()]
-    draw = partial(draw_figures, given.place, force=given.force)
+    draw = partial(draw_figures, given.drawn_to, force=given.force)
     if more:
         from fieldsid.cli.commands._compare_several import several_models
 

@@ -12,13 +12,11 @@ from fieldsid.page import Page, written
 from fieldsid.views.laws import blocks_of
 
 
-class Options(options.Models):
+class Options(options.ToFolder, options.Models):
     """What `sysid fit` takes."""
 
     unweighted: bool = options.flag("--unweighted", "Let every point count alike, standard errors or not.")
     output: Path | None = options.FILE
-    figures: bool = options.FIGURES
-    force: bool = options.FORCE
 
 
 @options.takes(Options)
@@ -39,7 +37,7 @@ def command(given: Options) -> Body:
     from fieldsid.results.turning import FittedLaws
 
     output, force = given.output, given.force
-    figure = output.with_suffix(".png") if output is not None and given.figures else None
+    figure = given.drawn_to and given.drawn_to.with_suffix(".png")
     refuse_existing(output, figure, force=force)
     models = models_among(given.models)
     source = load_parameter_source(models)

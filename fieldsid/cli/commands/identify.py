@@ -70,7 +70,7 @@ def command(given: Options) -> Body:
     files = [files_of(group) for group in groups]
     models = _save_models(fits, files, given)
     plots = {k: v for fit in fits for k, v in _plots(fit).items()}
-    draw_figures(given.output if given.figures else None, plots, force=given.force)
+    draw_figures(given.drawn_to, plots, force=given.force)
     entries = tuple(fitted_model(fit, model, of) for fit, model, of in zip(fits, models, groups, strict=True))
     result = Identified(axis=axis, fits=entries, skipped_runs=tuple(skips.records))
     from fieldsid.cli.headlines.models import headline_of_identify

@@ -80,7 +80,7 @@ def command(given: Options) -> Body:
         _save(result, given.output, source, force=given.force)
         plots = {"turn_radius": sketch("turn", prediction)}
         plots |= {f"circle_{m.turn.run}": sketch("turn", m.turn, draw="track_figure") for m in prediction.measured}
-        drawn = draw_figures(given.output if given.figures else None, plots, force=given.force)
+        drawn = draw_figures(given.drawn_to, plots, force=given.force)
         result = replace(result, figures=tuple(drawn))
     headline, notes = headline_of_turn(prediction, models, caveat(source.models, models)), prediction.notes
     page = Page("", blocks=page_of(prediction, angles()).blocks, closing=written(figure=result.figures))

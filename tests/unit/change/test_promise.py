@@ -127,3 +127,10 @@ def test_compare_takes_gains_and_the_runs_flown_with_them(run_cli, tmp_path, mon
     slow = run_cli("compare", "gains.yaml", "runs/sea.parquet", "--json").json
     assert not slow["as_promised"]
     assert slow["headline"]["next"] == "sysid compare"  # which takes the model and the run from here
+    for name, share in (("deaf", 1.0), ("mute", 1.1)):
+        aimless = flown(made, model)
+        save_run(Run(name, aimless.time, {"yaw_rad": share * aimless["yaw_rad"]}), tmp_path / f"sea/runs/{name}.parquet")
+    none = run_cli("compare", "gains.yaml", "runs/deaf.parquet", "runs/mute.parquet")
+    assert none.code == 2
+    assert none.err.count("does not say what the autopilot was told to hold") == 2
+    assert "no log is left that can be used" in none.err
