@@ -24,8 +24,9 @@ from fieldsid.logs.importing import Importer
 from fieldsid.logs.run import EXPLAINING, Run
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.models.axis import NAMES, Axis
+from fieldsid.records.keys import body_of
 from fieldsid.records.named_inputs import sha256_of
-from fieldsid.vehicle import Vehicle
+from fieldsid.vehicle import Vehicle, load_vehicle
 
 FIRST = ("log", "run", "status", "start_utc", "time_from", "speed_m_s", "verdict", "effects")
 EARLIEST_NS = 300_000_000 * 10**9
@@ -105,11 +106,7 @@ def _mapping(path: str | None) -> ChannelMap | None:
 
 @lru_cache(maxsize=4)
 def _vehicle(path: str | None) -> Vehicle | None:
-    if path is None:
-        return None
-    from fieldsid.vehicle import load_vehicle
-
-    return load_vehicle(Path(path))
+    return None if path is None else load_vehicle(Path(path))
 
 
 def _run_columns(task: Task, run: Run) -> Row:
@@ -142,20 +139,17 @@ def _with_parameters(run: Run, settings: Settings) -> Row:
 
     axis = Axis(settings.axis)
     (fit,) = identify([run], axis, method=settings.method, whole=settings.whole, vehicle=_vehicle(settings.vehicle))
-    model, merit = fit.model, goodness_of_fit(fit.predictions)
-    parameters = {}
-    for name in NAMES[axis].base:
-        parameters[name] = model.values.get(name, nan)
-        parameters[f"{name}_std_error"] = model.std_error(name) if name in model.values else nan
+    model = fit.model
+    known = [name for name in NAMES[axis].base if name in model.values]
+    parameters = {
+        column: value for n in known for column, value in ((n, model.values[n]), (f"{n}_std_error", model.std_error(n)))
+    }
     row: Row = {
         "status": "done",
         "speed_m_s": model.law.reference,
         "method": model.method,
         **parameters,
-        "angle_rms_rad": merit.angle_rms,
-        "rate_rms_rad_s": merit.rate_rms,
-        "angle_fit_percent": merit.angle_fit,
-        "rate_fit_percent": merit.rate_fit,
+        **body_of(goodness_of_fit(fit.predictions)),
         "angle_noise_rad": fit.floor.angle,
         "rate_noise_rad_s": fit.floor.rate,
         "warnings": ",".join(sorted({n.code for n in fit.notes if is_warning(n, axis)})),

@@ -11,12 +11,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from fieldsid.display import Brief
-from fieldsid.errors import ArtifactError, LogError
+from fieldsid.errors import ArtifactError, FieldsidError, LogError
 from fieldsid.logs.load import load_run
 from fieldsid.logs.reader import reader_of
 from fieldsid.logs.readers.several_tables import holds_one_run
 from fieldsid.logs.run import OF_LIMITS, SIMULATED, Run
-from fieldsid.logs.several.sifting import attempt
 from fieldsid.logs.unknown_file import own_kind
 from fieldsid.records.keys import Key, Words
 from fieldsid.records.named_inputs import first_allowed
@@ -132,9 +131,11 @@ class FolderState(Brief):
         """Yield each run that can be read: a command that uses another reports what is wrong with it."""
         for item in self.of_kind(RUN):
             place = self.place(item)
-            run = attempt(lambda path: load_run(path, self.mapping_of(path), recognise=True), place)
-            if isinstance(run, Run):
-                yield item, run
+            try:
+                run = load_run(place, self.mapping_of(place), recognise=True)
+            except FieldsidError:
+                continue
+            yield item, run
 
     @property
     def models(self) -> tuple[Item, ...]:

@@ -12,6 +12,8 @@ from types import MappingProxyType
 
 from fieldsid.cli.trial.parsed import Parsed
 from fieldsid.errors import FieldsidError
+from fieldsid.logs.load import load_run
+from fieldsid.logs.segments import may_show
 from fieldsid.logs.unknown_file import own_kind
 from fieldsid.models.axis import Axis
 from fieldsid.trial_folder.make import LOGS, MODELS, RUNS
@@ -51,9 +53,6 @@ def _may_show(place: Path, _written_ns: int, mapping: Path | None, axis: Axis) -
 
     _written_ns: the file's modification time in ns, by which the cache tells a file that was written anew.
     """
-    from fieldsid.logs import load_run
-    from fieldsid.logs.segments import may_show
-
     try:
         return may_show(load_run(place, mapping, recognise=True), axis)
     except FieldsidError:
