@@ -1,4 +1,4 @@
-"""The options of the commands: a command takes one record, each field of which is an option or an argument.
+"""The options of the commands: the fields of the one record that a command takes; of a command with few, its parameters.
 
 What several commands share is written once, as a record that theirs inherit, or as an option that their fields take. The fields
 of a record come before those of what inherits it, and of several inherited ones those of the last come first.

@@ -21,6 +21,7 @@ from fieldsid.page import Page, written
 
 if TYPE_CHECKING:
     from fieldsid.batch.archive import Work
+    from fieldsid.batch.rows import Row
     from fieldsid.batch.task import Task
     from fieldsid.results.trial import Batch, NotUsed
 
@@ -124,7 +125,7 @@ def _tasks(given: Options) -> list[Task]:
     return [Task(str(log), settings) for log in logs]
 
 
-def _counts(rows: Sequence[Body], column: str) -> dict[str, int]:
+def _counts(rows: Sequence[Row], column: str) -> dict[str, int]:
     """Return how many rows have each word of a column, the most frequent first."""
     return dict(Counter(r[column] for r in rows if r.get(column)).most_common())
 
@@ -143,7 +144,7 @@ def _work(given: Options) -> tuple[Work, str]:
     return partial(run_here, workers=count, timeout_s=given.timeout, memory_mb=given.memory), said
 
 
-def _unused_log(row: Body) -> NotUsed:
+def _unused_log(row: Row) -> NotUsed:
     from fieldsid.results.trial import NotUsed
 
     what, found, hint = (str(row.get(k) or "") for k in ("what", "found", "hint"))
