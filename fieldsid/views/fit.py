@@ -89,15 +89,10 @@ def _warnings(fit: Fit) -> list[Note]:
 
 
 def _correlations(fit: Fit) -> Block:
-    rows = tuple((f"{a}, {b}", f"{rho:+.2f}") for a, b, rho in _pairs(fit) if abs(rho) > LEAST_CORRELATION)
+    names, rho = fit.model.free, fit.correlation
+    pairs = ((names[i], names[j], float(rho[i, j])) for j in range(len(names)) for i in range(j))
+    rows = tuple((f"{a}, {b}", f"{share:+.2f}") for a, b, share in pairs if abs(share) > LEAST_CORRELATION)
     return Block(f"Correlations (those below {LEAST_CORRELATION:g} are left out)", rows)
-
-
-def _pairs(fit: Fit) -> Iterator[tuple[str, str, float]]:
-    names = fit.model.free
-    for j in range(len(names)):
-        for i in range(j):
-            yield names[i], names[j], float(fit.correlation[i, j])
 
 
 def _correlation(fit: Fit) -> DataFrame:
