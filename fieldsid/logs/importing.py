@@ -17,6 +17,7 @@ from fieldsid.logs.channels import ChannelMap, Source
 from fieldsid.logs.convert.assemble import WHOLE
 from fieldsid.logs.convert.conditioning import MAX_GAP_S, long_gaps
 from fieldsid.logs.load import load_run
+from fieldsid.logs.reader import rate_of
 from fieldsid.logs.run import EXPLAINING, Note, Run
 from fieldsid.logs.save import SUFFIXES, save_run
 from fieldsid.logs.several.run_names import name_of_run, names_apart, stem_of
@@ -141,7 +142,7 @@ class Importer:
             start_s=start,
             end_s=end,
             duration_s=end - start,
-            rate_hz=1.0 / float(np.median(np.diff(run.time))),
+            rate_hz=rate_of(run.time),
             signals={s: int(np.isfinite(v).sum()) for s, v in run.signals.items()},
             notes=run.notes,
         )

@@ -15,11 +15,11 @@ from fieldsid.display import Brief
 from fieldsid.errors import FieldsidError, MappingError
 from fieldsid.logs.channels import TableForm
 from fieldsid.logs.convert.conditioning import MAIN, MAX_GAP_S, gaps_in
-from fieldsid.logs.few_of import SHOWN
+from fieldsid.logs.few_of import MOSTLY, SHOWN
 from fieldsid.logs.importing import Importer
 from fieldsid.logs.mapping.propose import propose
 from fieldsid.logs.mapping.trial import Proposal
-from fieldsid.logs.reader import WORTH_SALVAGING, ChannelInfo, FieldInfo, Inventory, ReadOptions, reader_of
+from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, ReadOptions, reader_of
 from fieldsid.logs.readers._tables_of_run import tables_beside
 from fieldsid.logs.run import FINS, Note, Run
 from fieldsid.records.keys import Key
@@ -31,10 +31,7 @@ _TOPIC_EXAMPLE = (
     _EXAMPLE + "#   yaw_rad: {topic: TOPIC, field: FIELD, unit: UNIT}\n#   rudder_rad: {topic: ..., field: ..., unit: ...}\n"
 )
 NO_TIME = "# No column is a time; say how many rows there are a second:\n# time: {rate: 10}\n"
-SHORT = 120
-"""Largest number of letters of what was found that a note repeats after the statement of the problem."""
-_PLAIN = re.compile(r"^[A-Za-z/_][\w/.]*$")
-_RESERVED = frozenset({"y", "n", "yes", "no", "on", "off", "true", "false", "null"})
+_QUOTED_WORD = re.compile(r'(?<!\\)"(?!(?:y|n|yes|no|on|off|true|false|null)")([a-z/_][\w/.]*)"', re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,9 +104,8 @@ def inspect_log(
     proposed = [] if needs_none or mapping is not None else list(proposal.notes)
     notes = [*notes_of_size, *inventory.notes, *proposed, *(() if run is None else run.notes)]
     if proposal.problem is not None and run is None:
-        what, found, hint = proposal.problem.what, proposal.problem.found, proposal.problem.hint
-        problem_text = f"{what} ({found})" if len(found) <= SHORT else what
-        notes.append(Note("not_importable", f"{problem_text}: {hint}" if hint else problem_text, {"found": found, "hint": hint}))
+        problem, advice = proposal.problem, f": {proposal.problem.hint}" if proposal.problem.hint else ""
+        notes.append(Note("not_importable", f"{problem.what} ({problem.found}){advice}", _data_of(problem)))
     if not proposal.body["signals"] and run is None:
         notes.append(Note("nothing_recognised", "no name says what its numbers are: fill in `signals` in the mapping", {}))
     if not (set(FINS) & {*proposal.body["signals"], *(() if run is None else run.signals)} or joined):
@@ -117,40 +113,28 @@ def inspect_log(
     chosen = given or (None if needs_none or run is None else mapping_of(proposal.body))
     import_way = WayIn() if run is None else way_in(path, run, notes, Importer(chosen, msg_path=msg_path, joined=tuple(joined)))
     if import_way.refusal is not None:
-        what, found, hint = import_way.refusal.what, import_way.refusal.found, import_way.refusal.hint
-        advice = f"import it with `{' '.join(import_way.options)}`" if import_way.options else hint
-        notes.append(Note("refused", f"refused as it is: {what} ({found}); {advice}", {"found": found, "hint": hint}))
+        refusal, options_needed = import_way.refusal, " ".join(import_way.options)
+        advice = f"import it with `{options_needed}`" if options_needed else refusal.hint
+        notes.append(Note("refused", f"refused as it is: {refusal.what} ({refusal.found}); {advice}", _data_of(refusal)))
     distinct = {(n.code, n.message): n for n in notes if n.code != "ignored_columns"}
     return Inspection(inventory, proposal, run, tuple(distinct.values()), needs_none, import_way, tuple(joined))
+
+
+def _data_of(error: FieldsidError) -> dict[str, str]:
+    return {"found": error.found, "hint": error.hint}
 
 
 def write_proposal(found: Inspection, path: Path, *, force: bool = False) -> Path:
     """Write the proposed mapping; raises MappingError when nothing was recognised at all, ArtifactError when the file exists."""
     if not found.inventory.channels:
-        raise MappingError(
-            f"nothing in `{found.inventory.path}` can be mapped",
-            found="no columns and no topics",
-            hint="check that this is the log you meant",
-        )
+        what, hint = f"nothing in `{found.inventory.path}` can be mapped", "check that this is the log you meant"
+        raise MappingError(what, found="no columns and no topics", hint=hint)
     return write_text(path, found.yaml(), force=force)
 
 
 def _line(item: dict[str, Any]) -> str:
-    """Return one signal's source on one line of YAML; a name that YAML would parse as another type is quoted."""
-    return "{" + ", ".join(f"{key}: {_scalar(value)}" for key, value in item.items()) + "}"
-
-
-def _scalar(value: Any) -> str:
-    if isinstance(value, list):
-        return "[" + ", ".join(_scalar(part) for part in value) + "]"
-    if isinstance(value, dict):
-        return _line(value)
-    text = str(value)
-    return (
-        text
-        if isinstance(value, (int, float)) or (_PLAIN.match(text) and text.lower() not in _RESERVED)
-        else one_line(json.dumps(text, ensure_ascii=False))  # YAML reads these escapes too
-    )
+    """Return one signal's source on one line of YAML, which takes JSON; a word needs no quotes, unless YAML parses it."""
+    return one_line(_QUOTED_WORD.sub(r"\1", json.dumps(item, ensure_ascii=False)))
 
 
 def shown_channels(channel: ChannelInfo) -> Iterator[ShownChannel]:
@@ -197,7 +181,7 @@ def way_in(path: Path, run: Run, notes: Iterable[Note], plain: Importer) -> WayI
     if longest <= MAX_GAP_S and not any(n.code in LEFT_OUT for n in notes):
         return WayIn()
     refusal: FieldsidError | None = None
-    is_worth_salvaging = _share_kept(notes) >= WORTH_SALVAGING
+    is_worth_salvaging = _share_kept(notes) >= MOSTLY
     for options, importer in _importers(plain, round(longest + 0.1, 1), salvaging=is_worth_salvaging):
         try:
             importer.read(path)

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from fieldsid.display import Brief
 from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs.channels import ChannelMap, Source, TableForm
-from fieldsid.logs.few_of import few_of
+from fieldsid.logs.few_of import MOSTLY, few_of
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN, not_a_log
 from fieldsid.numerics.arrays import FloatArray
@@ -29,12 +29,14 @@ DEFINED = "message"
 """The kind of a topic whose fields the format defines, so that their meaning is not guessed from names."""
 MOST_CHANNELS = 5000
 """Largest number of channels of a log that are inspected, twice those of a glider; the others are only counted."""
+SAMPLED = 100_000
+"""Rows of a table that are in memory as text at once, and that are examined to guess the mapping."""
 TABLE = "table"
 """The kind of a topic that is a separate file, whose fields are its columns."""
+MOST_DEVICES = 32
+"""Largest number of servos, motors and the like of one kind; names or a field with more are of no devices."""
 JOINED = "several_tables"
 """The reader of a run in several tables."""
-WORTH_SALVAGING = 0.5
-"""Smallest readable share of a damaged log at which a hint offers to salvage it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +89,12 @@ def span_of(values: npt.NDArray[Any]) -> tuple[float, float] | None:
         return None
     seen = values[np.isfinite(values)]
     return (float(seen.min()), float(seen.max())) if seen.size else None
+
+
+def rate_of(time: FloatArray) -> float:
+    """Return the rate in Hz of increasing stamps (n,) in s: the inverse of their median step; NaN where that is none."""
+    step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
+    return 1.0 / step if step > 0.0 else float("nan")
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,8 +169,12 @@ class ReadOptions:
         return f"`{self.command} {option} -o imported/`"
 
     def salvaging(self, words: str, left: float) -> str:
-        """Return the hint to salvage a log of which the share `left` is readable; empty where that is below WORTH_SALVAGING."""
-        return f"{words}: {self.with_option('--salvage')}" if left >= WORTH_SALVAGING else ""
+        """Return the hint to salvage a log of which the share `left` is readable; empty where most of it is not."""
+        return f"{words}: {self.with_option('--salvage')}" if left >= MOSTLY else ""
+
+
+AS_IT_IS = ReadOptions()
+"""The options of a reading that accepts no damage."""
 
 
 def never_canonical(path: Path, options: ReadOptions) -> ChannelMap | None:

@@ -52,6 +52,8 @@ SIGNALS: Mapping[str, str] = MappingProxyType(
 """Canonical signal names and their units; `thrust` may be in any unit."""
 FINS = ("rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad")
 """The commanded and the measured fin angles."""
+MEASURED_FIN: Mapping[str, str] = MappingProxyType(dict(zip(FINS[:2], FINS[2:], strict=True)))
+"""The measured angle of each commanded one."""
 MOTORS = ("thrust", "thrust_ratio", "propeller_rpm")
 """The signals of the propulsion, commanded or measured; no estimate depends on their scale."""
 PART = "["

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -18,7 +19,7 @@ COPY_AGAIN = "where the vehicle's own file is larger, copy it again"
 
 ULOG = b"ULog\x01\x12\x35"
 DATAFLASH = b"\xa3\x95\x80"
-ULOG_HEADER = 16
+ULOG_HEADER = struct.calcsize("<7sBQ")
 """Bytes of a ULog file's header: signature, version and time of the start."""
 NO_READER = ", for which no reader is installed"
 FOREIGN: Mapping[bytes, tuple[str, str]] = MappingProxyType(

@@ -25,7 +25,7 @@ from fieldsid.logs.inspection import inspect_log
 from fieldsid.logs.readers._mat_elements import arrays_of
 from fieldsid.logs.readers._unpacked import SMALL, UnpackedSize
 from fieldsid.logs.readers.bags.messages.definitions import _parsed
-from fieldsid.logs.readers.bags.messages.message_layout import refuse_endless
+from fieldsid.logs.readers.bags.messages.message_layout import Decoder
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import load_model
 from fieldsid.online.progress import Watch, default_goals
@@ -231,8 +231,8 @@ RULE = "\n" + "=" * 80 + "\n"
     ids=["itself", "by another", "wide", "deep"],
 )
 def test_a_message_type_without_end_is_refused(definition):
-    with pytest.raises(LogError, match=r"holds itself|is none that is recorded"):
-        refuse_endless(_parsed(definition, "a/msg/B", "msg"), "a/msg/B")
+    with pytest.raises(LogError, match="holds itself|is none that is recorded|does not fit its messages"):
+        Decoder(_parsed(definition, "a/msg/B", "msg"), "a/msg/B", cdr=False).layout(b"\1\0\0\0" * 100)
 
 
 @pytest.mark.parametrize(

@@ -12,28 +12,20 @@ import numpy.typing as npt
 from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs.channels import Source
 from fieldsid.logs.convert.conditioning import in_order
-from fieldsid.logs.convert.times.clock_parts import MOSTLY
 from fieldsid.logs.convert.times.clock_text import DAY_S, clock_of_text
 from fieldsid.logs.convert.times.time_column import YEARS_S, likely_time_unit
+from fieldsid.logs.few_of import MOSTLY, NEARLY_ALL
 from fieldsid.logs.mapping.canonical_names import unit_in_name, words_of
-from fieldsid.logs.mapping.vocabulary import TIME
+from fieldsid.logs.mapping.vocabulary import TIME, word_set
 from fieldsid.logs.mapping.word_meaning import meaning_of
-from fieldsid.logs.reader import ReadOptions
+from fieldsid.logs.reader import ReadOptions, rate_of
 from fieldsid.logs.readers._clock_columns import clocks_in_parts, dates_beside, elapsed
 from fieldsid.logs.readers._columns import Columns, is_counter, time_of
 from fieldsid.logs.run import Note, origin_of
 from fieldsid.numerics.arrays import FloatArray
 
-REGULAR = 0.5
-"""Largest ratio of standard deviation to mean of the steps at which a column without a known name may be the time."""
-OF_WEEK = (
-    frozenset({"tow"}),
-    frozenset({"itow"}),
-    frozenset({"gms"}),
-    frozenset({"week", "seconds"}),
-    frozenset({"week", "time"}),
-)
-WEEKS = frozenset({"week", "wn", "wk", "gwk", "gpsweek"})
+OF_WEEK = tuple(map(word_set, ("tow", "itow", "gms", "week seconds", "week time")))
+WEEKS = word_set("week wn wk gwk gpsweek")
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +51,7 @@ class Clock:
         import pandas as pd
 
         there = ~np.asarray(pd.isna(cells)) & np.isfinite(self.time)
-        steps = np.diff(self.time[there])
-        return 1.0 / float(np.median(steps)) if steps.size else float("nan")
+        return rate_of(self.time[there])
 
 
 def clock_of(columns: Columns, known: Source | None) -> Clock | None:
@@ -135,7 +126,7 @@ def _clock_from(columns: Columns, source: Source) -> Clock | None:
     except FieldsidError:  # the column is no time
         return None
     steps = np.diff(time[np.isfinite(time)])
-    return Clock(time, source, origin_s=origin_of(notes)) if steps.size and bool((steps > 0.0).mean() > MOSTLY) else None
+    return Clock(time, source, origin_s=origin_of(notes)) if steps.size and bool((steps > 0.0).mean() > NEARLY_ALL) else None
 
 
 def _by_numbers(columns: Columns) -> Clock | None:
@@ -163,7 +154,7 @@ def _even_clocks(columns: Columns) -> Iterator[Clock]:
         steps = np.diff(clock.time[np.isfinite(clock.time)])
         # seconds since 1970 are a time even if the steps are uneven, because the logger paused
         is_epoch = cells.dtype.kind in "iuf" and bool(((cells > YEARS_S[0]) & (cells < YEARS_S[1])).all())
-        if is_epoch or float(np.std(steps)) < REGULAR * float(np.mean(steps)):
+        if is_epoch or float(np.std(steps)) < MOSTLY * float(np.mean(steps)):
             yield replace(clock, notes=_note_of_guess(name, clock.source.unit)) if name else clock
 
 

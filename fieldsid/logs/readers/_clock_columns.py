@@ -17,44 +17,43 @@ from fieldsid.logs.convert.number_cells import as_numbers
 from fieldsid.logs.convert.times.clock_parts import PARTS, PLUS, carries, seconds_of_part
 from fieldsid.logs.convert.times.clock_text import DAY_S, MINUTE_S, clock_of_text
 from fieldsid.logs.convert.times.dates import days_of_columns
+from fieldsid.logs.convert.units import SPELLINGS
 from fieldsid.logs.mapping.canonical_names import words_of
-from fieldsid.logs.mapping.vocabulary import TIME
+from fieldsid.logs.mapping.vocabulary import TIME, word_set
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.readers._columns import Columns
 from fieldsid.numerics.arrays import FloatArray
 
+UNITS_OF_PARTS = {"ss": "s", "ms": "ms", "us": "us", "ns": "ns", "mm": "min", "hh": "h", "yearday": "d"}
+"""Unit of a column that has the name of a part of a clock, but never starts again from zero."""
 NAMES_OF_PARTS: Mapping[str, frozenset[str]] = MappingProxyType(
     {
-        "year": frozenset({"year", "years", "yr", "yyyy", "yy", "y", "jahr"}),
-        "month": frozenset({"month", "months", "mon", "mo", "mm", "m", "monat"}),
-        "day": frozenset({"day", "days", "dd", "dy", "d", "tag"}),
-        "yearday": frozenset({"doy", "yday", "jday", "yearday", "jd", "ddd"}),
-        "hh": frozenset({"hour", "hours", "hr", "hrs", "hh", "h", "stunde", "stunden"}),
-        "mm": frozenset({"minute", "minutes", "min", "mins", "mn", "mi", "mm", "m", "minuten"}),
-        "ss": frozenset({"second", "seconds", "sec", "secs", "ss", "s", "sekunde", "sekunden"}),
-        "ds": frozenset({"decisecond", "deciseconds", "tenth", "tenths"}),
-        "cs": frozenset({"centisecond", "centiseconds", "centi", "hundredth", "hundredths", "hsec", "csec"}),
-        "ms": frozenset({"millisecond", "milliseconds", "millisec", "millis", "milli", "msec", "msecs", "ms"}),
-        "us": frozenset({"microsecond", "microseconds", "microsec", "micros", "micro", "usec", "usecs", "us"}),
-        "ns": frozenset({"nanosecond", "nanoseconds", "nanosec", "nanosecs", "nanos", "nano", "nsec", "nsecs", "ns"}),
-        "hhmm": frozenset({"hhmm"}),
-        "hhmmss": frozenset({"hhmmss"}),
+        "year": word_set("year years yr yyyy yy y jahr"),
+        "month": word_set("month months mon mo mm m monat"),
+        "day": word_set("day days dd dy d tag"),
+        "yearday": word_set("doy yday jday yearday jd ddd"),
+        "ds": word_set("decisecond deciseconds tenth tenths"),
+        "cs": word_set("centisecond centiseconds centi hundredth hundredths hsec csec"),
+        "hhmm": word_set("hhmm"),
+        "hhmmss": word_set("hhmmss"),
     }
-)
+    | {
+        part: word_set(also).union(text for text, unit in SPELLINGS["time"].items() if unit.name == UNITS_OF_PARTS[part])
+        for part, also in (
+            ("hh", "hh stunde stunden"), ("mm", "mm m mn mi minuten"), ("ss", "ss sekunde sekunden"), ("ms", "milli"),
+            ("us", "micro"), ("ns", "nano"),
+        )
+    }
+)  # fmt: skip
 """Names of the parts of a date and a clock; a month and a minute may have the same name."""
-IGNORED_WORDS = frozenset({
-    "time", "timestamp", "stamp", "header", "clock", "utc", "gps", "gnss", "gmt", "rtc", "local", "log", "pc", "unix", "unixtime",
-    "epoch", "posix",
-})  # fmt: skip
+IGNORED_WORDS = word_set("time timestamp stamp header clock utc gps gnss gmt rtc local log pc unix unixtime epoch posix")
 """Words that a name may contain in addition to the name of a part."""
-DATES = frozenset({"date", "datum", "day", "yyyymmdd", "ddmmyy", "ddmmyyyy", "yymmdd"})
+DATES = word_set("date datum day yyyymmdd ddmmyy ddmmyyyy yymmdd")
 """Words in the name of a column of dates."""
 FRACTIONS = ("ms", "us", "ns", "cs", "ds")
 """Parts that may be the fraction of whole seconds."""
 UPPERS = ("hhmm", "mm", "hh")
 """Parts that may count the periods of the parts below them."""
-UNITS_OF_PARTS = {"ss": "s", "ms": "ms", "us": "us", "ns": "ns", "mm": "min", "hh": "h", "yearday": "d"}
-"""Unit of a column that has the name of a part of a clock, but never starts again from zero."""
 _BEHIND = re.compile(r"[\[(].*|[ _]of[ _].*", re.IGNORECASE)
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 

@@ -15,23 +15,17 @@ from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ATTITUDE, COMBINED, ChannelMap, Source
 from fieldsid.logs.convert.number_cells import as_numbers
 from fieldsid.logs.convert.times.time_column import seconds_of, seconds_of_parts
-from fieldsid.logs.few_of import few_of
+from fieldsid.logs.few_of import FEW, few_of
 from fieldsid.logs.mapping.canonical_names import Canonical, canonical, stated_unit, unit_in_name, words_of
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
-from fieldsid.logs.reader import RawLog, ReadOptions, Samples, Series
+from fieldsid.logs.reader import SAMPLED, RawLog, ReadOptions, Samples, Series
 from fieldsid.logs.run import FINS, Note
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
 
 LOOKED_AT = 200
-FEW_WORDS = 0.05
-"""Largest share of words, among the first cells of a column and among all, at which the column counts as numbers."""
-SHOWN = 100
-"""Number of column names that a message lists."""
-SAMPLED = 100_000
-"""Largest number of rows of a table whose numbers are examined to guess the mapping."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +61,7 @@ class Columns:
 
     def shown(self) -> str:
         """Return the names of the columns for a message; where there are many, only the first ones."""
-        more = f", ... {self.width - SHOWN} more" if self.width > SHOWN else ""
-        return ", ".join(self.names[:SHOWN]) + more if self.names else f"{self.width} columns without names"
+        return few_of(self.names) or f"{self.width} columns without names"
 
     def name(self, index: int) -> str:
         """Return a column's name, or its index as text."""
@@ -89,14 +82,14 @@ class Columns:
 
 
 def numbers_mostly(cells: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Return cells (n,) as numbers, with NaN for words among them, if nearly all are numbers; else return the cells unchanged."""
+    """Return cells (n,) as numbers, with NaN for words, if FEW are words, of the first ones too; else the cells unchanged."""
     if cells.dtype.kind != "O":
         return cells
     seen = [c for c in cells[:LOOKED_AT].tolist() if isinstance(c, str)]
-    if as_numbers(np.array(seen, dtype=object))[1].size > FEW_WORDS * len(seen):
+    if as_numbers(np.array(seen, dtype=object))[1].size > FEW * len(seen):
         return cells
     values, wrong = as_numbers(cells)
-    return values if wrong.size <= FEW_WORDS * cells.size else cells
+    return values if wrong.size <= FEW * cells.size else cells
 
 
 def samples_of(columns: Columns, time: FloatArray, source: Source) -> Samples:

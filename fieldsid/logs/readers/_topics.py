@@ -27,6 +27,7 @@ from fieldsid.logs.reader import (
     Reader,
     ReadOptions,
     Series,
+    rate_of,
     span_of,
 )
 from fieldsid.logs.run import Note
@@ -37,8 +38,6 @@ from fieldsid.registry import near
 
 DATA = "data"
 """Name of the field of a topic that is a single number."""
-MOST_DEVICES = 32
-"""Largest number of servos, motors and the like in one kind of message or table; a field with more values names no devices."""
 Means = Mapping[str, tuple[str, Mapping[str, Any]]]
 """Signals by the definition of a format: by `topic.field`, the signal and the keys of a mapping with which it is read."""
 
@@ -135,9 +134,7 @@ def _channel(name: str, topic: Topic, means: Means, kind: str) -> ChannelInfo:
     fields += [
         FieldInfo(p, "numbers", (), None, m) for p, m in several.items() if all(part in topic.fields for part in p.split(", "))
     ]
-    steps = np.diff(topic.time)
-    rate = 1.0 / float(np.median(steps)) if steps.size and float(np.median(steps)) > 0.0 else float("nan")
-    return ChannelInfo(name, kind, int(topic.time.size), rate, tuple(fields), topic.unit)
+    return ChannelInfo(name, kind, int(topic.time.size), rate_of(topic.time), tuple(fields), topic.unit)
 
 
 def _not_empty(path: Path, log: Topics) -> dict[str, Topic]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
@@ -19,7 +20,8 @@ from fieldsid.logs.unknown_file import DATAFLASH, head_of, unreadable
 
 MAVLINK = (0xFE, 0xFD)
 """First byte of a packet in either version of the protocol; in a .tlog it follows eight bytes of time."""
-FORMAT, FORMAT_LENGTH = 128, 89
+FORMAT, FORMAT_LENGTH = 128, struct.calcsize("<3sBB4s16s64s")
+"""Kind of the message that defines another, and its bytes: head, kind, length, name, types and columns."""
 PARAMETERS = {"PARM": ("Name", "Value"), "PARAM_VALUE": ("param_id", "param_value")}
 """Messages of the vehicle's parameters, with the fields of their name and value."""
 TEXT = re.compile(rb"^FMT, ?128,", re.MULTILINE)

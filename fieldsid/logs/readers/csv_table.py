@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.reader import ReadOptions
+from fieldsid.logs.reader import SAMPLED, ReadOptions
 from fieldsid.logs.readers._cells import ERRORS, MISSING, SENTENCE, cells, has_number, is_word
 from fieldsid.logs.readers._columns import Columns, used_by
 from fieldsid.logs.readers._plain_text import HEAD, PlainText, plain_text
@@ -29,8 +29,6 @@ NUMBERS = "fiub"
 
 
 _LINE = re.compile(r"line (\d+)")
-BLOCK_ROWS = 100_000
-"""Rows that are read at once: few enough that the text of a block takes little memory compared with the columns."""
 
 
 def sniff(path: Path) -> bool:
@@ -217,7 +215,7 @@ class _Table:
             "encoding_errors": "replace",
             "on_bad_lines": "skip" if self.options.salvage else "error",
             "low_memory": False,
-            "chunksize": BLOCK_ROWS,
+            "chunksize": SAMPLED,
             **_exact(version),
         }
 

@@ -30,8 +30,6 @@ from fieldsid.numerics.arrays import FloatArray
 KEYS = frozenset({"key", "name", "variable", "signal", "topic", "field", "channel", "parameter", "path", "tag", "entry"})
 VALUES = frozenset({"value", "val", "data", "reading"})
 """Words in the name of the column of keys, and in that of the column of values."""
-FEWEST, OFTEN = 2, 3
-"""Smallest number of keys, and smallest average number of rows of a key."""
 
 
 def sniff(path: Path) -> bool:
@@ -58,7 +56,7 @@ def _places(form: Form, head: str) -> tuple[int, int, int] | None:
     for time, key, value in ((t, k, v) for t in times for k in keys for v in values if k != v):
         tags = [row[key] for row in rows]
         are_words = all(is_word(word, form.decimal) for word in tags)
-        if are_words and FEWEST <= len(set(tags)) <= len(tags) / OFTEN and any(not is_word(r[value], form.decimal) for r in rows):
+        if are_words and 1 < len(set(tags)) <= len(tags) / 3 and any(not is_word(r[value], form.decimal) for r in rows):
             return time, key, value
     return None
 

@@ -22,8 +22,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import LogError
-from fieldsid.logs.reader import ReadOptions
-from fieldsid.logs.readers._topics import MOST_DEVICES, Means, Topic, Topics, topic_of, topic_reader
+from fieldsid.logs.reader import MOST_DEVICES, ReadOptions
+from fieldsid.logs.readers._topics import Means, Topic, Topics, topic_of, topic_reader
 from fieldsid.logs.readers._unpacked import GZIP, gunzipped, inflated
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN, head_of, imc_order
@@ -84,7 +84,8 @@ def _numbers_of(message: ET.Element) -> tuple[tuple[str, str], ...]:
     return tuple(found)
 
 
-HEADER, FOOTER = 20, 2
+_HEAD = "HHHdHBHB"
+HEADER, FOOTER = struct.calcsize(f"<{_HEAD}"), struct.calcsize("<H")
 _STATE = {
     "psi": ("yaw_rad", "rad"), "theta": ("pitch_rad", "rad"), "phi": ("roll_rad", "rad"), "r": ("yaw_rate_rad_s", "rad/s"),
     "q": ("pitch_rate_rad_s", "rad/s"), "p": ("roll_rate_rad_s", "rad/s"), "u": ("surge_m_s", "m/s"), "v": ("sway_m_s", "m/s"),
@@ -116,7 +117,7 @@ Kinds = dict[tuple[int, int, int, int], list[int]]
 
 def _find_messages(data: bytes, order: str) -> tuple[Kinds, int, int]:
     """Return the offsets of the messages of each kind, the number of damaged places, and the offset of the first one."""
-    head, by_kind = struct.Struct(f"{order}HHHdHBHB"), defaultdict(list)
+    head, by_kind = struct.Struct(order + _HEAD), defaultdict(list)
     sync, at, damaged, first, buffer = data[:2], 0, 0, -1, np.frombuffer(data, np.uint8)
     while at >= 0 and at + HEADER + FOOTER <= len(data):
         _, kind, size, _, source, entity, _, _ = head.unpack_from(data, at)

@@ -26,7 +26,7 @@ from fieldsid.records.reading import read_json
 
 MAGIC = b"PAR1"
 METADATA_KEY = b"fieldsid"
-NUMBER_BYTES = 8
+NUMBER_BYTES = np.dtype(np.float64).itemsize
 LIST_CELLS = 3
 """Number of cells that are read of a column of lists."""
 AGAIN = "import the log again, with `--force`"

@@ -18,15 +18,15 @@ from fieldsid.errors import LogError
 from fieldsid.logs.channels import ATTITUDE, ChannelMap, TableForm, is_enough
 from fieldsid.logs.convert.times.clock_text import FEW_STEPS
 from fieldsid.logs.convert.times.time_column import EPOCH_FROM_S
-from fieldsid.logs.few_of import few_of
+from fieldsid.logs.few_of import MOSTLY, few_of
 from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.guesses import quaternion_of
 from fieldsid.logs.mapping.vocabulary import TIME
-from fieldsid.logs.reader import JOINED, TABLE, Inventory, RawLog, Reader, ReadOptions, reader_of
+from fieldsid.logs.reader import JOINED, MOST_DEVICES, TABLE, Inventory, RawLog, Reader, ReadOptions, reader_of
 from fieldsid.logs.readers._clock import Clock, clock_of
 from fieldsid.logs.readers._columns import Columns, canonical_sources, numbers_mostly
 from fieldsid.logs.readers._tables_of_run import names_in_run, run_of, runs_in
-from fieldsid.logs.readers._topics import MOST_DEVICES, Means, Topic, Topics, inventory_of, raw_log_of, topic_of, wanted_by
+from fieldsid.logs.readers._topics import Means, Topic, Topics, inventory_of, raw_log_of, topic_of, wanted_by
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import name_of_run
 from fieldsid.numerics.arrays import FloatArray
@@ -221,8 +221,6 @@ DEVICE_WORDS = frozenset({
     "number", "no", "nr",
 })  # fmt: skip
 """Words in the name of a column that identifies the device."""
-IN_TURN = 0.5
-"""Smallest share of rows whose device differs from that of the row before, in a table in which devices alternate."""
 
 
 def devices_of(columns: Columns) -> dict[str, Columns]:
@@ -240,8 +238,8 @@ def devices_of(columns: Columns) -> dict[str, Columns]:
 
 
 def _rows_by_device(cells: npt.NDArray[Any]) -> dict[str, npt.NDArray[np.bool_]]:
-    """Return a mask (n,) of the rows of each device named in cells (n,); empty where the cells do not name devices."""
-    if cells.size < 2 or float(np.mean(cells[1:] != cells[:-1])) < IN_TURN:
+    """Return a mask (n,) of the rows of each device named in cells (n,), which alternate mostly; empty where they name none."""
+    if cells.size < 2 or float(np.mean(cells[1:] != cells[:-1])) < MOSTLY:
         return {}
     if cells.dtype.kind == "f" and not bool((cells == np.round(cells)).all()):
         return {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from fieldsid.logs.readers._topics import Means, Topics, library, silenced, topi
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import ULOG, ULOG_HEADER, head_of, unreadable
 
-MESSAGE_HEADER = 3
+MESSAGE_HEADER = struct.calcsize("<HB")
 """Bytes before a message's body: its length and its type."""
 MEANS: Means = {
     "vehicle_attitude.q[0], q[1], q[2], q[3]": ("attitude", {"order": "wxyz"}),

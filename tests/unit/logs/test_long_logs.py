@@ -37,7 +37,7 @@ def write_table(path, last="0.5"):
 def test_a_table_is_the_same_in_blocks_of_any_size(tmp_path, monkeypatch, rows):
     path = write_table(tmp_path / "run.csv")
     at_once, listed = load_run(path), csv_table.READER.inventory(path, ReadOptions(), TableForm())
-    monkeypatch.setattr(csv_table, "BLOCK_ROWS", rows)
+    monkeypatch.setattr(csv_table, "SAMPLED", rows)
     run = load_run(path)
     np.testing.assert_array_equal(run.time, at_once.time)
     for signal in at_once.signals:
@@ -54,7 +54,7 @@ def test_a_table_is_the_same_in_blocks_of_any_size(tmp_path, monkeypatch, rows):
 
 @pytest.mark.parametrize("rows", [7, 1000])
 def test_a_word_in_the_last_block_is_told_by_its_row(tmp_path, monkeypatch, rows):
-    monkeypatch.setattr(csv_table, "BLOCK_ROWS", rows)
+    monkeypatch.setattr(csv_table, "SAMPLED", rows)
     path = write_table(tmp_path / "run.csv", last="fault")
     with pytest.raises(csv_table.LogError, match="cells that are no numbers") as error:
         load_run(path)
@@ -68,7 +68,7 @@ def test_the_cells_of_a_table_cannot_be_changed(tmp_path):
 
 @pytest.mark.parametrize("kind", ["csv", "csv.gz", *KINDS])
 def test_the_share_that_was_read_is_told_and_ends_at_all(tmp_path, monkeypatch, kind):
-    monkeypatch.setattr(csv_table, "BLOCK_ROWS", 10)
+    monkeypatch.setattr(csv_table, "SAMPLED", 10)
     monkeypatch.setattr(packets, "SETTLE_BYTES", 1 << 12)
     monkeypatch.setattr(mcap, "SETTLE_BYTES", 1 << 12)
     mapping = mapping_of(MAPPING)
@@ -119,7 +119,7 @@ def test_a_bar_on_a_terminal_moves_inside_a_log(monkeypatch):
 def test_an_inspection_tells_its_share_too(tmp_path, monkeypatch):
     from fieldsid.logs.inspection import inspect_log
 
-    monkeypatch.setattr(csv_table, "BLOCK_ROWS", 10)
+    monkeypatch.setattr(csv_table, "SAMPLED", 10)
     told = []
     inspect_log(write_table(tmp_path / "log.csv"), progress=told.append)
     assert len(told) >= 20

@@ -11,7 +11,7 @@ import numpy as np
 
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ChannelMap, Source, Stamp
-from fieldsid.logs.reader import MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, RawLog, ReadOptions, span_of
+from fieldsid.logs.reader import MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, RawLog, ReadOptions, rate_of, span_of
 from fieldsid.logs.readers._topics import topic_name
 from fieldsid.logs.readers.bags.messages.definitions import DefinitionSearch, decoder_of
 from fieldsid.logs.readers.bags.messages.message_layout import Decoder
@@ -102,9 +102,7 @@ class Contents:
     def _channel(self, connection: Connection, packets: TopicPackets) -> ChannelInfo:
         known = self.topics.get(connection.topic, _Topic())
         fields = tuple(FieldInfo(p, type(v).__name__, (v,), known.spans.get(p)) for p, v in known.first.items())
-        steps = np.diff(np.sort(np.frombuffer(packets.stamps, dtype=np.int64)))
-        period = float(np.median(steps)) / 1e9 if steps.size else 0.0
-        rate = 1.0 / period if period > 0.0 else float("nan")
+        rate = 1e9 * rate_of(np.sort(np.frombuffer(packets.stamps, dtype=np.int64)))
         return ChannelInfo(connection.topic, connection.type_name, len(packets.stamps), rate, fields)
 
 
@@ -147,13 +145,12 @@ def check_not_empty(path: Path, collector: Collector) -> None:
         next((n.message for n in collector.notes if n.code in ("truncated", "damaged")), ""),
         ", ".join(sorted(known)),
     )
-    if damage or not known:
-        what = "holds no message that can be read" if known else "has no messages"
-        found = f"{damage}; topics {topics}" if known else damage or "no topics"
-        raise LogError(f"`{path}` {what}", found=found, hint=COPY_AGAIN)
-    what = "has no messages" if wanted is None else "has no messages on the mapped topics"
+    if not known:
+        raise LogError(f"`{path}` has no messages", found=damage or "no topics", hint=COPY_AGAIN)
+    if damage:
+        raise LogError(f"`{path}` holds no message that can be read", found=f"{damage}; topics {topics}", hint=COPY_AGAIN)
     hint = "check that the recorder ran: its topics and their types are all that is in the file"
-    raise LogError(f"`{path}` {what}", found=topics, hint=hint)
+    raise LogError(f"`{path}` has no messages{' on the mapped topics' * (wanted is not None)}", found=topics, hint=hint)
 
 
 def _topic(path: Path, collector: Collector, signal: str, source: Source) -> None:
@@ -183,15 +180,13 @@ def _notes_of_delay(topics: list[TopicSeries], requested: Stamp | None) -> list[
 
     Raises MappingError where the delay is so large that the stamps must be of two clocks.
     """
-    late: dict[str, float] = {}
-    receive = False
-    for topic in topics:
-        for source in topic.sources.values():
-            by_header = topic.header is not None and topic.stamps(source, requested) is topic.header
-            receive |= not by_header
-            if topic.header is not None and by_header:
-                late[topic.connection.topic] = float(np.median(topic.received - topic.header)) / 1e9
-    if not late or not receive:
+    by_header = {t.connection.topic: [t.stamps(s, requested) is t.header for s in t.sources.values()] for t in topics}
+    late = {
+        t.connection.topic: float(np.median(t.received - t.header)) / 1e9
+        for t in topics
+        if t.header is not None and any(by_header[t.connection.topic])
+    }
+    if not late or all(map(all, by_header.values())):
         return []
     worst = max(late, key=lambda t: abs(late[t]))
     if abs(late[worst]) > LATE_S:

@@ -8,19 +8,22 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
+from fieldsid.logs.convert.times.clock_text import DAY_S
 from fieldsid.logs.readers._unpacked import UnpackedSize
 from fieldsid.logs.run import Note
 
 ROS1, CDR = "ros1", "cdr"
 """Serializations that can be decoded."""
 
-LAST_NS = (1 << 63) - 1
+LAST_NS = int(np.iinfo(np.int64).max)
 """Largest stamp that is a signed 64-bit number; a larger stamp is damaged."""
 
 MOST_PLACES_NOTED = 5
 """Number of damaged places with a note each; the others are only counted."""
 
-DAY_NS = 86_400 * 1_000_000_000
+DAY_NS = int(DAY_S * 1e9)
 
 SETTLE_BYTES = 1 << 23
 """Bytes of a file after which the waiting payloads are settled: enough for decoding in blocks, little compared with 500 MiB."""

@@ -16,8 +16,6 @@ from rosbags.typesys import Stores, get_typestore
 from fieldsid.errors import ArtifactError
 from fieldsid.numerics.arrays import FloatArray
 
-NANOSECONDS = 1_000_000_000
-
 
 def write_commands(
     path: Path,
@@ -63,7 +61,7 @@ def _fill(path: Path, time: FloatArray, commands: Mapping[str, FloatArray], auto
         writer.write(abort, 0, bytes(store.serialize_cdr(string(data=conditions), string.__msgtype__)))
         values = [v.tolist() for v in commands.values()]
         for t, is_steering, *angles in zip(time.tolist(), autopilot.tolist(), *values, strict=True):
-            stamp = round(t * NANOSECONDS)
+            stamp = round(t * 1e9)
             for command, angle in zip(fins, angles, strict=True):
                 writer.write(command, stamp, bytes(store.serialize_cdr(float64(data=angle), float64.__msgtype__)))
             writer.write(pilot, stamp, bytes(store.serialize_cdr(boolean(data=bool(is_steering)), boolean.__msgtype__)))

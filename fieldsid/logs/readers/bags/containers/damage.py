@@ -12,9 +12,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from struct import Struct
 
 from fieldsid.logs.readers.bags.containers.decompress import unpacked
-from fieldsid.logs.readers.bags.packets import LAST_NS, Collector, TopicPackets
+from fieldsid.logs.readers.bags.packets import LAST_NS, Collector, Connection, TopicPackets
 
 Bytes = bytes | mmap.mmap
 CHAIN = 3
@@ -130,6 +131,17 @@ class Records(ABC):
         else:
             self.collector.damaged_at(f"{stop - pos} bytes", pos)
         return stop
+
+    def connect(self, number: int, connection: Connection) -> None:
+        """Register the connection of a number of the file."""
+        self.topics[number] = connection.topic
+        self.by_number[number] = self.collector.connect(connection)
+
+    def expect(self, counts: bytes, entry: Struct) -> None:
+        """Add the numbers of messages that an index states, in entries of a connection's number and its count."""
+        for number, count in entry.iter_unpack(counts[: len(counts) - len(counts) % entry.size]):
+            if number in self.topics:
+                self.collector.expect(self.topics[number], count)
 
     def leave_out_last(self) -> None:
         """Remove the last message, if it still waits."""

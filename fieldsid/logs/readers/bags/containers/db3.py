@@ -25,8 +25,6 @@ DAMAGE = (sqlite3.DatabaseError, MemoryError, UnicodeDecodeError)
 """Errors that SQLite raises on a damaged file; MemoryError for a damaged length, UnicodeDecodeError for damaged text."""
 NO_MESSAGE = (KeyError, TypeError, OverflowError)
 """Errors for a row whose topic is unknown, whose stamp is no integer of 64 bits, or that has no data."""
-FIRST_ID = 0
-"""Id below those of all messages, which count from 1."""
 MAPPED_BYTES = 1 << 24
 """Number of bytes of a file that SQLite maps to memory, which is a tenth faster than reading by calls."""
 _LANGUAGES = {"ros2msg": "msg", "ros2idl": "idl"}
@@ -136,12 +134,12 @@ class _Rows:
             "SELECT id, topic_id, timestamp, CAST(data AS BLOB) FROM messages WHERE id >= ? "  # noqa: S608 - marks only
             f"AND (topic_id NOT IN ({marks}) OR typeof(topic_id) <> 'integer') ORDER BY id"
         )
-        self.last: tuple[int, TopicPackets | None] = (FIRST_ID, None)
+        self.last: tuple[int, TopicPackets | None] = (0, None)  # messages count from 1
         self.no_messages = 0
 
     def read(self) -> None:
         """Read all rows that can be read."""
-        start: int | None = FIRST_ID
+        start: int | None = 0
         while start is not None:
             try:
                 self._read_from(start)
@@ -154,7 +152,7 @@ class _Rows:
 
     def _read_from(self, start: int) -> None:
         rows = self.base.execute(self.query, (start, *self.unwanted))
-        if start != FIRST_ID:
+        if start:
             self._skip_a_message(rows)
         while not self._collect_rows(rows):
             self.no_messages += 1

@@ -10,7 +10,8 @@ repeats schemas and channels and counts the messages; it is used if it exists.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from enum import IntEnum
 from pathlib import Path
 from struct import Struct, error
 from types import MappingProxyType
@@ -20,11 +21,22 @@ from fieldsid.logs.readers.bags.containers.damage import Bytes, ChunkHead, Place
 from fieldsid.logs.readers.bags.packets import LAST_NS, SETTLE_BYTES, Collector, Connection
 
 MAGIC = b"\x89MCAP0\r\n"
-FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, STATISTICS, DATA_END = 2, 3, 4, 5, 6, 7, 11, 15
-LEAST: Mapping[int, int] = MappingProxyType({
-    1: 8, FOOTER: 20, SCHEMA: 14, CHANNEL: 16, MESSAGE: 22, CHUNK: 40, MESSAGE_INDEX: 6, 8: 60, 9: 36, 10: 40, STATISTICS: 46,
-    12: 8, 13: 20, 14: 17, DATA_END: 4,
-})  # fmt: skip
+
+
+class Op(IntEnum):
+    """The opcodes of the records that are read."""
+
+    FOOTER = 2
+    SCHEMA = 3
+    CHANNEL = 4
+    MESSAGE = 5
+    CHUNK = 6
+    MESSAGE_INDEX = 7
+    STATISTICS = 11
+    DATA_END = 15
+
+
+LEAST = dict(enumerate((8, 20, 14, 16, 22, 40, 6, 60, 36, 40, 46, 8, 20, 17, 4), start=1))
 """The shortest body of each record."""
 OWN_OPS = 0x80
 """Records with this opcode or a higher one are private to an application and may have any content."""
@@ -59,12 +71,16 @@ class _Records(Records):
         super().__init__(collector)
         self.schemas: dict[int, tuple[str, str, str]] = {}
         self.done = False
-        self.takers = {SCHEMA: self._schema, CHANNEL: self._channel, STATISTICS: self._statistics}
+        self.takers: dict[int, Callable[[bytes], None]] = {
+            Op.SCHEMA: self._schema,
+            Op.CHANNEL: self._channel,
+            Op.STATISTICS: self._statistics,
+        }
 
     def summary(self, data: Bytes) -> None:
         """Read schemas, channels and counts from the summary at the end of a complete file."""
         footer = len(data) - len(MAGIC) - 29
-        if footer < len(MAGIC) or data[-len(MAGIC) :] != MAGIC or data[footer] != FOOTER:
+        if footer < len(MAGIC) or data[-len(MAGIC) :] != MAGIC or data[footer] != Op.FOOTER:
             return
         (pos,) = _U64.unpack_from(data, footer + 9)
         while len(MAGIC) <= pos < footer:
@@ -78,13 +94,13 @@ class _Records(Records):
 
     def run(self, data: Bytes, pos: int, end: int, place: Place) -> None:
         """Read the records from `pos` to `end`, continuing after damaged places."""
-        record, message, by_number = _RECORD.unpack_from, _MESSAGE.unpack_from, self.by_number
+        record, message, by_number, of_message = _RECORD.unpack_from, _MESSAGE.unpack_from, self.by_number, int(Op.MESSAGE)
         self.last = None
         settle_at = pos + SETTLE_BYTES if not place.chunk else end
         while pos < end and not self.done:
             op, length = record(data, pos) if pos + 9 <= end else (0, 0)
             stop = pos + 9 + length
-            if op == MESSAGE and length >= 22 and stop <= end:
+            if op == of_message and length >= 22 and stop <= end:
                 channel, _, stamp, _ = message(data, pos + 9)
                 if channel in by_number and stamp <= LAST_NS:
                     if pos > settle_at:
@@ -109,16 +125,16 @@ class _Records(Records):
         """
         if stop - pos - 9 < LEAST.get(op, 0) or (op not in LEAST and op < OWN_OPS):
             return False
-        if place.chunk and op not in (SCHEMA, CHANNEL):
+        if place.chunk and op not in (Op.SCHEMA, Op.CHANNEL):
             return False
-        if op != CHUNK:
+        if op != Op.CHUNK:
             self.last = None
-        if op in (SCHEMA, CHANNEL):
+        if op in (Op.SCHEMA, Op.CHANNEL):
             return self._is_parsed(op, bytes(data[pos + 9 : stop]))
-        if op == CHUNK:
+        if op == Op.CHUNK:
             return self._is_chunk(data, pos, stop, stop)
-        self.done = op == DATA_END
-        return op != MESSAGE
+        self.done = op == Op.DATA_END
+        return op != Op.MESSAGE
 
     def is_cut(self, data: Bytes, pos: int, end: int) -> bool:
         """Whether the record at `pos` is cut off by the end of the file; the rest of a chunk that is cut off is read."""
@@ -127,7 +143,7 @@ class _Records(Records):
         op, length = _RECORD.unpack_from(data, pos)
         if op not in LEAST or pos + 9 + length <= end:
             return False
-        return op != CHUNK or self._is_chunk(data, pos, end, pos + 9 + length)
+        return op != Op.CHUNK or self._is_chunk(data, pos, end, pos + 9 + length)
 
     def candidates(self, data: Bytes, pos: int, end: int) -> Iterator[int]:
         """Yield the offsets whose bytes may be the opcode and the length of a record."""
@@ -144,13 +160,13 @@ class _Records(Records):
         stop = int(pos + 9 + length)
         if stop > end or length < LEAST.get(op, length + 1):
             return None
-        if op == MESSAGE:
+        if op == Op.MESSAGE:
             channel, _, stamp, _ = _MESSAGE.unpack_from(data, pos + 9)
             low, high = (place.low, place.high) if place.chunk else self.near
             return stop if channel in self.by_number and low <= stamp <= high else None
-        if place.chunk and op not in (SCHEMA, CHANNEL):
+        if place.chunk and op not in (Op.SCHEMA, Op.CHANNEL):
             return None
-        return None if op == CHUNK and _head_of_chunk(data, pos, stop) is None else stop
+        return None if op == Op.CHUNK and _head_of_chunk(data, pos, stop) is None else stop
 
     def _is_chunk(self, data: Bytes, pos: int, stop: int, full_end: int) -> bool:
         """Read the records of a chunk that ends at `stop`; return whether the head of the chunk is valid.
@@ -165,10 +181,10 @@ class _Records(Records):
 
     def stated_stamps(self, data: Bytes, pos: int) -> Iterator[tuple[int, Iterable[int]]]:
         """Yield each channel's number with its stamps in ns in the index records at `pos`."""
-        while pos + 9 <= len(data) and data[pos] == MESSAGE_INDEX:
+        while pos + 9 <= len(data) and data[pos] == Op.MESSAGE_INDEX:
             (_, length) = _RECORD.unpack_from(data, pos)
             stop = pos + 9 + length
-            if length < LEAST[MESSAGE_INDEX] or stop > len(data):
+            if length < LEAST[Op.MESSAGE_INDEX] or stop > len(data):
                 return
             (channel,) = _U16.unpack_from(data, pos + 9)
             entries = _ENTRY.iter_unpack(data[pos + 15 : stop - (length - 6) % _ENTRY.size])
@@ -198,17 +214,12 @@ class _Records(Records):
         name, language, definition = self.schemas.get(schema, ("", "", ""))
         parts = name.split("/")
         full = f"{parts[0]}/msg/{parts[-1]}" if len(parts) == 2 else name
-        connection = Connection(topic, full, encoding, definition, LANGUAGES.get(language, ""))
-        self.by_number[number] = self.collector.connect(connection)
-        self.topics[number] = topic
+        self.connect(number, Connection(topic, full, encoding, definition, LANGUAGES.get(language, "")))
 
     def _statistics(self, body: bytes) -> None:
         """Add the number of messages that the statistics state for each channel."""
         (size,) = _U32.unpack_from(body, 42)
-        for at in range(46, 46 + size, _COUNT.size):
-            channel, count = _COUNT.unpack_from(body, at)
-            if channel in self.topics:
-                self.collector.expect(self.topics[channel], count)
+        self.expect(body[46 : 46 + size], _COUNT)
 
 
 def _head_of_chunk(data: Bytes, pos: int, stop: int) -> ChunkHead | None:

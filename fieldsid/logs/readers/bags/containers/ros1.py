@@ -28,8 +28,8 @@ NEEDED: Mapping[bytes, frozenset[bytes]] = MappingProxyType({
     CONNECTION: frozenset({b"conn", b"topic"}),
 })  # fmt: skip
 """The required fields of each kind of record."""
-MESSAGE_HEADER = 38
-"""Bytes of the header of a message: op, conn and time, each with its length."""
+MESSAGE_HEADER = sum(map(len, (b"....op=.", b"....conn=....", b"....time=........")))
+"""Bytes of the header of a message: op, conn and time, each after its length."""
 LONGEST_HEADER = 4096
 """Largest number of bytes of a header, whose longest field is the name of a topic; a longer one is damaged."""
 BEFORE_OP = 128
@@ -82,7 +82,7 @@ class _Records(Records):
             if fields[b"op"] == CONNECTION:
                 self._connection(fields, data, at, stop)
             elif fields[b"op"] == CHUNK_INFO:
-                self._counts(data, at, stop)
+                self.expect(data[at + 8 + _U32.unpack_from(data, at)[0] : stop], _STAMP)
             at = stop
 
     def run(self, data: Bytes, pos: int, end: int, place: Place) -> None:
@@ -185,16 +185,7 @@ class _Records(Records):
         package, _, short = about[b"type"].decode(errors="replace").rpartition("/")
         topic = (about.get(b"topic") or fields[b"topic"]).decode(errors="replace")
         definition = about[b"message_definition"].decode(errors="replace")
-        self.topics[number] = topic
-        self.by_number[number] = self.collector.connect(Connection(topic, f"{package}/msg/{short}", ROS1, definition, "msg"))
-
-    def _counts(self, data: Bytes, pos: int, stop: int) -> None:
-        """Add the numbers of messages that the index states for each connection of a chunk."""
-        (size,) = _U32.unpack_from(data, pos)
-        for at in range(pos + 8 + size, stop - 7, _STAMP.size):
-            number, count = _STAMP.unpack_from(data, at)
-            if number in self.topics:
-                self.collector.expect(self.topics[number], count)
+        self.connect(number, Connection(topic, f"{package}/msg/{short}", ROS1, definition, "msg"))
 
     def _chunk(self, fields: Fields, data: Bytes, pos: int, stop: int, full_end: int) -> None:
         """Read the records of a chunk that ends at `stop`; in a file that is not cut off it would end at `full_end`."""

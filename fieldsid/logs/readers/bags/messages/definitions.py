@@ -12,7 +12,7 @@ from typing import Any
 from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
 
 from fieldsid.errors import LogError
-from fieldsid.logs.readers.bags.messages.message_layout import Decoder, refuse_endless, types_in
+from fieldsid.logs.readers.bags.messages.message_layout import Decoder, types_in
 from fieldsid.logs.readers.bags.packets import CDR, Connection
 from fieldsid.logs.run import Note
 
@@ -20,8 +20,6 @@ Fields = dict[str, list[tuple[str, Any]]]
 _IDL_RULE = "=" * 80 + "\n"
 DEEPEST = 4
 """Depth of folders below that of the bag in which .msg files are searched, as in `workspace/src/package/msg`."""
-MOST_PARSED = 256
-"""Number of parsed definitions that are cached: more than any known bag has topics."""
 MOST_FOLDERS = 2000
 """Largest number of folders near a bag that are searched, so that a bag in a home folder does not start a search of all of it."""
 
@@ -76,7 +74,6 @@ def _sources(connection: Connection, search: DefinitionSearch) -> Iterator[tuple
 
 def _fitting(known: Fields, connection: Connection, payload: bytes) -> Decoder:
     """Return the decoder by these definitions; raises LogError where they do not fit the message."""
-    refuse_endless(known, connection.type_name)
     decoder = Decoder(known, connection.type_name, cdr=connection.serialization == CDR)
     decoder.layout(payload)
     return decoder
@@ -147,7 +144,7 @@ def _refuse_several(files: Sequence[Path], connection: Connection, search: Defin
         )
 
 
-@lru_cache(maxsize=MOST_PARSED)
+@lru_cache(maxsize=256)
 def _parsed(text: str, name: str, language: str) -> Fields:
     """Return a parsed definition, cached because topics share types and a log is read again with its mapping."""
     try:

@@ -11,20 +11,18 @@ Encodings: ROS 1 (packed, little endian) and CDR (OMG CORBA 3.0, 15.3: a number 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from rosbags.interfaces import Nodetype
 
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.few_of import SHOWN
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
-
-BASE, NAME, ARRAY = 1, 2, 3
-"""Kinds of a field in a definition; 4 is a sequence."""
 
 DTYPES = {
     "bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4",
@@ -34,7 +32,7 @@ PADDING = "structure_needs_at_least_one_member"
 """Name of the member that ROS 2 adds to an empty structure."""
 QUATERNION = ("x", "y", "z", "w")
 DEEPEST, MOST_PARTS = 50, 100_000
-"""Largest depth of types inside one another, and largest number of fields in all of them; a real message has fewer."""
+"""Largest depth of types inside one another, and largest number of them in a message; a real one has fewer."""
 ROWS_APART = 32
 """Number of layouts that are matched against all messages of a block before the rest is decoded one by one."""
 
@@ -76,6 +74,8 @@ class Walker:
         self.order = ">" if cdr and raw[1:2] == b"\x00" else "<"
         self.layout = Layout()
         self.pos = self.start
+        self.above: list[str] = []
+        self.parts = 0
         if cdr and raw[:2] not in {b"\x00\x00", b"\x00\x01"}:
             raise LogError(
                 "a message is in an encoding that is not plain CDR",
@@ -102,21 +102,40 @@ class Walker:
             raise LogError(
                 f"no definition of message type `{type_name}`", found="none in the bag", hint="give its folder: `--msg-path DIR`"
             )
+        self._refuse_endless(type_name)
         fields = [f for f in self.definitions[type_name] if f[0] != PADDING]
         if not fields and self.cdr:
             self._advance(1)  # IDL has no structure without members: ROS 2 adds one of one byte
         for name, description in fields:
             self._field(description, f"{path}.{name}" if path else name)
+        self.above.pop()
+
+    def _refuse_endless(self, type_name: str) -> None:
+        """Note a type inside those above it; raises LogError where it is in itself, or there are more than a message can have."""
+        self.parts += 1
+        if type_name in self.above or len(self.above) > DEEPEST:
+            raise LogError(
+                f"message type `{type_name}` is a type that holds itself, or one in one without end",
+                found=" in ".join([type_name, *self.above[::-1]][:SHOWN]),
+                hint="give a definition that ends: `--msg-path DIR`",
+            )
+        if self.parts > MOST_PARTS:
+            raise LogError(
+                f"message type `{(self.above or [type_name])[0]}` is none that is recorded: it has too many parts",
+                found=f"more than {MOST_PARTS}",
+                hint="give the definitions the vehicle was built with: `--msg-path DIR`",
+            )
+        self.above.append(type_name)
 
     def _field(self, description: Any, path: str) -> None:
         kind, what = description
-        if kind == BASE:
+        if kind == Nodetype.BASE:
             self._base(what[0], path)
-        elif kind == NAME:
+        elif kind == Nodetype.NAME:
             self._message(what, path)
         else:
             inner, length = what
-            self._row(inner, length if kind == ARRAY else self._length(), path)
+            self._row(inner, length if kind == Nodetype.ARRAY else self._length(), path)
 
     def _base(self, base: str, path: str) -> None:
         if base == "string":
@@ -129,11 +148,11 @@ class Walker:
 
     def _row(self, inner: Any, count: int, path: str) -> None:
         kind, what = inner
-        if kind == NAME or what[0] == "string":
+        if kind == Nodetype.NAME or what[0] == "string":
             if count > min(len(self.raw), MOST_PARTS):
                 raise IndexError(count)
             begin = self.pos
-            if kind == NAME:
+            if kind == Nodetype.NAME:
                 for i in range(count):
                     self._message(what, f"{path}[{i}]")
             else:
@@ -218,45 +237,8 @@ def _no_field(layout: Layout, path: str) -> MappingError:
 
 def types_in(fields: Sequence[tuple[str, Any]]) -> list[str]:
     """Return the message types of the fields of a type."""
-    return [name for name, _ in _inner(fields)]
-
-
-def refuse_endless(definitions: Definitions, type_name: str) -> None:
-    """Raise LogError for a type that contains itself, or has more numbers and texts than a message can have."""
-    known: dict[str, int] = {}
-
-    def parts_of(name: str, above: tuple[str, ...]) -> int:
-        if name in above or len(above) > DEEPEST:
-            raise LogError(
-                f"message type `{type_name}` is a type that holds itself, or one in one without end",
-                found=" in ".join([name, *above[::-1]][:SHOWN]),
-                hint="give a definition that ends: `--msg-path DIR`",
-            )
-        if name not in known:
-            fields = definitions.get(name, ())
-            known[name] = sum(_count(what) * parts_of(inner, (*above, name)) for inner, what in _inner(fields)) + len(fields) + 1
-        return known[name]
-
-    if (count := parts_of(type_name, ())) > MOST_PARTS:
-        raise LogError(
-            f"message type `{type_name}` is none that is recorded: it comes to {count} parts",
-            found=f"more than {MOST_PARTS}",
-            hint="give the definitions the vehicle was built with: `--msg-path DIR`",
-        )
-
-
-def _inner(fields: Sequence[tuple[str, Any]]) -> Iterator[tuple[str, Any]]:
-    """Yield the message types among the types of some fields, with the descriptions of these fields."""
-    for _, (kind, what) in fields:
-        if kind == NAME:
-            yield what, (kind, what)
-        elif kind > NAME and what[0][0] == NAME:
-            yield what[0][1], (kind, what)
-
-
-def _count(description: Any) -> int:
-    kind, what = description
-    return int(what[1]) if kind == ARRAY else 1
+    inner = (of if of[0] == Nodetype.NAME or of[0] == Nodetype.BASE else of[1][0] for _, of in fields)
+    return [name for kind, name in inner if kind == Nodetype.NAME]
 
 
 class Decoder:
