@@ -10,6 +10,7 @@ from typing import Literal
 
 from fieldsid.logs.convert.clock import GAP_FACTOR
 from fieldsid.logs.convert.frames import Frame
+from fieldsid.logs.run import MEASURED_FIN
 
 Stamp = Literal["header", "receive"]
 ATTITUDE = "attitude"
@@ -20,8 +21,7 @@ COMBINED = (ATTITUDE, POSITION)
 ANGLES = ("yaw_rad", "pitch_rad", "roll_rad")
 
 
-AXES = ((("yaw_rad", "yaw_rate_rad_s"), ("rudder_rad", "rudder_measured_rad")),
-        (("pitch_rad", "pitch_rate_rad_s"), ("elevator_rad", "elevator_measured_rad")))  # fmt: skip
+AXES = tuple(zip((("yaw_rad", "yaw_rate_rad_s"), ("pitch_rad", "pitch_rate_rad_s")), MEASURED_FIN.items(), strict=True))
 """The signals of each axis, motion and fin: identification needs at least one of each."""
 
 

@@ -16,12 +16,13 @@ from fieldsid.logs.convert.conditioning import MAX_GAP_S, in_order, possible, re
 from fieldsid.logs.convert.faults.copied_fins import without_copied_fins
 from fieldsid.logs.convert.faults.dropouts import SENSED, without_dropouts
 from fieldsid.logs.convert.faults.heading_fills import without_fills
-from fieldsid.logs.convert.faults.repeats import measured_anew, note_on_repeats, without_repeats
+from fieldsid.logs.convert.faults.repeats import measured_anew, note_on_repeats, rows_of, without_repeats
 from fieldsid.logs.convert.frames import SWAPPED_BY_WORLD, about_level, angles_of_quaternion, north_and_east, to_ned_frd
 from fieldsid.logs.convert.heading_unwrap import unwrapped_over
 from fieldsid.logs.convert.servo_counts import counts_unit, turned_from_counts
 from fieldsid.logs.convert.units import DEGREE, depth_of_pressure, factor_to, pick_unit, scaled
-from fieldsid.logs.reader import RawLog, ReadOptions, Series
+from fieldsid.logs.few_of import MOSTLY, NEARLY_ALL
+from fieldsid.logs.reader import AS_IT_IS, RawLog, ReadOptions, Series
 from fieldsid.logs.run import COLUMNS, COMMANDS, FINS, PART, Note, Run, signal_of
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
@@ -33,20 +34,11 @@ def part_between(start: float | None, end: float | None) -> tuple[float, float]:
     return (WHOLE[0] if start is None else start, WHOLE[1] if end is None else end)
 
 
-ON_BASE_ROWS = 0.5
-"""Smallest share of a signal's numbers that are in rows in which the fastest angle or rate also has a number.
-
-Below it the table has a separate row for each reading of a sensor.
-"""
-FIN_MOVES = 0.1
-"""Smallest share of a measured fin's numbers that differ from the last at which it is repeated, and not at rest."""
-
-
 def assemble(
     raw: RawLog,
     mapping: ChannelMap,
     path: Path | None,
-    options: ReadOptions | None = None,
+    options: ReadOptions = AS_IT_IS,
     *,
     part: tuple[float, float] = WHOLE,
     max_gap_s: float = MAX_GAP_S,
@@ -56,39 +48,18 @@ def assemble(
     Raises LogError or MappingError for a log or mapping that cannot be right, DataError where the part is empty. Gaps outside
     of the part are not checked.
     """
-    options = options or ReadOptions()
     if raw.finished:
         time = next(iter(raw.series.values())).time if raw.series else np.zeros(0)
         run = Run(raw.name, time, {s: v.values for s, v in raw.series.items()}, path, raw.notes)
         return run if part == WHOLE else run.between(*part)
     raw = _split_by_sensor(raw)
     notes = list(raw.notes)
-    tracks: dict[str, Track] = {}
-    for signal, series in raw.series.items():
-        for name, track in _tracks(signal, series, mapping, notes, options).items():
-            if name in tracks:
-                raise MappingError(
-                    f"two sources give `{name}`",
-                    found=f"{tracks[name].label} and {track.label}",
-                    hint=f"map `{name}` once",
-                    signal=name,
-                )
-            tracks[name] = track
-    tracks = summed(tracks, mapping.gap_factor)
+    tracks = summed(_tracks_by_signal(raw, mapping, notes, options), mapping.gap_factor)
     if not tracks:
         raise MappingError(
             f"{mapping.place} maps no signal", found="an empty `signals`", hint=f"map one of those that {_inspect(path)} shows"
         )
-    for name in [n for n in tracks if n in SENSED]:
-        values, repeats = without_repeats(name, tracks[name].values)
-        values, dropouts = without_dropouts(name, values)
-        tracks[name], notes = replace(tracks[name], values=values), notes + repeats + dropouts
-    if "yaw_rad" in tracks:
-        tracks["yaw_rad"], fills = without_fills(tracks["yaw_rad"])
-        tracks["yaw_rad"], lines = unwrapped_over(tracks["yaw_rad"], tracks.get("yaw_rate_rad_s"), mapping.gap_factor)
-        notes += fills + lines
-    for name in {"roll_rad", "pitch_rad"} & tracks.keys():
-        tracks[name] = replace(tracks[name], values=about_level(tracks[name].values))
+    tracks = _without_faults(tracks, mapping, notes)
     time, signals, found = _on_one_clock(raw, tracks, mapping)
     notes += found
     if time.size < 2:
@@ -100,6 +71,35 @@ def assemble(
     run = run if part == WHOLE else run.between(*part)
     refuse_long_gaps(run.time, run.signals, options, limit_s=max_gap_s)
     return run
+
+
+def _tracks_by_signal(raw: RawLog, mapping: ChannelMap, notes: list[Note], options: ReadOptions) -> dict[str, Track]:
+    """Return the signals of a raw log in SI, NED and FRD; append to `notes`. Raises MappingError where two sources give one."""
+    tracks: dict[str, Track] = {}
+    for signal, series in raw.series.items():
+        for name, track in _tracks(signal, series, mapping, notes, options).items():
+            if name in tracks:
+                found = f"{tracks[name].label} and {track.label}"
+                raise MappingError(f"two sources give `{name}`", found=found, hint=f"map `{name}` once", signal=name)
+            tracks[name] = track
+    return tracks
+
+
+def _without_faults(tracks: dict[str, Track], mapping: ChannelMap, notes: list[Note]) -> dict[str, Track]:
+    """Return tracks in which what is no measurement is missing, with continuous angles; append to `notes` what was found."""
+    tracks = dict(tracks)
+    for name in [n for n in tracks if n in SENSED]:
+        values, repeats = without_repeats(name, tracks[name].values)
+        values, dropouts = without_dropouts(name, values)
+        tracks[name] = replace(tracks[name], values=values)
+        notes += repeats + dropouts
+    if "yaw_rad" in tracks:
+        tracks["yaw_rad"], fills = without_fills(tracks["yaw_rad"])
+        tracks["yaw_rad"], lines = unwrapped_over(tracks["yaw_rad"], tracks.get("yaw_rate_rad_s"), mapping.gap_factor)
+        notes += fills + lines
+    for name in {"roll_rad", "pitch_rad"} & tracks.keys():
+        tracks[name] = replace(tracks[name], values=about_level(tracks[name].values))
+    return tracks
 
 
 def _counted(time: FloatArray, notes: Sequence[Note]) -> str:
@@ -118,34 +118,33 @@ def _split_by_sensor(raw: RawLog) -> RawLog:
 
     Most cells of such a table are blank. A table with one row for all sensors also has blanks, where a sensor is slower or fails,
     but there the numbers of the slower sensor are in rows in which the faster one has a number too. In a table of separate rows
-    they are not, so that the times of the rows are the clock of no sensor. The cells may be filled with the last number instead.
+    most are not, so that the times of the rows are the clock of no sensor. The cells may be filled with the last number instead.
     """
     seen = {signal: _rows_of(signal, series) for signal, series in raw.series.items()}
     filled = {signal: rows for signal, rows in seen.items() if rows.any()}
     if not raw.one_clock or not filled or all(rows.all() for rows in filled.values()):
         return raw
     base = max([s for s in (ATTITUDE, *ANGLES_AND_RATES) if s in filled] or filled, key=lambda s: int(filled[s].sum()))
-    if all((rows & filled[base]).sum() >= ON_BASE_ROWS * rows.sum() for rows in filled.values()):
+    if all((rows & filled[base]).sum() >= MOSTLY * rows.sum() for rows in filled.values()):
         return raw
     series = {
         s: replace(raw.series[s], time=raw.series[s].time[rows], values=raw.series[s].values[rows]) for s, rows in filled.items()
     }
-    numbers = {s: int(_numbers(raw.series[s]).sum()) for s in filled}
+    numbers = {s: int(rows_of(raw.series[s].values).sum()) for s in filled}
     repeats = tuple(note_on_repeats(s, rows, raw.series[s].values) for s, rows in filled.items() if rows.sum() < numbers[s])
     return replace(raw, series=series, notes=(*raw.notes, *repeats), one_clock=False)
 
 
 def _rows_of(signal: str, series: Series) -> BoolArray:
-    """Return a mask (n,) of the rows in which a signal has a number, without those in which a measured one only repeats it."""
-    numbers = _numbers(series)
+    """Return a mask (n,) of the rows in which a signal has a number, without those in which a measured one only repeats it.
+
+    A fin of which NEARLY_ALL numbers are equal to the last is at rest, and not repeated.
+    """
+    numbers = rows_of(series.values)
     if signal_of(signal) in COMMANDS:
         return numbers
     own = measured_anew(series.values)
-    return numbers if signal_of(signal) in FINS and own.sum() < FIN_MOVES * numbers.sum() else own
-
-
-def _numbers(series: Series) -> BoolArray:
-    return np.asarray(np.isfinite(series.values.reshape(series.time.size, -1)).all(axis=1))
+    return numbers if signal_of(signal) in FINS and own.sum() < (1.0 - NEARLY_ALL) * numbers.sum() else own
 
 
 def _on_one_clock(

@@ -163,17 +163,9 @@ def interpolated(track: Track, time: FloatArray, gap_factor: float) -> FloatArra
     """Return a track (n,) interpolated linearly at some times, NaN in gaps and outside; samples at these very times are kept."""
     seen = np.isfinite(track.values)
     stamps, values = track.time[seen], track.values[seen]
-    result = np.full(time.size, np.nan)
     if not stamps.size:
-        return result
-    above = np.searchsorted(stamps, time, side="left")
-    coincide = (above < stamps.size) & (stamps[np.minimum(above, stamps.size - 1)] == time)
-    result[coincide] = values[above[coincide]]
-    limit = gap_factor * float(np.median(np.diff(stamps))) if stamps.size > 1 else 0.0
-    inside = ~coincide & (above > 0) & (above < stamps.size)
-    low, high = above[inside] - 1, above[inside]
-    width = stamps[high] - stamps[low]
-    share = (time[inside] - stamps[low]) / width
-    between = values[low] + share * (values[high] - values[low])
-    result[inside] = np.where(width <= limit * (1.0 + 1e-9), between, np.nan)
-    return result
+        return np.full(time.size, np.nan)
+    limit = gap_factor * float(np.median(np.diff(stamps))) * (1.0 + 1e-9) if stamps.size > 1 else 0.0
+    above = np.searchsorted(stamps, time).clip(max=stamps.size - 1)
+    is_near = (stamps[above] == time) | (stamps[above] - stamps[np.maximum(above - 1, 0)] <= limit)
+    return np.where(is_near, np.interp(time, stamps, values, left=np.nan, right=np.nan), np.nan)

@@ -11,17 +11,13 @@ import numpy.typing as npt
 from fieldsid.errors import LogError
 from fieldsid.logs.convert.times.clock_text import FEW_STEPS
 from fieldsid.logs.convert.times.time_column import unit_of_step
-from fieldsid.logs.reader import ReadOptions
+from fieldsid.logs.few_of import FEWEST
+from fieldsid.logs.reader import AS_IT_IS, ReadOptions
 from fieldsid.logs.run import FINS, Note
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 MAX_GAP_S = 2.0
 """A run in which a main signal is missing for longer than this is refused, unless the user raises the limit."""
-
-WORTH_TAKING = 10
-"""A part without a gap is proposed in a hint if it has more samples than this."""
-ROUNDING = 1.01
-"""Tolerance of the limit for rounding and jitter of the times, as a factor."""
 
 MAIN = ("yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s", *FINS)
 """Signals that identification depends on."""
@@ -73,12 +69,11 @@ class Gap:
         return (self.end_s - self.start_s) * self.count / (self.count + 1)
 
 
-def in_order(time: FloatArray, label: str, options: ReadOptions | None = None) -> tuple[npt.NDArray[np.intp], list[Note]]:
+def in_order(time: FloatArray, label: str, options: ReadOptions = AS_IT_IS) -> tuple[npt.NDArray[np.intp], list[Note]]:
     """Return the indices (m,) of the rows with which time increases strictly, and a note where others were left out.
 
     Rows without a time are left out. Raises LogError where time goes back or repeats, unless the options say to salvage.
     """
-    options = options or ReadOptions()
     rows = np.flatnonzero(np.isfinite(time))
     stamps = time[rows]
     if stamps.size == 0 or bool((np.diff(stamps) > 0).all()):
@@ -121,15 +116,14 @@ def long_gaps(time: FloatArray, signals: Mapping[str, FloatArray], limit_s: floa
     for signal in (s for s in MAIN if s in signals):
         steps = np.diff(time[np.isfinite(signals[signal])])
         limit = max(limit_s, FEW_STEPS * float(np.median(steps))) if steps.size else limit_s
-        found += [(gap, signal, limit) for gap in gaps_in(time, signals[signal]) if gap.length_s > ROUNDING * limit]
+        found += [(gap, signal, limit) for gap in gaps_in(time, signals[signal]) if gap.length_s > limit]
     return found
 
 
 def refuse_long_gaps(
-    time: FloatArray, signals: Mapping[str, FloatArray], options: ReadOptions | None = None, *, limit_s: float = MAX_GAP_S
+    time: FloatArray, signals: Mapping[str, FloatArray], options: ReadOptions = AS_IT_IS, *, limit_s: float = MAX_GAP_S
 ) -> None:
     """Raise LogError for the longest of the long gaps, if there is one."""
-    options = options or ReadOptions()
     found = long_gaps(time, signals, limit_s)
     if not found:
         return
@@ -137,7 +131,7 @@ def refuse_long_gaps(
     length = gap.length_s
     start, end = _longest_without(time, [g for g, _, _ in found])
     hint = f"accept it: {options.with_option(f'--max-gap {length + 0.1:.1f}')}"
-    if np.count_nonzero((time >= start) & (time <= end)) > WORTH_TAKING:
+    if np.count_nonzero((time >= start) & (time <= end)) > FEWEST:
         hint += f"; or take the longest part without one: {options.with_option(f'--from {start:.2f} --to {end:.2f}')}"
     raise LogError(
         f"`{signal}` is missing for {length:.2f} s (limit {limit:.3g} s)",

@@ -21,8 +21,8 @@ Body = Literal["FRD", "FLU"]
 TURNED_BY_BODY = frozenset({"pitch_rad", "pitch_goal_rad", "pitch_rate_rad_s", "yaw_rate_rad_s", "sway_m_s", "heave_m_s"})
 """Signals that change sign between forward-left-up and forward-starboard-down."""
 
-SHORTEST, LONGEST = 1e-3, 1e3
-"""Norms between which four numbers are taken for a quaternion that is not normalised."""
+LONGEST = 1e3
+"""Largest norm, and inverse of the smallest, at which four numbers are taken for a quaternion that is not normalised."""
 
 SWAPPED_BY_WORLD = {"x_m": "y_m", "y_m": "x_m"}
 """Signals that change places between east-north-up and north-east-down."""
@@ -64,7 +64,7 @@ def angles_of_quaternion(xyzw: FloatArray, frame: Frame) -> tuple[FloatArray, Fl
     """
     with np.errstate(over="ignore"):
         length = np.linalg.norm(xyzw, axis=1)
-    usable = (length > SHORTEST) & (length < LONGEST)
+    usable = (length > 1.0 / LONGEST) & (length < LONGEST)
     x, y, z, w = (np.where(usable[:, None], xyzw, np.nan) / np.where(usable, length, 1.0)[:, None]).T
     forward = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)])
     side_z = 2 * (y * z + w * x)

@@ -23,28 +23,26 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.clock import GAP_FACTOR, Track, interpolated
+from fieldsid.logs.convert.faults.spikes import SPREADS
 from fieldsid.logs.convert.frames import unwrapped
-from fieldsid.logs.few_of import few_of
+from fieldsid.logs.few_of import FEW, few_of
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.trapezoid import trapezoid_integral
 from fieldsid.numerics.white_noise import robust_white_noise_std
 
 FASTEST_RAD_S = 3.0
-"""A faster step is no motion of a vehicle; a sweep of one turn that takes longer than a turn at this rate is a real turn."""
+"""A faster step is no motion of a vehicle."""
+LONGEST_SWEEP_S = math.tau / FASTEST_RAD_S
+"""A sweep of one turn that takes longer is a real turn; a heading that is kept at the wrap comes back to it in half this time."""
 SLACK_RAD_S = 0.5
 """Largest difference of the rate at a crossing of the wrap from that of the steps around it."""
 MIN_JUMP_RAD = 0.03
-NOISES = 6.0
-"""A step is significant above this many standard deviations of the noise, and above `MIN_JUMP_RAD`."""
+"""A step is significant above this, and above SPREADS standard deviations of the noise."""
 NEIGHBOURS = 8
 """Number of steps on each side from which the motion is estimated."""
-HELD_S = 1.0
-"""A heading that is kept at the wrap comes back to it within this time."""
-ALIKE = (0.7, 1.4)
+ALIKE = (math.sqrt(0.5), math.sqrt(2.0))
 """Ratios of two sensors' readings of one motion between which they agree; a wrong unit gives a ratio further off."""
-RARE = 0.02
-"""Share of samples with a nonzero second difference, up to which these do not show the level of the noise."""
 
 
 def unwrapped_over(heading: Track, rate: Track | None = None, gap_factor: float = GAP_FACTOR) -> tuple[Track, list[Note]]:
@@ -132,7 +130,7 @@ def _path(time: FloatArray, values: FloatArray, rate: Track | None) -> _Path | N
     steps, dt = np.diff(values), np.diff(time)
     turned = within_half_turn(steps)
     noise = noise_of_steps(np.where(np.abs(turned) > FASTEST_RAD_S * dt, np.nan, turned))
-    least = max(MIN_JUMP_RAD, NOISES * math.sqrt(2.0) * noise)
+    least = max(MIN_JUMP_RAD, SPREADS * math.sqrt(2.0) * noise)
     limit = np.maximum(FASTEST_RAD_S * dt, least)
     jumps = np.flatnonzero(np.abs(steps) > limit)
     spread = float(np.ptp(values)) - math.tau
@@ -151,9 +149,9 @@ def noise_of_steps(turned: FloatArray) -> float:
     """Return the standard deviation of the white noise on a heading, from its steps (n-1,), of which jumps are NaN."""
     bends = np.abs(np.diff(turned))
     bends = bends[np.isfinite(bends)]
-    # A value repeated over several samples has second differences only where it changes: those show its noise, unless rare.
+    # A value repeated over several samples has second differences only where it changes: those show its noise, unless FEW.
     some = bends[bends > 1e-9]
-    return 0.0 if some.size <= RARE * bends.size else robust_white_noise_std(some, 2)
+    return 0.0 if some.size <= FEW * bends.size else robust_white_noise_std(some, 2)
 
 
 def _swept(time: FloatArray, turned: FloatArray, calm: npt.NDArray[np.intp], rate: Track | None) -> FloatArray | None:
@@ -193,7 +191,7 @@ def _line(path: _Path, jump: int) -> tuple[int, int] | None:
     while last < path.time.size - 1 and path.is_significant(last, sign):
         last += 1
     off = abs(path.excess(first, last) - sign * math.tau)
-    is_possible = last - first > 1 and path.duration(first, last) <= math.tau / FASTEST_RAD_S
+    is_possible = last - first > 1 and path.duration(first, last) <= LONGEST_SWEEP_S
     return (first, last) if is_possible and off <= path.limit_of_excess(first, last) else None
 
 
@@ -203,7 +201,7 @@ def _there_and_back(path: _Path, jump: int) -> tuple[int, int] | None:
     Where the log begins or ends inside the excursion, the missing sample is -1 or n.
     """
     low, high = float(path.values.min()), float(path.values.max())
-    start, stop = np.searchsorted(path.time, (path.time[jump] - HELD_S, path.time[jump] + HELD_S)).tolist()
+    start, stop = np.searchsorted(path.time, path.time[jump] + 0.5 * LONGEST_SWEEP_S * np.array([-1.0, 1.0])).tolist()
     part = path.values[start:stop]
     at_wrap = (start + np.flatnonzero(np.minimum(part - low, high - part) <= 2.0 * path.least)).tolist()
     middle = bisect_right(at_wrap, jump)

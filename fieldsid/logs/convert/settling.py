@@ -8,18 +8,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.logs.few_of import MOSTLY
 from fieldsid.numerics.arrays import FloatArray
 
 POLES = (1e-3, 20.0)
 """Range in 1/s in which the pole is searched."""
-MOST_RESIDUAL = 0.5
-"""The pole is identified if the residual sum of squares is below this share of that of a model without a lag."""
 
 
 def settling_of(time: FloatArray, values: FloatArray, *, integrated: bool = False) -> tuple[float, float] | None:
     """Return pole (1/s) and final value of a signal (n,), or, with `integrated`, of the rate of an angle (n,).
 
-    Returns None where the pole cannot be identified.
+    Returns None where the pole cannot be identified: a model without a lag leaves less than twice the residual sum of squares.
     """
     from scipy.optimize import minimize_scalar
 
@@ -36,7 +35,7 @@ def settling_of(time: FloatArray, values: FloatArray, *, integrated: bool = Fals
 
     found = minimize_scalar(lambda x: residual(columns(float(np.exp(x)))), bounds=tuple(np.log(POLES).tolist()), method="bounded")
     without_lag = residual(np.column_stack([np.ones(t.size), t]) if integrated else np.ones((t.size, 1)))
-    if not found.fun < MOST_RESIDUAL * without_lag:
+    if not found.fun < MOSTLY * without_lag:
         return None
     pole = float(np.exp(found.x))
     coefficients = np.linalg.lstsq(columns(pole), values)[0]

@@ -20,7 +20,6 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
 
 DEGREE = math.pi / 180.0
-KNOT = 1852.0 / 3600.0
 GRAVITY = 9.80665
 """Standard acceleration of free fall in m/s^2."""
 
@@ -98,7 +97,7 @@ _QUOTIENTS: Mapping[str, Mapping[str, str]] = {
 """Units divided by a unit of time; their spellings combine those of both, with `/`, `p`, `per` or nothing between."""
 _NAMED: Mapping[str, Mapping[str, tuple[float, str]]] = {
     "angle rate": {"rpm": (math.pi / 30, "1/min rev/min revs/min rpms")},
-    "speed": {"kn": (KNOT, "kt kts kns knot knots nmi/h"), "mph": (1609.344 / 3600.0, "mi/h mile/h miles/h")},
+    "speed": {"kn": (1852.0 / 3600.0, "kt kts kns knot knots nmi/h"), "mph": (1609.344 / 3600.0, "mi/h mile/h miles/h")},
 }
 _ORDER = ("angle", "angle rate", "speed", "length", "pressure", "time", "ratio", "force")
 

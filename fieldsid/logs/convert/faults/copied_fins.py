@@ -10,26 +10,26 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fieldsid.logs.run import FINS, Note
+from fieldsid.logs.run import MEASURED_FIN, Note
 from fieldsid.numerics.arrays import FloatArray
 
 
 def without_copied_fins(signals: Mapping[str, FloatArray]) -> tuple[dict[str, FloatArray], list[Note]]:
     """Return the signals (n,) without measured fins that equal a moving command at every sample, and a note on each."""
-    copies = {
-        measured: command
-        for command, measured in zip(FINS[:2], FINS[2:], strict=True)
-        if {command, measured} <= signals.keys()
-        and np.array_equal(signals[command], signals[measured], equal_nan=True)
-        and np.unique(signals[command][np.isfinite(signals[command])]).size > 1
-    }
-    notes = [
-        Note(
-            "copied",
-            f"{measured} equals {command} at all {signals[command].size} samples: it is the command again, no measurement of the "
-            "fin, and is left out",
-            {"signal": measured, "count": int(signals[command].size)},
+    kept, notes = dict(signals), list[Note]()
+    for command, measured in MEASURED_FIN.items():
+        one, other = signals.get(command), signals.get(measured)
+        if (
+            one is None
+            or other is None
+            or not np.array_equal(one, other, equal_nan=True)
+            or np.unique(one[np.isfinite(one)]).size < 2
+        ):
+            continue
+        message = (
+            f"{measured} equals {command} at all {one.size} samples: it is the command again, no measurement of the fin, and "
+            "is left out"
         )
-        for measured, command in copies.items()
-    ]
-    return {s: v for s, v in signals.items() if s not in copies}, notes
+        del kept[measured]
+        notes.append(Note("copied", message, {"signal": measured, "count": int(one.size)}))
+    return kept, notes

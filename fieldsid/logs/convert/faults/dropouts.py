@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.faults.spikes import DIGITS, OF_MEDIAN, SPREADS, last_digit
+from fieldsid.logs.convert.faults.spikes import FEWEST as SHORTEST
 from fieldsid.logs.run import FINS, MEASURED, SIGNALS, Note
 from fieldsid.numerics.arrays import FloatArray
 
@@ -66,7 +67,7 @@ def without_dropouts(name: str, values: FloatArray) -> tuple[FloatArray, list[No
 @np.errstate(over="ignore", invalid="ignore")
 def _dropout_of(values: FloatArray) -> tuple[float, int, int] | None:
     """Return the fill value of a signal (n,) without gaps, its number of jumps and of samples; None where there is none."""
-    if values.size < 20:
+    if values.size < SHORTEST:
         return None
     steps = np.diff(values)
     bend = float(np.median(np.abs(np.diff(values, 2))))

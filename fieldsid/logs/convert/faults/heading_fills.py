@@ -15,18 +15,14 @@ import numpy as np
 from fieldsid.logs.convert.clock import Track
 from fieldsid.logs.convert.conditioning import blocks_of
 from fieldsid.logs.convert.faults.dropouts import FEWEST
-from fieldsid.logs.convert.heading_unwrap import FASTEST_RAD_S, MIN_JUMP_RAD, NOISES, noise_of_steps, within_half_turn
+from fieldsid.logs.convert.faults.spikes import SPREADS
+from fieldsid.logs.convert.heading_unwrap import FASTEST_RAD_S, MIN_JUMP_RAD, noise_of_steps, within_half_turn
+from fieldsid.logs.few_of import FEW, MOSTLY, NEARLY_ALL
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 END_RAD = 1e-6
 """Largest distance of a fill value from a multiple of a right angle; every frame turns an end of the range into one."""
-GOES_ON = 0.8
-"""Smallest share of the jumps across which the other samples must form a continuous heading."""
-MOSTLY = 0.5
-"""Largest share of fill values among the samples from the first to the last; above it the vehicle is on that heading."""
-FAST = 0.95
-"""Quantile of the heading's rates that is taken for the fastest motion; 1.5 times as fast is still allowed."""
 
 
 def without_fills(heading: Track) -> tuple[Track, list[Note]]:
@@ -57,7 +53,10 @@ def _note(end: float, count: int, of: int) -> Note:
 
 @np.errstate(over="ignore", invalid="ignore")
 def _fills(time: FloatArray, values: FloatArray, end: float) -> BoolArray:
-    """Return a mask (n,) of the samples that are fill values at an end of the range."""
+    """Return a mask (n,) of the samples that are fill values at an end of the range.
+
+    Where they are most of the samples the vehicle is on that heading. Its fastest motion is 1.5 times that of all but FEW steps.
+    """
     at_end: BoolArray = np.asarray(values == end)
     begins, stops = blocks_of(at_end)
     inside = (begins > 0) & (stops < values.size)
@@ -67,12 +66,12 @@ def _fills(time: FloatArray, values: FloatArray, end: float) -> BoolArray:
     if others.sum() < 3 or before.size < FEWEST or at_end[before[0] : after[-1]].mean() > MOSTLY:
         return none
     steps, dt = within_half_turn(np.diff(values[others])), np.diff(time[others])
-    least = max(MIN_JUMP_RAD, NOISES * math.sqrt(2.0) * noise_of_steps(steps))
+    least = max(MIN_JUMP_RAD, SPREADS * math.sqrt(2.0) * noise_of_steps(steps))
     jumped = (np.abs(within_half_turn(values[before] - end)) > least + FASTEST_RAD_S * (time[before + 1] - time[before])) & (
         np.abs(within_half_turn(values[after] - end)) > least + FASTEST_RAD_S * (time[after] - time[after - 1])
     )
-    fastest = 1.5 * float(np.quantile(np.abs(steps) / dt, FAST))
+    fastest = 1.5 * float(np.quantile(np.abs(steps) / dt, 1.0 - FEW))
     across = np.abs(within_half_turn(values[after] - values[before])) <= least + fastest * (time[after] - time[before])
-    if jumped.sum() < FEWEST or across[jumped].mean() < GOES_ON:
+    if jumped.sum() < FEWEST or across[jumped].mean() < NEARLY_ALL:
         return none
     return at_end

@@ -11,17 +11,16 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.faults.spikes import last_digit
+from fieldsid.logs.few_of import FEW, FEWEST, MOSTLY
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
-FEWEST = 10
-"""Smallest number of changes from which the sensor's interval is estimated."""
-DIGITS = 1.5
-"""Smallest ratio of the median change to the smallest one at which a sensor that measures anew seldom repeats a number."""
+UNEVEN = 1.5
+"""Smallest ratio of the median change to the smallest one at which a sensor that measures anew seldom repeats a number; and
+largest ratio of the rows per line, but for FEW lines, to their median."""
 
-STRAIGHT, BENT, UNEVEN = 2.5, 10.0, 1.5
-"""Largest bend of a straight line and smallest median bend between two lines, in last digits; and the largest ratio of the 95th
-percentile of the rows per line to their median."""
+STRAIGHT, BENT = 2.5, 10.0
+"""Largest bend of a straight line and smallest median bend between two lines, in last digits."""
 LEAST_CHANGE = 1e-12
 """Range in SI up to which a signal is constant: a simulation leaves less by rounding in a plane in which nothing moves."""
 SIGNIFICANT = 1e-5
@@ -61,6 +60,11 @@ def _rows_per_measurement(changed: npt.NDArray[np.intp]) -> int:
     return every if every == int(np.median(apart)) else 1
 
 
+def rows_of(values: FloatArray) -> BoolArray:
+    """Return a mask of the rows (n,) in which a sensor has a number, or several (n, k)."""
+    return np.asarray(np.isfinite(values.reshape(len(values), -1)).all(axis=1))
+
+
 def measured_anew(values: FloatArray) -> BoolArray:
     """Return a mask of the rows (n,) in which a sensor has a number, or several (n, k), without those that it repeats by turns.
 
@@ -70,14 +74,14 @@ def measured_anew(values: FloatArray) -> BoolArray:
     line through the numbers, where a table is filled by straight lines.
     """
     columns = values if values.ndim > 1 else values[:, None]
-    rows = np.asarray(np.isfinite(columns).all(axis=1))
+    rows = rows_of(values)
     steps = np.abs(np.diff(columns[rows], axis=0)).max(axis=1, initial=0.0)
     changed = np.flatnonzero(steps)
     if changed.size < FEWEST or steps.max() <= LEAST_CHANGE or _rows_per_measurement(changed) > 1:
         return rows
     if float(np.median(np.diff(changed))) < 2.0:
         rows[rows] = _bends(columns[rows])
-    elif float(np.median(steps[changed])) > DIGITS * float(steps[changed].min()):
+    elif float(np.median(steps[changed])) > UNEVEN * float(steps[changed].min()):
         rows[rows] = np.append(True, steps > 0.0)
     return rows
 
@@ -95,11 +99,11 @@ def _bends(columns: FloatArray) -> BoolArray:
     apart = np.diff(at)
     if at.size < FEWEST or float(np.median(apart)) < 2.0 or float(np.median(bend[at])) < BENT:
         return every
-    if float(np.percentile(apart, 95)) > UNEVEN * float(np.median(apart)):
+    if float(np.quantile(apart, 1.0 - FEW)) > UNEVEN * float(np.median(apart)):
         return every
     between = np.setdiff1d(np.arange(at[0], at[-1]), at)
     lines = np.stack([np.interp(between, at, c[at + 1]) for c in columns.T], axis=1)
-    if np.mean(np.abs(columns[between + 1] - lines).max(axis=1) > STRAIGHT * digit[between]) > 0.5:
+    if np.mean(np.abs(columns[between + 1] - lines).max(axis=1) > STRAIGHT * digit[between]) > MOSTLY:
         return every
     every[1:-1] = bend > STRAIGHT
     return every
@@ -107,9 +111,8 @@ def _bends(columns: FloatArray) -> BoolArray:
 
 def note_on_repeats(name: str, own: BoolArray, values: FloatArray) -> Note:
     """Return the note that of the samples of a signal (n,), or of several (n, k), only its `own` (n,) were measured."""
-    columns = values if values.ndim > 1 else values[:, None]
-    seen = np.isfinite(columns).all(axis=1)
-    is_held = bool((np.diff(columns[seen], axis=0)[~own[seen][1:]] == 0.0).all())
+    seen = rows_of(values)
+    is_held = bool((np.diff(values[seen], axis=0)[~own[seen][1:]] == 0.0).all())
     how, what = (
         ("repeated until the next, as in a table that is written at each message", "the repeats")
         if is_held

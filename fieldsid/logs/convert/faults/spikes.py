@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from fieldsid.logs.few_of import FEW
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.white_noise import MEDIAN_OF_NORMAL
 
@@ -24,11 +25,11 @@ ALIKE = 0.5
 """Least ratio of the distances from the lines on either side to that from the line across, which are equal for a lone sample."""
 DIGITS = 3.0
 """Limit of the three distances in units of the log's last digit."""
-FEW = 0.01
+SPARSE = 0.01
 """Largest share of spikes among the samples; where there are more, they belong to the signal."""
 FEWEST = 20
-ROUNDED, BULK = 1e-9, 0.05
-"""Share of a signal's range below which differences are rounding; share of values not counted in that range at either end."""
+ROUNDED = 1e-9
+"""Share of a signal's range, but for FEW values at either end, below which differences are rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +55,7 @@ def spikes_of(values: FloatArray) -> Spikes:
     sign, across = np.sign(middle), np.minimum(np.abs(middle), np.finfo(np.float64).max)
     alone = np.minimum(np.minimum(before * sign, after * sign), across) > np.maximum(limit, ALIKE * across)
     places = np.flatnonzero(alone)
-    if places.size > max(FEW * values.size, 1.0):
+    if places.size > max(SPARSE * values.size, 1.0):
         return none
     return Spikes(places + 2, np.abs(middle[places]), limit)
 
@@ -69,7 +70,7 @@ def spike_limit(values: FloatArray) -> float:
 
 def last_digit(values: FloatArray) -> float:
     """Return the least difference of two different values, which is the last digit of a log with few digits."""
-    ordered, ends = np.sort(values), int(BULK * values.size)
+    ordered, ends = np.sort(values), int(FEW * values.size)
     apart = np.diff(ordered)
     different = apart[apart > ROUNDED * (ordered[-1 - ends] - ordered[ends])]
     return float(different.min()) if different.size else 0.0

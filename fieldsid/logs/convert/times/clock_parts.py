@@ -27,7 +27,8 @@ from fieldsid.logs.convert.times.clock_text import (
     clock_of_text,
     made_continuous,
 )
-from fieldsid.logs.convert.units import scaled
+from fieldsid.logs.convert.units import UNITS, scaled
+from fieldsid.logs.few_of import NEARLY_ALL
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
@@ -48,20 +49,13 @@ PARTS: Mapping[str, Part] = MappingProxyType(
         "s": Part(1.0, np.inf),
         "ds": Part(1e-1, 1.0),
         "cs": Part(1e-2, 1.0),
-        "ms": Part(1e-3, 1.0),
-        "us": Part(1e-6, 1.0),
-        "ns": Part(1e-9, 1.0),
+        **{unit: Part(UNITS[unit].factor, 1.0) for unit in ("ms", "us", "ns")},
         "hhmm": Part(MINUTE_S, DAY_S),
         **{form: Part(1.0, period) for form, period in FORMS.items()},
     }
 )
 """Parts of a time in several columns: `s` are seconds that never start again, `ss` are the seconds of a minute."""
 PLUS = "+"
-MOSTLY = 0.9
-"""Smallest share, among the changes of the upper part and the falls of the lower one, at which their sum must not decrease.
-
-It is below one because a damaged log has exceptions.
-"""
 
 
 def parts_of(form: str | None, columns: Sequence[str | int], place: str = "the mapping") -> tuple[str, ...]:
@@ -111,8 +105,8 @@ def carries(upper: FloatArray, lower: FloatArray, upper_period_s: float, lower_p
     either = falls | changes
     if not either.any():
         return True
-    is_slow = float(np.median(steps)) > 0.5 * lower_period_s
-    return float((steps[either] >= 0.0).mean()) >= MOSTLY and (is_slow or 2 * int((falls & changes).sum()) >= int(either.sum()))
+    is_slow, rises = float(np.median(steps)) > 0.5 * lower_period_s, float((steps[either] >= 0.0).mean())
+    return rises >= NEARLY_ALL and (is_slow or 2 * int((falls & changes).sum()) >= int(either.sum()))
 
 
 def put_together(names: Sequence[str], parts: Sequence[str], dates: Sequence[str]) -> Note:

@@ -17,11 +17,14 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.number_cells import as_numbers
-from fieldsid.logs.convert.times.dates import DATE, MOSTLY, days_of, stamps_in, texts
+from fieldsid.logs.convert.times.dates import DATE, days_of, stamps_in, texts
+from fieldsid.logs.convert.units import UNITS
+from fieldsid.logs.few_of import MOSTLY
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
-MINUTE_S, HOUR_S, DAY_S, WEEK_S = 60.0, 3600.0, 86400.0, 604800.0
+MINUTE_S, HOUR_S, DAY_S = (UNITS[unit].factor for unit in ("min", "h", "d"))
+WEEK_S = 7.0 * DAY_S
 STAMP = "yyyymmddhhmmss"
 FORMS = {"hh:mm:ss": DAY_S, "mm:ss": HOUR_S, "hh:mm": DAY_S, "hhmmss": DAY_S, STAMP: np.inf}
 """Forms of a clock that a mapping may state as the unit of time, each with the period in s after which it starts again."""
@@ -162,7 +165,7 @@ def round_of(values: npt.NDArray[Any], factor: float) -> Round | None:
     rounds = [(f"each {name}", s / factor) for name, s in ROUNDS_S.items()]
     for words, period in [*rounds, *((f"after {bits}", size) for bits, size in COUNTERS.items())]:
         falls = steps[steps < -0.5 * period] + period
-        if span <= period and falls.size and float((falls <= FEW_STEPS * usual).mean()) > 0.5:
+        if span <= period and falls.size and float((falls <= FEW_STEPS * usual).mean()) > MOSTLY:
             return words, period
     return None
 

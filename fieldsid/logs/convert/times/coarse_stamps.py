@@ -14,12 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.times.clock_text import FEW_STEPS
+from fieldsid.logs.few_of import FEW, FEWEST, NEARLY_ALL
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
-FEWEST = 10
-WORN_OUT = 0.05
-"""Largest share of a last digit that the last bit of a number may be worth; above it any number would count as whole."""
 DIGITS = range(2, 8)
 DECIMALS = range(-9, 9)
 WITHIN = 1.0 + 1e-6
@@ -34,8 +32,6 @@ MOST = 99.0
 """Percentile of the steps up to which they are averaged to the usual step: longer ones may be gaps."""
 SHORT = 3.0
 """Smallest length of a stretch, in units of the last digit, from which its step is estimated from its stamps."""
-IN_TURN = 0.9
-"""Smallest share of changes by exactly one last digit for the stamps of a drifting clock to be spread."""
 
 
 def rebuilt(time: FloatArray, name: str) -> tuple[FloatArray, list[Note]]:
@@ -117,11 +113,12 @@ def _last_digits(stamps: FloatArray) -> list[FloatArray]:
 def _whole(numbers: FloatArray, last_bit: float = 0.0) -> bool:
     """Whether numbers are whole within `last_bit`, the value of their last bit, and not all zero in too large a unit.
 
-    A last digit tells apart what differs: an epoch near a round number is not whole in millions of seconds.
+    A last bit that is worth more than a FEW hundredths would make any number whole. A last digit tells apart what differs: an
+    epoch near a round number is not whole in millions of seconds.
     """
     whole = np.round(numbers)
     made_equal = np.diff(whole)[np.diff(numbers) != 0.0] == 0.0
-    if not bool(np.abs(numbers).max() >= 1.0) or last_bit > WORN_OUT or bool(made_equal.any()):
+    if not bool(np.abs(numbers).max() >= 1.0) or last_bit > FEW or bool(made_equal.any()):
         return False
     return bool(np.all(np.abs(numbers - whole) <= 1e-6 + last_bit + 1e-12 * np.abs(numbers)))
 
@@ -156,7 +153,7 @@ def _spread(stamps: FloatArray, last: FloatArray) -> FloatArray | None:
     """Return the times (n,) of samples spread evenly from each stamp to the next; None unless stamps rise by one last digit."""
     steps = np.diff(stamps)
     changed = np.flatnonzero(steps > 0.0) + 1
-    if changed.size < 2 or float(np.isclose(steps[changed - 1], last[changed], rtol=1e-6).mean()) < IN_TURN:
+    if changed.size < 2 or float(np.isclose(steps[changed - 1], last[changed], rtol=1e-6).mean()) < NEARLY_ALL:
         return None
     known, at = stamps[changed], changed.astype(np.float64)
     usual = float((known[-1] - known[0]) / (at[-1] - at[0]))

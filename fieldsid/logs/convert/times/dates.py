@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.number_cells import as_numbers
+from fieldsid.logs.few_of import MOSTLY
 from fieldsid.numerics.arrays import FloatArray
 
 if TYPE_CHECKING:
@@ -19,10 +20,7 @@ DATE = re.compile(r"(\d{1,4})([-/.])(\d{1,2}|[A-Za-z]{3})[-/.](\d{1,4})")
 OF_WEEK_OR_YEAR = r"\d{4}-(?:W\d\d-\d|\d{3})"
 """2024-W09-5, the fifth day of a week, and 2024-061, the 61st day of a year."""
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
-MOSTLY = 0.5
-"""A column has a form if more than this share of its cells has it."""
-LONGEST_YEAR = 4
-YEARS = (1970.0, 2120.0)
+YEARS = (1980, 2100)
 """Plausible years of a log, the last one excluded."""
 
 
@@ -45,7 +43,7 @@ def days_of(cells: npt.NDArray[Any]) -> FloatArray | None:
         return None
     a, b, c = (_month_numbers(parts[i]) for i in (0, 2, 3))
     named = parts[2].str.isalpha().fillna(value=False).any()
-    is_iso = bool((parts[0].str.len() == LONGEST_YEAR).any())
+    is_iso = bool((parts[0].str.len() == len("yyyy")).any())
     return _likeliest([(a, b, c)] if is_iso else [(c, b, a)] if named else [(c, a, b), (c, b, a)])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -32,16 +33,21 @@ from fieldsid.logs.convert.times.clock_text import (
 )
 from fieldsid.logs.convert.times.coarse_stamps import rebuilt
 from fieldsid.logs.convert.times.dates import YEARS, days_of_columns, texts
-from fieldsid.logs.convert.units import Unit, pick_unit, scaled
-from fieldsid.logs.reader import ReadOptions
+from fieldsid.logs.convert.units import UNITS, Unit, pick_unit, scaled
+from fieldsid.logs.few_of import MOSTLY
+from fieldsid.logs.reader import AS_IT_IS, ReadOptions
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 EPOCH_FROM_S = 1e8
 """A time that starts at more than this many seconds (three years) counts from an epoch, not from the start of the run."""
-GPS_EPOCH_S = 315964800.0
-"""6 January 1980, from which GPS weeks count, in seconds since 1970."""
+GPS_EPOCH_S = datetime(1980, 1, 6, tzinfo=UTC).timestamp()
+"""The day from which GPS weeks count, in seconds since 1970."""
+YEARS_S = tuple(datetime(year, 1, 1, tzinfo=UTC).timestamp() for year in YEARS)
+"""Seconds since 1970 at the start and the end of the plausible years of a log."""
+LATEST_S = 1e9 * YEARS_S[1]
+"""Largest plausible time, even for nanoseconds since 1970 taken for seconds: a larger number is a damaged cell."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +83,7 @@ class _Column:
 def seconds_of(
     cells: npt.NDArray[Any],
     unit: str | None,
-    options: ReadOptions | None = None,
+    options: ReadOptions = AS_IT_IS,
     *,
     name: str,
     dates: Sequence[npt.NDArray[Any]] = (),
@@ -91,7 +97,7 @@ def seconds_of(
     its start. Stamps with too few digits are rebuilt, see coarse_stamps.py. Cells that are no times become NaN when salvaging.
     Raises LogError for a cell that is no time, MappingError for what is no unit of time.
     """
-    column = _Column(cells, name, options or ReadOptions())
+    column = _Column(cells, name, options)
     column.refuse_empty()
     if unit in FORMS or (dates and cells.dtype.kind == "O"):
         return _from_clock(_clock(column, unit if unit in FORMS else None), column, dates)
@@ -107,7 +113,7 @@ def seconds_of(
 def seconds_of_parts(
     columns: Sequence[npt.NDArray[Any]],
     form: str | None,
-    options: ReadOptions | None = None,
+    options: ReadOptions = AS_IT_IS,
     *,
     names: Sequence[str],
     dates: Sequence[npt.NDArray[Any]] = (),
@@ -117,10 +123,10 @@ def seconds_of_parts(
 
     Raises MappingError for a form that does not fit, LogError for a row in which a part is missing.
     """
-    _Column(columns[0], names[0], options or ReadOptions()).refuse_empty()
+    _Column(columns[0], names[0], options).refuse_empty()
     parts = parts_of(form, names)
     clock = clock_of_parts(columns, parts)
-    time, notes = _from_clock(clock, _Column(clock.seconds, PLUS.join(names), options or ReadOptions()), dates)
+    time, notes = _from_clock(clock, _Column(clock.seconds, PLUS.join(names), options), dates)
     return time, [put_together(names, parts, date_names if dates else ()), *notes]
 
 
@@ -136,14 +142,14 @@ def likely_time_unit(cells: npt.NDArray[Any]) -> str | None:
     steps = np.diff(seen.astype(np.float64))
     ahead = steps[steps > 0.0]  # most steps of stamps with too few digits are zero
     step = float(np.median(ahead)) if ahead.size else 0.0
-    epoch = "ns" if size > 1e17 else "us" if size > 1e14 else "ms" if size > 1e11 else "d" if _are_days(size, step) else ""
     if _are_digits_of_a_clock(seen):
         return "hhmmss"
     if any(low <= size < high for low, high in STAMPS):
         return STAMP
     if YEARS_S[0] < size < YEARS_S[1] and bool((seen != np.round(seen)).any()):
         return "s"
-    return epoch or unit_of_step(step) or "s"
+    of_epoch = next((u for u in ("ms", "us", "ns") if YEARS_S[0] < size * UNITS[u].factor < YEARS_S[1]), "")
+    return of_epoch or ("d" if _are_days(size, step) else unit_of_step(step)) or "s"
 
 
 def _are_digits_of_a_clock(seen: npt.NDArray[Any]) -> bool:
@@ -171,18 +177,14 @@ DAYS = ((2e4, 8e4), (7e5, 8e5), (2.4e6, 2.5e6))
 """Ranges of days: since 1900 as in spreadsheets (1954 to 2119; as in astronomy from 1982), since year 0, and Julian days."""
 FASTEST_S = 1e-4
 """A shorter step is implausible in seconds; in days it is a step of less than 9 s."""
-YEARS_S = (946684800, 4102444800)
-"""Seconds since 1970 between 2000 and 2100."""
-LATEST_S = 1e20
-"""Largest plausible time, even for nanoseconds since an epoch taken for seconds: a larger number is a damaged cell."""
 SLOW_S = 5.0
 """A log with a longer step would not show a vehicle's motion, so that its time must be in another unit."""
 
 
 def unit_of_step(step_s: float) -> str:
     """Return the unit of time in which a step that is too long in seconds is plausible; empty where there is none."""
-    units = [name for name, factor in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)) if 1e-4 <= step_s * factor <= 2.0]
-    return units[0] if units and step_s > SLOW_S else ""
+    plausible = (unit for unit in ("ms", "us", "ns") if FASTEST_S <= step_s * UNITS[unit].factor <= SLOW_S)
+    return next(plausible, "") if step_s > SLOW_S else ""
 
 
 def time_unit(unit: str, what: str = "time") -> Unit:
@@ -225,7 +227,7 @@ def _of_text(column: _Column, unit: str | None) -> tuple[FloatArray, list[Note]]
             raise column.error_at("holds cells that are no times", wrong)
         return _of_numbers(values, _factor(unit), column)
     stamps = _iso(cells)
-    if np.isnat(stamps).mean() > 0.5:
+    if np.isnat(stamps).mean() > MOSTLY:
         other = stamps_of_text(cells)
         if other is not None:
             return _from_start(other, column)
@@ -239,12 +241,9 @@ def _of_text(column: _Column, unit: str | None) -> tuple[FloatArray, list[Note]]
 
 def _of_stamps(stamps: npt.NDArray[np.datetime64], column: _Column) -> tuple[FloatArray, list[Note]]:
     """Return the seconds of dates and times (n,) from the first one on, and notes; NaT where a row has none."""
-    there = ~np.isnat(stamps)
-    notes = column.without_time(there)
-    nanoseconds = stamps.astype(np.int64)
+    there, nanoseconds = ~np.isnat(stamps), stamps.astype(np.int64)
     start = int(nanoseconds[there][0]) if there.any() else 0
-    seconds, coarse = rebuilt(np.where(there, (nanoseconds - start) / 1e9, np.nan), column.name)
-    return seconds, [*notes, *coarse, _origin(start / 1e9)]
+    return _from_start(np.where(there, (nanoseconds - start) / 1e9, np.nan), column, start_s=start / 1e9)
 
 
 def _from_clock(clock: Clock, column: _Column, dates: Sequence[npt.NDArray[Any]]) -> tuple[FloatArray, list[Note]]:
@@ -269,14 +268,16 @@ def _clock(column: _Column, form: str | None) -> Clock:
     return found
 
 
-def _from_start(seconds: FloatArray, column: _Column, *, is_of_day: bool = False) -> tuple[FloatArray, list[Note]]:
-    """Return seconds (n,) counted from the first one, and notes on cells without a time and on the start."""
+def _from_start(
+    seconds: FloatArray, column: _Column, *, start_s: float = 0.0, is_of_day: bool = False
+) -> tuple[FloatArray, list[Note]]:
+    """Return seconds (n,) after `start_s` counted from the first one, and notes on cells without a time and on the start."""
     there = np.isfinite(seconds)
     notes = column.without_time(there)
     start = float(seconds[there][0]) if there.any() else 0.0
     # A clock has at most nine decimals of a second; further digits are rounding errors of the subtraction.
     time, coarse = rebuilt(np.round(seconds - start, 9), column.name)
-    return time, [*notes, *coarse, _origin(start, is_of_day=is_of_day)]
+    return time, [*notes, *coarse, _origin(start_s + start, is_of_day=is_of_day)]
 
 
 def _of_weeks(column: _Column, unit: str | None, weeks: npt.NDArray[Any]) -> tuple[FloatArray, list[Note]]:

@@ -6,8 +6,10 @@ from look_alikes import SPEED, truth, write_table
 
 from fieldsid.errors import LogError
 from fieldsid.logs import load_run
-from fieldsid.logs.convert.units import KNOT
+from fieldsid.logs.convert.units import UNITS
 from fieldsid.logs.inspection import inspect_log, write_proposal
+
+KNOT = UNITS["kn"].factor
 
 TRUTH = truth(noise=0.0)
 LATITUDE_DEG, LONGITUDE_DEG = 57.05, 9.87
@@ -31,7 +33,12 @@ def without_header(log):
 
 
 def test_degrees_of_the_globe_without_a_name_are_no_metres(tmp_path):
-    columns = {"t": TRUTH["time_s"], **GEOGRAPHIC, "h": HEADING_DEG, "v": SPEED / KNOT + 0.01 * np.sin(TRUTH["time_s"])}
+    columns = {
+        "t": TRUTH["time_s"],
+        **GEOGRAPHIC,
+        "h": HEADING_DEG,
+        "v": SPEED / KNOT + 0.01 * np.sin(TRUTH["time_s"]),
+    }
     found, run = read_as_proposed(without_header(write_table(tmp_path / "boat.csv", columns)))
     assert found.proposal.body["signals"]["position"] == {"columns": [1, 2]}
     assert found.proposal.body["signals"]["surge_m_s"] == {"column": 4, "unit": "kn"}
