@@ -7,6 +7,7 @@ times the usual activity of the fin.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -15,14 +16,15 @@ import numpy as np
 
 from fieldsid.errors import DataError, UsageError
 from fieldsid.logs.convert.settling import settling_of
-from fieldsid.logs.run import Run
+from fieldsid.logs.run import MEASURED_FIN, Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 BEFORE_S = 2.0
 AFTER_S = 10.0
-LEAST_RAD = 0.0087
-"""Half a degree in rad; a smaller excursion is not excitation."""
-SHARE_OF_LARGEST = 0.25
+LEAST_RAD = math.radians(0.5)
+"""A smaller excursion is not excitation."""
+MOVED = 0.25
+"""Share of the largest excursion of a fin, or of its range, from which on a change is a movement."""
 ACTIVITY = 4.0
 WHOLE = 0.8
 """Share of a run from which on its excitation is long enough for the complete run to be used."""
@@ -30,7 +32,7 @@ STEADY_S = 1.0
 """Time at the start over which the trim is the median of the fin angle."""
 
 YAW = "yaw"
-_FINS = {YAW: ("rudder_measured_rad", "rudder_rad"), "pitch": ("elevator_measured_rad", "elevator_rad")}
+_FINS = dict(zip((YAW, "pitch"), MEASURED_FIN.items(), strict=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +55,7 @@ def segment(run: Run, axis: str) -> Segment:
     """
     signal = _fin_of(run, axis)
     if signal is None:
-        raise no_fin(run, axis, _FINS[axis][1])
+        raise no_fin(run, axis, _FINS[axis][0])
     time, fin = _finite_samples(run, signal)
     away, limit = excursions(run.name, axis, signal, time, fin, _answer_of(run))
     return _segment_around(run, time, away, signal, limit)
@@ -82,10 +84,10 @@ def excited_axis(runs: Sequence[Run], *, written: str) -> str:
         return found[0]
     has_fin = {axis: any(_fin_of(run, axis) for run in runs) for axis in _FINS}
     seen = ", ".join(
-        f"{axis} in {count} of {len(runs)}" if has_fin[axis] else f"no fin for {axis} (`{_FINS[axis][1]}`)"
+        f"{axis} in {count} of {len(runs)}" if has_fin[axis] else f"no fin for {axis} (`{_FINS[axis][0]}`)"
         for axis, count in excited.items()
     )
-    lacking = next((_FINS[axis][1] for axis in _FINS if not has_fin[axis]), None)
+    lacking = next((_FINS[axis][0] for axis in _FINS if not has_fin[axis]), None)
     otherwise = "or fly an excitation" if lacking is None else f"or map `{lacking}` on import"
     choice = "write " + " or ".join(written.format(axis=axis) for axis in _FINS if has_fin[axis])
     raise UsageError(
@@ -107,7 +109,7 @@ def may_show(run: Run, axis: str) -> bool:
 
 def _fin_of(run: Run, axis: str) -> str | None:
     """Return the signal of the fin of an axis, the command where command and measurement exist; None where neither does."""
-    return next((s for s in reversed(_FINS[axis]) if run.has(s)), None)
+    return next((s for s in _FINS[axis] if run.has(s)), None)
 
 
 def _finite_samples(run: Run, signal: str) -> tuple[FloatArray, FloatArray]:
@@ -182,10 +184,10 @@ def no_fin(run: Run, axis: str, missing: str) -> DataError:
 def _excursion_mask(time: FloatArray, fin: FloatArray) -> tuple[BoolArray, float]:
     trim = float(np.median(fin[time <= time[0] + STEADY_S]))
     off = np.abs(fin - trim)
-    quiet = off[off < SHARE_OF_LARGEST * off.max()] if off.max() > 0 else off
+    quiet = off[off < MOVED * off.max()] if off.max() > 0 else off
     # The median of the small deviations only, so that a long excitation does not raise its own limit.
     activity = float(np.median(quiet)) if quiet.size else 0.0
-    limit = max(LEAST_RAD, SHARE_OF_LARGEST * float(off.max()), ACTIVITY * activity)
+    limit = max(LEAST_RAD, MOVED * float(off.max()), ACTIVITY * activity)
     return off > limit, limit
 
 

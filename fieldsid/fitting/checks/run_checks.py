@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from fieldsid.fitting.fin_offset import offset_of
-from fieldsid.logs.doctor.fin_findings import BEYOND_SHARE, share_beyond
+from fieldsid.logs.doctor.fin_findings import share_beyond
+from fieldsid.logs.few_of import FEW
 from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
@@ -51,12 +52,12 @@ def _limit(run: Run, axis: Axis, vehicle: Vehicle | None) -> Iterator[Note]:
     if limit is None or not run.has(name):
         return
     share = share_beyond(run, name, limit)
-    if share > BEYOND_SHARE:
+    if share > FEW:
         yield Note(
             "fin_at_limit",
             f"run {run.name!r}: {name} is beyond its limit of {limit:.3g} rad for {100 * share:.0f} % of the time (limit "
-            f"{100 * BEYOND_SHARE:.0f} %): the fin stopped there, and the log does not show it; log the measured fin",
-            {"value": share, "limit": BEYOND_SHARE, "signal": name, "run": run.name},
+            f"{100 * FEW:.0f} %): the fin stopped there, and the log does not show it; log the measured fin",
+            {"value": share, "limit": FEW, "signal": name, "run": run.name},
         )
 
 

@@ -13,9 +13,10 @@ import numpy as np
 
 from fieldsid.errors import DataError
 from fieldsid.logs.convert.faults.spikes import DIGITS, SPREADS, last_digit
+from fieldsid.logs.convert.heading_unwrap import ALIKE
 from fieldsid.logs.convert.units import UNIT_LIMIT, UNITS, unit_of_ratio
 from fieldsid.logs.doctor.stated import Stated
-from fieldsid.logs.doctor.together import delay_of, over, together
+from fieldsid.logs.doctor.together import SURE, delay_of, over, together
 from fieldsid.logs.run import SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.shifted_correlation import shifted_correlations, slope_of
@@ -27,17 +28,14 @@ PAIR_WINDOW_S, LONG_WINDOW_S = 1.0, 4.0
 TRUSTED = 0.8
 """Smallest correlation at which a slope is used."""
 STRONG, WEAK = 0.9, 0.5
-"""Smallest correlation of a signal with its rate, and the correlation below which, at every shift, the two are unrelated."""
-MIN_NOISE_RATIO = 4.0
-"""Smallest ratio of a change to its noise at which it is compared."""
-FASTER, FEWEST_JUMPS = 1.5, 2
-"""Allowed difference of an angle from its rate, in steps at the 90th percentile of the rate, and fewest jumps for a finding."""
+"""Smallest correlation of a signal with its rate, or mean cosine of two directions, that agree; and the correlation below which,
+at every shift, two signals are unrelated."""
+FASTER = 1.5
+"""Allowed difference of an angle from its rate, in steps at the 90th percentile of the rate."""
 JUMP_WIDTHS = (1, 2, 4)
 """Numbers of steps over which jumps are sought."""
 FITS_BETTER = 2.5
 """Significant ratio of two variances of the same steps, at least 50: 2.4 is the upper 0.1 percent point of F(50, 50)."""
-ROUNDING = 1e-12
-"""Smallest circular variance, in place of zero."""
 DEGREES = 180.0 / math.pi
 RATES = {u.name: u.factor for u in UNITS.values() if u.dimension == "angle rate"}
 """Units of rates, in rad/s."""
@@ -168,7 +166,8 @@ def _unwrapped_degrees(run: Run, angle: str, rate: str, stated: Stated) -> list[
     if both is None:
         return []
     made, turned = np.diff(both[1]), np.diff(trapezoid_integral(both[0], both[2]))
-    as_rad, as_deg = (max(1.0 - abs(complex(np.mean(np.exp(1j * (made - k * turned))))), ROUNDING) for k in (1.0, DEGREES))
+    least = float(np.finfo(np.float64).eps)
+    as_rad, as_deg = (max(1.0 - abs(complex(np.mean(np.exp(1j * (made - k * turned))))), least) for k in (1.0, DEGREES))
     if not as_deg < as_rad / FITS_BETTER:
         return []
     advice, unit = _in_degrees(angle, "deg", rate, stated)
@@ -216,7 +215,7 @@ def _jumps_over(
     limit = max(SPREADS * usual, DIGITS * last_digit(turned))
     jumping = np.flatnonzero(off > np.maximum(limit, fastest * np.diff(time)[width - 1 :]))
     places = 1 + int(np.count_nonzero(np.diff(jumping) > width)) if jumping.size else 0
-    if places < FEWEST_JUMPS or usual == 0.0:
+    if places < 2 or usual == 0.0:
         return None
     at = int(np.argmax(off))
     return places, float(off[at]), limit, float(time[at])
@@ -252,14 +251,14 @@ def changes_of(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray,
         return None
     time, turned, turning = both
     swept, step = trapezoid_integral(time, turning), float(np.median(np.diff(time)))
-    floor = MIN_NOISE_RATIO * math.sqrt(2.0) * _noise(turned)
+    floor = SURE * math.sqrt(2.0) * _noise(turned)
     noise = _noise(turning)
     for window_s in (PAIR_WINDOW_S, LONG_WINDOW_S):
         width = max(1, round(window_s / step))
         if time.size <= 3 * width:
             return None
         a, b = over(turned, width), over(swept, width)
-        if float(np.std(a)) > floor and float(np.std(b)) > MIN_NOISE_RATIO * noise * math.sqrt(window_s * step):
+        if float(np.std(a)) > floor and float(np.std(b)) > SURE * noise * math.sqrt(window_s * step):
             return a, b, step
     return None
 
@@ -276,7 +275,7 @@ def _slope_findings(angle: str, rate: str, slope: float, stated: Stated) -> list
         message = f"{rate} runs against {angle} (slope {slope:.3g}, should be 1): {stated.flip(angle, rate)}, or set the frame"
         found.append(Note("rate_sign", message, data))
     size = abs(slope)
-    if 0.7 < size / DEGREES < 1.4:
+    if ALIKE[0] < size / DEGREES < ALIKE[1]:
         advice, unit = _in_degrees(angle, "deg", rate, stated)
         found.append(
             Note("unit", f"{angle} changes {size:.3g} times as fast as {rate} says: {advice}", {**data, "signal": angle, **unit})

@@ -12,10 +12,11 @@ from fieldsid.logs.channels import AXES
 from fieldsid.logs.convert.conditioning import blocks_of
 from fieldsid.logs.convert.servo_counts import servo_of
 from fieldsid.logs.convert.units import DEGREE
-from fieldsid.logs.doctor.holes import MOVED
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.doctor.together import SURE, together
-from fieldsid.logs.run import Note, Run
+from fieldsid.logs.few_of import FEW
+from fieldsid.logs.run import MEASURED_FIN, Note, Run
+from fieldsid.logs.segments import MOVED
 from fieldsid.numerics.arrays import FloatArray
 
 WIDEST = 0.8
@@ -30,8 +31,8 @@ EARLY = 0.15
 FEWEST = 5
 ONE_SIDED = 0.02
 """Largest deflection to the other side of a fin that goes to one side only, as a share of its largest one."""
-FEWEST_EACH_SIDE, OTHER_SIDE = 2, 0.3
-"""Fewest turns to each side, and their smallest ratio, at which a fin on one side turns a vehicle to both."""
+OTHER_SIDE = 0.3
+"""Smallest ratio of the turns to each side, at least two of them, at which a fin on one side turns a vehicle to both."""
 ROLLED = math.acos(0.9)
 """Roll phi in rad at which the yaw rate of the body differs by a tenth from that of the heading: r = psi' cos(phi)."""
 
@@ -87,7 +88,7 @@ def _without_side(run: Run, angle: str, fin: str) -> list[Note]:
     turns = np.array([turned[end - 1] - turned[start] for start, end in ends])
     of_side = [turns[side * turns > 0.0] for side in (-1.0, 1.0)]
     less, more = sorted(float(np.abs(t).sum()) for t in of_side)
-    if min(t.size for t in of_side) < FEWEST_EACH_SIDE or less < OTHER_SIDE * more:
+    if min(t.size for t in of_side) < 2 or less < OTHER_SIDE * more:
         return []
     message = (
         f"{fin} goes to one side only, and {angle} turns to either one over its {turns.size} deflections: it is a size without "
@@ -153,13 +154,13 @@ def _roll_finding(run: Run) -> list[Note]:
     seen = np.isfinite(run["roll_rad"])
     time, roll = run.time[seen], np.abs(run["roll_rad"][seen])
     share = float(np.mean((roll > ROLLED) & (roll < math.pi - ROLLED)))
-    if share <= 0.05 or float(np.percentile(roll, 99)) > math.pi:
+    if share <= FEW or float(np.percentile(roll, 99)) > math.pi:
         return []
     message = (
-        f"roll_rad is beyond {math.degrees(ROLLED):.0f} deg for {100 * share:.0f} % of the run (limit 5 %): there yaw and pitch "
-        f"answer to both fins, and no model of one axis holds{_upright_advice(time, roll)}"
+        f"roll_rad is beyond {math.degrees(ROLLED):.0f} deg for {100 * share:.0f} % of the run (limit {100 * FEW:.0f} %): there "
+        f"yaw and pitch answer to both fins, and no model of one axis holds{_upright_advice(time, roll)}"
     )
-    return [Note("rolled", message, {"signal": "roll_rad", "value": share, "limit": 0.05})]
+    return [Note("rolled", message, {"signal": "roll_rad", "value": share, "limit": FEW})]
 
 
 def _upright_advice(time: FloatArray, roll: FloatArray) -> str:
@@ -171,10 +172,8 @@ def _upright_advice(time: FloatArray, roll: FloatArray) -> str:
     return f"; take the longest stretch without: `--from {begin:.2f} --to {end:.2f}`"
 
 
-BEYOND_SHARE = 0.05
-"""Largest share of a run in which a command may exceed the limit of the fin."""
-FIN_ZERO = 0.0175
-"""One degree in rad, the accuracy of a fin's zero. Commands about a trim may exceed the limit by as much."""
+FIN_ZERO = math.radians(1.0)
+"""The accuracy of a fin's zero in rad. Commands about a trim may exceed the limit by as much."""
 
 
 def limit_findings(run: Run, fin_max_rad: Mapping[str, float]) -> list[Note]:
@@ -183,17 +182,17 @@ def limit_findings(run: Run, fin_max_rad: Mapping[str, float]) -> list[Note]:
 
 
 def _limit_finding(run: Run, fin: str, limit: float) -> list[Note]:
-    """Return the finding that a fin was measured or commanded beyond its limit (rad) for more than BEYOND_SHARE of the run."""
-    measured, stated = f"{fin.removesuffix('_rad')}_measured_rad", f"`{fin.removesuffix('_rad')}_max_rad` of vehicle.yaml"
+    """Return the finding that a fin was measured or commanded beyond its limit (rad) for more than FEW of the run."""
+    measured, stated = MEASURED_FIN.get(fin, fin), f"`{fin.removesuffix('_rad')}_max_rad` of vehicle.yaml"
     name = measured if run.has(measured) else fin
-    if not run.has(name) or (share := _share_beyond(run, name, limit)) <= BEYOND_SHARE:
+    if not run.has(name) or (share := _share_beyond(run, name, limit)) <= FEW:
         return []
     reach = float(np.nanmax(np.abs(run[name])))
     message = (
         f"{name} goes to {reach:.3g} rad, beyond the fin's limit of {limit:.3g} rad for {100 * share:.0f} % of the run (limit "
-        f"{100 * BEYOND_SHARE:.0f} %): "
+        f"{100 * FEW:.0f} %): "
     )
-    data = {"signal": name, "value": share, "limit": BEYOND_SHARE, "reach_rad": reach}
+    data = {"signal": name, "value": share, "limit": FEW, "reach_rad": reach}
     if name == measured:
         return [Note("fin_limit", f"{message}correct {stated}", data)]
     advice = f"where the fin goes so far, correct {stated}; where it stopped, the log does not show it: log the measured fin"
@@ -209,6 +208,4 @@ def share_beyond(run: Run, fin: str, limit: float) -> float:
 
     The share is zero where the fin itself was measured.
     """
-    if run.has(f"{fin.removesuffix('_rad')}_measured_rad") or fin.endswith("_measured_rad"):
-        return 0.0
-    return _share_beyond(run, fin, limit)
+    return 0.0 if run.has(MEASURED_FIN.get(fin, fin)) else _share_beyond(run, fin, limit)

@@ -13,15 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.logs.convert.times.clock_text import FEW_STEPS
+from fieldsid.logs.few_of import NEARLY_ALL
 from fieldsid.logs.run import Note, Run
+from fieldsid.logs.segments import MOVED
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 JITTER = 0.35
 """Relative deviation from the usual step that is jitter of the clock and not a missing sample."""
-REGULAR = 0.9
-"""Smallest share of usual steps, within jitter, in a log with regular steps, in which a longer step has missing samples."""
-MOVED = 0.25
-"""Share of the range of a fin from which on a change is a movement; a smaller one over a hole is neglected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +41,8 @@ def usual_step(steps: FloatArray) -> float | None:
 
 
 def is_usual(regular: BoolArray) -> bool:
-    """Return whether steps are regular: `regular` (n,) marks those that differ from their median by jitter only."""
-    return bool(np.count_nonzero(regular) > REGULAR * regular.size)
+    """Return whether NEARLY_ALL steps are usual: `regular` (n,) marks those that differ from their median by jitter only."""
+    return bool(np.count_nonzero(regular) > NEARLY_ALL * regular.size)
 
 
 def holes_of(time: FloatArray, fin: FloatArray) -> tuple[Hole, ...]:

@@ -14,9 +14,10 @@ import numpy as np
 from fieldsid.logs.channels import AXES
 from fieldsid.logs.convert.heading_unwrap import ALIKE
 from fieldsid.logs.convert.units import UNIT_LIMIT, factor_to, unit_of_ratio
-from fieldsid.logs.doctor.angle_and_rate import TRUSTED
+from fieldsid.logs.doctor.angle_and_rate import STRONG, TRUSTED
 from fieldsid.logs.doctor.stated import Stated
-from fieldsid.logs.doctor.together import FEWEST, SURE, delay_of, over, together, width_of
+from fieldsid.logs.doctor.together import FEWEST, SURE, agreement, delay_of, over, together, width_of
+from fieldsid.logs.few_of import FEW
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.shifted_correlation import slope_of
@@ -24,8 +25,9 @@ from fieldsid.numerics.trapezoid import trapezoid_integral
 
 SPEEDS = {unit: factor_to("surge_m_s", unit) for unit in ("kn", "mph", "km/h", "ft/s", "cm/s", "mm/s")}
 """Units of speeds, in m/s."""
-LEAST_WAY, MOST_WAY = 0.6, 1.5
-"""Limits of the ratio of the speed from positions to the logged speed; currents and sideslip stay within."""
+MOST_WAY = 1.5
+"""Largest ratio of the speed from positions and the logged speed, either way; currents and sideslip stay within."""
+LEAST_WAY = 1.0 / MOST_WAY
 SLOWEST = 0.1
 """Speed in m/s below which a distance is mostly sensor noise."""
 SLOW_RPM = 30.0
@@ -56,7 +58,7 @@ def _speed_and_distance(run: Run, stated: Stated) -> list[Note]:
         if unit
         else "check the unit of speed"
     )
-    message = f"the way made is {ratio:.3g} times what surge_m_s says (limits {LEAST_WAY:g} and {MOST_WAY:g}): {advice}"
+    message = f"the way made is {ratio:.3g} times what surge_m_s says (limits {LEAST_WAY:.2g} and {MOST_WAY:g}): {advice}"
     data = {"signal": "surge_m_s", "value": ratio, "limit": MOST_WAY} | ({"unit": unit} if unit else {})
     return [Note("speed_unit", message, data)]
 
@@ -118,15 +120,10 @@ def _command_and_fin(run: Run, command: str, fin: str, stated: Stated) -> list[N
 
 
 WINDOW_S = 3.0
-AGREES = 0.9
-"""Smallest length of the mean unit vector of the angle between two directions that agree."""
 TURNED = 0.2
 """Smallest difference of two agreements for a finding; the heading must turn for it to occur."""
-ALL_BUT = 0.95
-"""Smallest share of windows with motion in which the course can be unwrapped."""
 RATIO = 2.0
 """Largest ratio of the turns of course and heading: a vehicle with sideslip turns as far as its course in the end."""
-FEWEST_MOVED = 20
 LEAST_DIVE, MOST_DIVE = ALIKE
 """Limits of the ratio of the change of depth to that from speed and pitch; a heave velocity stays within."""
 DEPTHS = {unit: factor_to("depth_m", unit) for unit in ("ft", "fathom", "cm", "mm")}
@@ -151,7 +148,7 @@ class Course:
         """Ratio of the turns of course and heading; None where they are uncorrelated or the course cannot be unwrapped."""
         c, h = np.unwrap(self.course) - np.unwrap(self.course).mean(), self.heading - self.heading.mean()
         power = math.sqrt(float(c @ c) * float(h @ h))
-        if self.moved <= ALL_BUT or power == 0.0 or float(c @ h) / power < AGREES or float(np.std(c)) < TURNED:
+        if self.moved <= 1.0 - FEW or power == 0.0 or float(c @ h) / power < STRONG or float(np.std(c)) < TURNED:
             return None
         return math.sqrt(float(c @ c) / float(h @ h))
 
@@ -167,7 +164,7 @@ def course_of(run: Run, window_s: float = WINDOW_S) -> Course | None:
     moved = way > SLOWEST * window_s
     heading = trapezoid_integral(time, yaw)
     mean, rate = (over(v, width) / over(time, width) for v in (heading, yaw))
-    if moved.sum() < FEWEST_MOVED:
+    if moved.sum() < FEWEST:
         return None
     share = float(moved.mean())
     return Course(np.arctan2(dy, dx)[moved], mean[moved], rate[moved], way[moved], share, width)
@@ -178,10 +175,8 @@ def _course_findings(run: Run) -> list[Note]:
     if found is None:
         return []
     # weighted by the distance: the course of a short distance is mostly sensor noise
-    along, against = (
-        complex(np.average(np.exp(1j * (found.course - s * found.heading)), weights=found.way)) for s in (1.0, -1.0)
-    )
-    if abs(against) > AGREES and abs(against) - abs(along) > TURNED:
+    along, against = agreement(np.exp(1j * found.heading), found.way * np.exp(1j * found.course))
+    if abs(against) > STRONG and abs(against) - abs(along) > TURNED:
         message = (
             f"the course made from x_m and y_m turns against yaw_rad (agreement {abs(against):.2f} against and {abs(along):.2f} "
             f"along it, limit {TURNED:g} between them): x is east and y north where the heading counts from north; "
@@ -198,7 +193,7 @@ def _course_findings(run: Run) -> list[Note]:
         data = {"signal": "yaw_rad", "value": slope, "limit": RATIO} | ({} if unit is None else {"unit": unit})
         return [Note("course_slope", message, data)]
     off = math.remainder(float(np.angle(along)), math.tau)
-    if abs(along) > AGREES and abs(off) > math.pi / 4:
+    if abs(along) > STRONG and abs(off) > math.pi / 4:
         message = (
             f"the course made from x_m and y_m is {math.degrees(off):.0f} deg from yaw_rad (limit 45 deg): the heading counts "
             "from another direction than north, or x is not north; set `frame`"
@@ -222,8 +217,8 @@ def _dive_unit(slope: float, stated: Stated) -> list[Note]:
     (signal, unit), is_one = may[0], len(may) == 1
     advice = f"set {', or '.join(f'`unit: {u}` at {s}' for s, u in may)}"
     message = (
-        f"depth_m changes {slope:.3g} times as fast as surge_m_s and pitch_rad say (limits {LEAST_DIVE:g} and {MOST_DIVE:g}): "
-        f"{advice}"
+        f"depth_m changes {slope:.3g} times as fast as surge_m_s and pitch_rad say (limits {LEAST_DIVE:.2g} and "
+        f"{MOST_DIVE:.2g}): {advice}"
     )
     data = {"signal": signal, "value": slope, "limit": MOST_DIVE} | ({"unit": unit} if is_one else {})
     return [Note("depth_unit" if signal == "depth_m" else "speed_unit", message, data)]

@@ -14,6 +14,7 @@ from fieldsid.logs.doctor.angle_and_rate import PAIRS
 from fieldsid.logs.doctor.holes import usual_step
 from fieldsid.logs.doctor.pair_findings import goes_with_way
 from fieldsid.logs.doctor.stated import Stated
+from fieldsid.logs.few_of import FEW
 from fieldsid.logs.run import FINS, GOALS, MEASURED, MOTORS, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
@@ -23,7 +24,6 @@ PLACE = frozenset({"x_m", "y_m"})
 """The coordinates of one sensor: neither is frozen while the other changes."""
 RATE_OF = dict(PAIRS)
 """The rate of each angle."""
-MISSING_LIMIT = 0.05
 FROZEN_S = 1.0
 COARSE_LIMIT = 0.3
 """Largest share of samples equal to the one before; above it a signal is coarse, or is not examined for being frozen."""
@@ -83,10 +83,10 @@ def _missing(name: str, seen: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> lis
         return []  # a command that is published when it changes
     # a sensor slower than the clock lacks samples only where its own are missing
     share = 1.0 - apart * float(seen.mean())
-    if share <= MISSING_LIMIT:
+    if share <= FEW:
         return []
-    message = f"{name}: {100 * share:.0f} % of the samples are missing (limit {100 * MISSING_LIMIT:.0f} %)"
-    return [Note("missing", message, {"signal": name, "value": share, "limit": MISSING_LIMIT})]
+    message = f"{name}: {100 * share:.0f} % of the samples are missing (limit {100 * FEW:.0f} %)"
+    return [Note("missing", message, {"signal": name, "value": share, "limit": FEW})]
 
 
 def _size(run: Run, name: str, values: FloatArray, stated: Stated) -> list[Note]:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.run import Run
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.arrays import ComplexArray, FloatArray
 from fieldsid.numerics.shifted_correlation import lag_of
 
 FEWEST = 50
@@ -35,6 +35,19 @@ def delay_of(a: FloatArray, b: FloatArray, step: float) -> float:
     """
     late, gain = lag_of(a, b, min(round(LAG_S / step), a.size // 4))
     return late * step if gain >= LEAST_GAIN else 0.0
+
+
+def agreement(directions: ComplexArray, travel: ComplexArray) -> tuple[complex, complex]:
+    """Return the mean unit vectors from directions (n,) to a travel (n,), and to its mirror image, weighted by their lengths.
+
+    A vector is as long as they agree; both are zero below FEWEST samples with a length.
+    """
+    weight = np.abs(travel) * np.abs(directions)
+    seen = np.isfinite(weight) & (weight > 0.0)
+    if seen.sum() < FEWEST:
+        return 0.0j, 0.0j
+    a, b, total = directions[seen], travel[seen], float(weight[seen].sum())
+    return complex((b * a.conj()).sum()) / total, complex((b * a).sum()) / total
 
 
 def width_of(time: FloatArray, window_s: float) -> int:

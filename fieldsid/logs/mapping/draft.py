@@ -10,15 +10,16 @@ from typing import Any
 import numpy as np
 
 from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, Source
+from fieldsid.logs.few_of import MOSTLY
 from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.guesses import NOTHING, Guess, of_column, of_topic, quaternion_of
 from fieldsid.logs.mapping.numbers.recognise import PLACE, recognised
 from fieldsid.logs.mapping.numbers.true_heading import true_north
 from fieldsid.logs.mapping.numbers.unit_inference import set_by_size
-from fieldsid.logs.mapping.vocabulary import AS_MEASURED, LATITUDE, LONGITUDE
+from fieldsid.logs.mapping.vocabulary import LATITUDE, LONGITUDE
 from fieldsid.logs.mapping.word_meaning import is_command, meaning_of
 from fieldsid.logs.reader import TABLE, Inventory, Samples
-from fieldsid.logs.run import SIGNALS, Note
+from fieldsid.logs.run import MEASURED_FIN, SIGNALS, Note
 
 SCHEMA = "fieldsid/mapping/1"
 REP103, NED = "ENU/FLU", "NED/FRD"
@@ -28,8 +29,8 @@ _MESSAGE_PATH = re.compile(r"\bheader\.|\bpose\.pose\.|\btwist\.twist\.|\borient
 """Names of columns that were written from messages, which are in the frames of REP 103."""
 NORTH_EAST_DOWN = frozenset({"ned", "px"})
 """Words of topics that are in NED and FRD: those with the frame in their name, and those of PX4."""
-OTHER_HEADINGS, OTHERS_SHOWN = 4, 3
-"""Number of alternative headings that are tried, and number of alternatives of any signal that a note names."""
+OTHERS = 4
+"""Number of alternatives of a signal that a note names, and of a heading that are tried."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +147,7 @@ def _other_headings(guesses: Iterable[Guess], signals: Mapping[str, Any]) -> tup
     if "yaw_rad" not in signals:
         return ()
     others = sorted((g for g in guesses if g.signal == "yaw_rad" and g.item != signals["yaw_rad"]), key=lambda g: -g.sure)
-    return tuple(g.item for g in others[:OTHER_HEADINGS])
+    return tuple(g.item for g in others[:OTHERS])
 
 
 def _best(guesses: Iterable[Guess]) -> tuple[dict[str, Guess], list[Note]]:
@@ -154,7 +155,7 @@ def _best(guesses: Iterable[Guess]) -> tuple[dict[str, Guess], list[Note]]:
     by_signal: dict[str, list[Guess]] = {}
     for guess in guesses:
         by_signal.setdefault(guess.signal, []).append(guess)
-    for fin, measured in AS_MEASURED.items():
+    for fin, measured in MEASURED_FIN.items():
         # beside a fin whose name says that it is the command, the others are where the fin is
         of_fin = by_signal.get(fin, [])
         commanded = [g for g in of_fin if is_command(place_of(g.item), fin)]
@@ -166,7 +167,7 @@ def _best(guesses: Iterable[Guess]) -> tuple[dict[str, Guess], list[Note]]:
         ordered = sorted(several, key=lambda g: (-g.sure, -g.count, len(words_of(str(g.item.get("column", ""))))))
         first = best[signal] = ordered[0]
         # where a format defines two fields as the same signal, neither is an alternative
-        near = [g for g in ordered[1 : 1 + OTHERS_SHOWN] if g.sure > 0.5 * first.sure and not (g.defined and first.defined)]
+        near = [g for g in ordered[1 : 1 + OTHERS] if g.sure > MOSTLY * first.sure and not (g.defined and first.defined)]
         others = [f"`{place_of(g.item)}`" for g in near]
         if others and signal in SIGNALS:
             message = f"{signal} is taken from `{place_of(first.item)}`; it may also be {', '.join(others)}"

@@ -12,9 +12,10 @@ import numpy as np
 from fieldsid.logs.channels import ANGLES, ATTITUDE
 from fieldsid.logs.convert.conditioning import MAX_PLAUSIBLE_VALUE
 from fieldsid.logs.convert.units import dimension_of
+from fieldsid.logs.few_of import FEW
 from fieldsid.logs.mapping.canonical_names import unit_in_name, unit_of_field, words_of
 from fieldsid.logs.mapping.vocabulary import COMMANDED, COMPASS, LATITUDE, LONGITUDE, TIME, part_of, word_set
-from fieldsid.logs.mapping.word_meaning import STANDARD, meaning_of
+from fieldsid.logs.mapping.word_meaning import CANONICAL, STANDARD, meaning_of
 from fieldsid.logs.reader import DEFINED, TABLE, ChannelInfo, FieldInfo
 from fieldsid.numerics.arrays import FloatArray
 
@@ -30,8 +31,8 @@ FRAMES = {"enu": "ENU/FLU", "flu": "ENU/FLU", "ned": "NED/FRD", "frd": "NED/FRD"
 """Words of a name that state the frames of its numbers."""
 _FRAMED = word_set("ned enu local")
 """Words of a pose whose x and y are metres: others are in degrees of latitude and longitude."""
-FORMAT, PRESSURE, PLANE = 9.0, 6.0, 5.0
-"""Scores of a field that its format defines, of a pressure, and of a component of a pose in the plane."""
+PRESSURE, PLANE = 6.0, 5.0
+"""Scores of a pressure, and of a component of a pose in the plane: between a name of one word more, and one less."""
 NOTHING = 0.1
 """Score of a column that never changes."""
 _PARTS_OF_QUATERNION = (
@@ -39,8 +40,6 @@ _PARTS_OF_QUATERNION = (
     re.compile(r"(?P<stem>.*?q(?:uat|uaternion)?s?[_.]?[\[(]?)(?P<part>[0-4])(?P<end>[\])]?)$", re.IGNORECASE),
 )
 """Names of the components of a quaternion: letters, or numbers after a `q`, as in `q[0]` and `quat_1`."""
-UNIT_LENGTH = 0.02
-"""Largest deviation of the median norm of a quaternion from one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +97,7 @@ def quaternion_of(names: Sequence[str], columns: Mapping[str | int, FloatArray])
         numbers = np.stack([columns[c] for c in picked])
         lengths = np.linalg.norm(numbers, axis=0)
         seen = lengths[np.isfinite(lengths)]
-        if len(picked) == 4 and seen.size and abs(float(np.median(seen)) - 1.0) < UNIT_LENGTH:
+        if len(picked) == 4 and seen.size and abs(float(np.median(seen)) - 1.0) < FEW:
             size = np.nanmean(numbers**2, axis=1)
             is_real_first = "x" not in parts and size[1] + size[2] <= size[0] + size[1]
             return {"columns": picked} | ({"order": "wxyz"} if is_real_first else {})
@@ -110,7 +109,7 @@ def of_topic(channel: ChannelInfo) -> Iterator[Guess]:
     for info in channel.fields:
         if info.means is not None:
             signal, how = info.means
-            yield Guess(signal, FORMAT, {"topic": channel.name, "field": info.path, **how}, channel.count, defined=True)
+            yield Guess(signal, CANONICAL, {"topic": channel.name, "field": info.path, **how}, channel.count, defined=True)
         elif channel.kind == TABLE:
             yield from _of_table(channel, info)
         elif channel.kind != DEFINED:

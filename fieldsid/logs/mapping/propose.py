@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from fieldsid.logs.convert.units import CLEARLY
 from fieldsid.logs.doctor.angle_and_rate import TRUSTED, changes_of
+from fieldsid.logs.few_of import FEW
 from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.draft import Draft, draft_of, place_of, with_units_by_span
 from fieldsid.logs.mapping.fins.several import which_output, with_several_fins
@@ -16,8 +18,6 @@ from fieldsid.logs.reader import Inventory, Reader, ReadOptions
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.several.sifting import attempt
 from fieldsid.numerics.shifted_correlation import slope_of
-
-TRIES = 6
 
 
 def propose(inventory: Inventory, reader: Reader, options: ReadOptions) -> Proposal:
@@ -34,7 +34,7 @@ def propose(inventory: Inventory, reader: Reader, options: ReadOptions) -> Propo
 def _tested(log: Log, draft: Draft) -> Proposal:
     left_out: list[Note] = []
     signals = draft.body["signals"]
-    for _ in range(TRIES if signals else 0):
+    while signals:
         done = attempt(lambda draft: _with_fins(log, _with_vehicle_heading(log, draft), draft), draft)
         if isinstance(done, Proposal):
             return done.saying(*left_out, *_over_ground(done))
@@ -99,14 +99,12 @@ def _without_clock(log: Log, draft: Draft) -> Proposal:
 
 ASSUMED_HZ = 10.0
 USUAL_HZ = (1.0, 2.0, 4.0, 5.0, 8.0, 10.0, 16.0, 20.0, 25.0, 30.0, 32.0, 40.0, 50.0, 60.0, 64.0, 100.0, 128.0, 200.0, 250.0)
-NEAR = 0.02
-"""Relative deviation up to which an estimated rate is replaced by a usual rate of loggers."""
-SLOWEST_HZ, FASTEST_HZ = 0.5, 400.0
-"""Lowest and highest sampling rate of vehicle logs."""
 
 
 def rate_by_turning(run: Run, *, has_unit: bool) -> tuple[float, str, Note] | None:
     """Return the sampling rate of a run that was read with `ASSUMED_HZ`, the unit of its yaw rate, and a note; None where open.
+
+    A rate within FEW hundredths of a usual one of loggers is taken for that.
 
     `has_unit` states that the unit of the yaw rate is known; else it is the one that gives a possible sampling rate.
     """
@@ -116,7 +114,7 @@ def rate_by_turning(run: Run, *, has_unit: bool) -> tuple[float, str, Note] | No
         return None
     units = {"rad/s": 1.0} if has_unit else {"rad/s": 1.0, "deg/s": 180.0 / math.pi}
     rates = {unit: ASSUMED_HZ / (slope * factor) for unit, factor in units.items()}
-    likely = [unit for unit, rate in rates.items() if SLOWEST_HZ < rate < FASTEST_HZ]
+    likely = [unit for unit, rate in rates.items() if USUAL_HZ[0] / CLEARLY < rate < USUAL_HZ[-1] * CLEARLY]
     if len(likely) != 1:
         return None
     rate = rates[likely[0]]
@@ -126,7 +124,7 @@ def rate_by_turning(run: Run, *, has_unit: bool) -> tuple[float, str, Note] | No
     )
     usual = min(USUAL_HZ, key=lambda known: abs(known - rate))
     return (
-        usual if abs(usual / rate - 1.0) < NEAR else float(f"{rate:.3g}"),
+        usual if abs(usual / rate - 1.0) < FEW else float(f"{rate:.3g}"),
         likely[0],
         Note("rate_guessed", message, {"value": rate, "signal": "yaw_rate_rad_s"}),
     )

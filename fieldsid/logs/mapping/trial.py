@@ -33,9 +33,6 @@ from fieldsid.logs.mapping.numbers.unit_inference import (
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.run import FINS, SIGNALS, Note, Run
 
-MAX_READINGS = 6
-"""Largest number of readings of the log, each with the corrections of the one before: a unit, a frame, the signs of two rates."""
-
 
 @dataclass(frozen=True, slots=True)
 class Log:
@@ -88,7 +85,7 @@ def tried(log: Log, body: dict[str, Any], defined: frozenset[str]) -> Proposal:
     wraps = None if yaw is None else unit_of_wraps(yaw.values)
     in_doubt = by_size if wraps is None else by_size - {"yaw_rad"}
     why: list[Note] = []
-    for _ in range(MAX_READINGS):
+    for _ in signals:  # each reading corrects a signal at least
         run, stated = log.run_of(body, raw), stated_by(mapping_of(body), raw)
         notes = examine(run, stated=stated)
         corrections = mended(body, run, notes, in_doubt)

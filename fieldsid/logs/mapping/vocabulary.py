@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from fieldsid.logs.run import FINS, GOALS
+from fieldsid.logs.run import FINS, GOALS, MEASURED_FIN
 
 TIME = "time_s"
 LATITUDE, LONGITUDE = "latitude", "longitude"
@@ -52,19 +52,19 @@ OTHERS = word_set(
 class Rule:
     """A signal and the phrases, separated by commas, that mean it; `alone` where the name may contain no other word.
 
-    The largest magnitude in the column must be above `over`, and at most `upto`.
+    The largest magnitude in the column must be at least `over`, and at most `upto`.
     """
 
     signal: str
     phrases: str
     unless: frozenset[str] = frozenset()
-    over: float = -1.0
+    over: float = 0.0
     upto: float = math.inf
     alone: bool = False
 
     def holds(self, span: Span) -> bool:
         """Return whether the smallest and the largest number of a column may be those of the signal."""
-        return self.over < max(map(abs, span)) <= self.upto
+        return self.over <= max(map(abs, span)) <= self.upto
 
 
 STEEPEST_DEG = 360.0
@@ -127,9 +127,7 @@ AS_COMMANDED: Mapping[str, str] = MappingProxyType(
     {s: s for s in ("rudder_rad", "elevator_rad", "thrust", "propeller_rpm", TIME)}
     | {"yaw_rad": "yaw_goal_rad", "pitch_rad": "pitch_goal_rad"}
 )
-AS_MEASURED: Mapping[str, str] = MappingProxyType({"rudder_rad": "rudder_measured_rad", "elevator_rad": "elevator_measured_rad"})
-"""AS_COMMANDED: the signal that the command of a signal is; a command of any other is none. AS_MEASURED: the signal that a
-measurement is."""
+"""The signal that the command of a signal is; a command of any other is none."""
 GROUNDED = frozenset({"yaw_rad", "surge_m_s", LATITUDE, LONGITUDE})
 """Signals that differ from the vehicle's heading, speed or position where their name says over ground."""
 GLIDER: Mapping[str, str] = MappingProxyType({"m": "measured", "c": "commanded"})
@@ -138,13 +136,11 @@ CONTROL: Mapping[str, str] = MappingProxyType({"e": "error", "r": "reference", "
 """The meaning of a letter before a name in a log of control: `e_speed` is an error, `r_speed` a reference; a `u_rudder` commands
 the rudder, and a `u_yaw` is the output of a controller in yaw."""
 GREEK = word_set("phi theta psi")
-MOST_WORDS_WITH_GREEK = 2
-"""Number of other words up to which a Greek letter in a name is a symbol; with more it is an abbreviation: `PHI_HOST_PORT_DB`."""
 
 
 def is_abbreviation(words: list[str]) -> bool:
-    """Return whether the words contain a Greek letter that is an abbreviation and not a symbol."""
-    return bool(GREEK & set(words)) and len(words) > MOST_WORDS_WITH_GREEK + 1
+    """Return whether a Greek letter is no symbol, but an abbreviation, by its number of words: `PHI_HOST_PORT_DB`."""
+    return bool(GREEK & set(words)) and len(words) > 3
 
 
 _TURNS = ("roll_rate_rad_s", "pitch_rate_rad_s", "yaw_rate_rad_s")
@@ -193,4 +189,4 @@ def as_command_or_measurement(signal: str, sure: int, words: set[str]) -> tuple[
     if signal in GROUNDED and OVER_GROUND & words:
         return signal, 1
     sure += (("true" in words) - ("magnetic" in words)) * (signal in ("yaw_rad", "surge_m_s"))
-    return AS_MEASURED.get(signal, signal) if MEASURED & words else signal, sure
+    return MEASURED_FIN.get(signal, signal) if MEASURED & words else signal, sure

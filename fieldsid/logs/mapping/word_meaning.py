@@ -26,7 +26,8 @@ _PREFIXED = re.compile(r"\s*[A-Za-z][_ .]\w{2}")
 RATES = dict(PAIRS)
 """The rate that the name of an angle means together with the unit of a rate, as in `yaw_deg_s`."""
 CANONICAL, STANDARD = 9, 8
-"""Scores of a canonical name and of a component of a standard message, comparable with those of rules."""
+"""Scores of a canonical name, as of a field that its format defines, and of a component of a standard message: those of rules
+are two for each word."""
 
 
 def meaning_of(name: str, span: Span | None = None, unit_text: str | None = None) -> tuple[str, int] | None:

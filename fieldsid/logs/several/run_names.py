@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
-from itertools import takewhile
+from itertools import chain, count, takewhile
 from pathlib import Path
 
 from fieldsid.errors import UsageError
@@ -46,15 +46,16 @@ def names_apart(names: Sequence[str], paths: Sequence[Path]) -> list[str]:
 
     Files of one folder differ by their suffix.
     """
-    alike: dict[str, list[int]] = defaultdict(list)
-    for i, name in enumerate(names):
-        alike[name].append(i)
     out = list(names)
-    for name, places in alike.items():
-        if len(places) > 1:
-            for i, label_of_run in zip(places, _distinct_labels(name, [_real(paths[i]) for i in places]), strict=True):
-                out[i] = label_of_run
-    return _numbered(out)
+    for name in dict.fromkeys(name for name, number in Counter(names).items() if number > 1):
+        places = [i for i, known in enumerate(names) if known == name]
+        labels = list(_labels(name, [_real(paths[i]) for i in places]))
+        for i, label in zip(places, next((found for found in labels if len(set(found)) == len(found)), labels[-1]), strict=True):
+            out[i] = label
+    for i, name in enumerate(out):
+        numbered = (f"{name}_{n}" for n in count(2))
+        out[i] = next(label for label in chain([name], numbered) if label not in out[:i])
+    return out
 
 
 def runs_apart(runs: Sequence[Run]) -> list[Run]:
@@ -118,33 +119,13 @@ def short_names(names: Sequence[str]) -> ShortNames:
     return ShortNames(start, end)
 
 
-def _distinct_labels(name: str, paths: Sequence[Path]) -> list[str]:
-    """Return the shortest labels that are distinct, or the longest possible ones."""
-    labels = [name] * len(paths)
-    for labels in _labels(name, paths):
-        if len(set(labels)) == len(labels):
-            break
-    return labels
-
-
 def _labels(name: str, paths: Sequence[Path]) -> Iterator[list[str]]:
+    """Yield labels of files that share a name, from the shortest to the longest: with folders before it, and the suffix after."""
     deepest = max(len(p.parent.parts) for p in paths)
     folders = [["_".join([*p.parent.parts[1:][-k:], name] if k else [name]) for p in paths] for k in range(deepest)]
     yield from folders[1:]
     for of in folders:
         yield ["_".join([label, *p.suffixes[-1:]]).replace("_.", "_") for label, p in zip(of, paths, strict=True)]
-
-
-def _numbered(names: Sequence[str]) -> list[str]:
-    """Return the names with a number appended to each that repeats an earlier one."""
-    out: list[str] = []
-    for name in names:
-        label_of_run, n = name, 1
-        while label_of_run in out:
-            n += 1
-            label_of_run = f"{name}_{n}"
-        out.append(label_of_run)
-    return out
 
 
 def refuse_twice(runs: Sequence[Run], paths: Sequence[Path]) -> None:

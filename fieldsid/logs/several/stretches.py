@@ -17,9 +17,7 @@ from fieldsid.logs.run import MOTORS, Note, Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 OFF_S = 10.0
-"""Shortest duration of a part that is left out."""
-LEAST_S = 20.0
-"""Shortest duration of a stretch."""
+"""Shortest duration of a part that is left out, and half of that of a stretch."""
 IDLE = 0.15
 """Share of the usual speed below which the vehicle counts as stopped."""
 DIVES_M, DIVES = 1.0, 0.2
@@ -44,7 +42,7 @@ def stretches_of(run: Run) -> tuple[tuple[Part, ...], tuple[Note, ...]]:
     breaks = np.flatnonzero((np.diff(run.time) > max(OFF_S, FEW_STEPS * float(np.median(np.diff(run.time))))) | np.diff(away)) + 1
     parts = [p for p in np.split(np.arange(run.time.size), breaks) if not away[p[0]]]
     found = ((float(run.time[p[0]]), float(run.time[p[-1]])) for p in parts)
-    kept = tuple((start, end) for start, end in found if end - start >= LEAST_S)
+    kept = tuple((start, end) for start, end in found if end - start >= 2.0 * OFF_S)
     if not kept or kept == whole:
         return whole, ()
     return kept, (_note(run, kept, off),)
@@ -81,11 +79,9 @@ def _idle(run: Run) -> BoolArray:
 
 
 def _surfaced(run: Run) -> BoolArray:
-    if not run.has("depth_m"):
-        return np.zeros(run.time.size, dtype=np.bool_)
-    depth = run["depth_m"]
-    dives = float(np.nanmean(depth > DIVES_M)) > DIVES
-    return np.isfinite(depth) & (depth < SURFACE_M) if dives else np.zeros(run.time.size, dtype=np.bool_)
+    depth = run["depth_m"] if run.has("depth_m") else np.zeros(run.time.size)
+    has_dives = float(np.mean(depth > DIVES_M)) > DIVES
+    return np.asarray(has_dives & (depth < SURFACE_M))
 
 
 def _constant_ends(run: Run) -> BoolArray:

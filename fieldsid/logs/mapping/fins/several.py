@@ -21,6 +21,7 @@ from fieldsid.logs.channels import AXES
 from fieldsid.logs.convert.clock import Track, zero_order_hold
 from fieldsid.logs.convert.servo_counts import COUNTS, SERVOS, Servo
 from fieldsid.logs.convert.units import pick_unit
+from fieldsid.logs.doctor.fin_findings import WIDEST
 from fieldsid.logs.doctor.together import width_of
 from fieldsid.logs.few_of import few_of
 from fieldsid.logs.mapping.canonical_names import words_of
@@ -29,7 +30,7 @@ from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.mapping.numbers.unit_inference import Reading, as_counts, fin_reading
 from fieldsid.logs.mapping.trial import Log
 from fieldsid.logs.mapping.vocabulary import COMMANDED, MEASURED, OF_ANOTHER, word_set
-from fieldsid.logs.reader import Inventory, Series
+from fieldsid.logs.reader import MOST_DEVICES, Inventory, Series
 from fieldsid.logs.run import FINS, Note, Run, origin_of
 from fieldsid.numerics.arrays import FloatArray
 
@@ -47,12 +48,8 @@ SIDES = STARBOARD | word_set(
     "port left p l upper lower top bottom up down t b a c d ul ur ll lr tl tr bl br pu pl su sl ne nw se sw i ii iii iv"
 )
 """Words of the position of one of several fins."""
-MOST = 16
-"""Largest number of similar fins or motors of a vehicle."""
 Family = Mapping[str, Mapping[str, Any]]
 """Similar fins: the source of each in a mapping, by its name."""
-SHORT_WORD = 2
-"""Number of letters up to which a word is a side only where another word precedes it."""
 
 
 def is_measured(family: Family) -> bool:
@@ -73,7 +70,9 @@ def families(inventory: Inventory) -> list[Family]:
         kind = _kind(words_of(name))
         if kind is not None:
             by_kind.setdefault(kind, {})[name] = place
-    return [f for f in by_kind.values() if 1 < len(f) <= MOST or (are_outputs(f) and any(c.isdigit() for c in "".join(f)))]
+    return [
+        f for f in by_kind.values() if 1 < len(f) <= MOST_DEVICES or (are_outputs(f) and any(c.isdigit() for c in "".join(f)))
+    ]
 
 
 def _numbers(inventory: Inventory) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -89,7 +88,7 @@ def _numbers(inventory: Inventory) -> Iterator[tuple[str, Mapping[str, Any]]]:
 
 def _kind(words: list[str]) -> tuple[str, ...] | None:
     """Return the words of a name with numbers and sides replaced by `#`; None where it is not that of one of several fins."""
-    kind = tuple("#" if w.isdigit() or (w in SIDES and (i or len(w) > SHORT_WORD)) else w for i, w in enumerate(words))
+    kind = tuple("#" if w.isdigit() or (w in SIDES and (i or len(w) > 2)) else w for i, w in enumerate(words))
     is_fin = bool((CALLED | THRUSTERS) & set(kind)) or set(words) <= SIDES
     return kind if is_fin and "#" in kind and not OF_ANOTHER & set(words) else None
 
@@ -106,8 +105,8 @@ def is_on_starboard(name: str) -> bool:
 
 
 PLACE = ("column", "topic", "field")
-THRUST_RAD = 0.4
-"""Fin angle in rad that is assumed for the largest difference of thrusters."""
+THRUST_RAD = 0.5 * WIDEST
+"""Fin angle in rad that is assumed for the largest difference of thrusters, that of a fin about to stall."""
 
 
 @dataclass(frozen=True, slots=True)

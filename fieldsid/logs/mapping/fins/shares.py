@@ -14,10 +14,10 @@ from fractions import Fraction
 import numpy as np
 
 from fieldsid.logs.doctor.together import FEWEST, over
+from fieldsid.logs.few_of import FEW
+from fieldsid.logs.reader import SAMPLED
 from fieldsid.numerics.arrays import FloatArray
 
-TOGETHER = 0.05
-"""Ratio of a singular value to the largest below which a pattern of fin angles counts as absent."""
 NOTHING = 0.15
 """Share of the strongest fin's effect below which a fin has none."""
 ALIKE = 0.25
@@ -28,7 +28,6 @@ EXPLAINS = 0.3
 """Smallest share that a fin must explain of the change of a rate that the rate itself does not explain."""
 WINDOWS_S = (1.0, 2.0)
 """Windows in s over which changes are computed; a fin is most visible in a short one."""
-MOST_ROWS = 100_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +65,7 @@ def moved_by(
         np.stack(columns, axis=1) for columns in ([np.ones(grows.size), *regressors], [window_mean(time, v, width) for v in fins])
     )
     seen = np.isfinite(grows) & np.isfinite(means).all(axis=1) & np.isfinite(base).all(axis=1)
-    rows = np.flatnonzero(seen)[:: max(1, grows.size // MOST_ROWS)]
+    rows = np.flatnonzero(seen)[:: max(1, grows.size // SAMPLED)]
     if rows.size < FEWEST:
         return None
     left, moved = (beyond(base[rows], v[rows]) for v in (grows[:, None], means))
@@ -74,10 +73,13 @@ def moved_by(
 
 
 def fin_shares(left: FloatArray, moved: FloatArray, width: int) -> FinShares:
-    """Return the shares (m,) of fins in dr/dt, from the two results of `moved_by`."""
-    solution, _, _, length = np.linalg.lstsq(moved, left, rcond=TOGETHER)
+    """Return the shares (m,) of fins in dr/dt, from the two results of `moved_by`.
+
+    A pattern of fin angles whose singular value is below FEW hundredths of the largest counts as absent.
+    """
+    solution, _, _, length = np.linalg.lstsq(moved, left, rcond=FEW)
     fitted = solution.astype(np.float64)
-    shares, patterns = _shares(fitted), int((length > TOGETHER * length[0]).sum())
+    shares, patterns = _shares(fitted), int((length > FEW * length[0]).sum())
     return FinShares(
         shares,
         fitted / float(np.sum(np.abs(fitted))),

@@ -18,9 +18,9 @@ import numpy as np
 
 from fieldsid.logs.convert.frames import north_and_east
 from fieldsid.logs.convert.units import CLEARLY, UNITS
-from fieldsid.logs.doctor.angle_and_rate import PAIRS
+from fieldsid.logs.doctor.angle_and_rate import PAIRS, STRONG, WEAK
 from fieldsid.logs.doctor.together import FEWEST, change, width_of
-from fieldsid.logs.few_of import few_of
+from fieldsid.logs.few_of import FEW, few_of
 from fieldsid.logs.mapping.fins.shares import EXPLAINS, beyond, explained, explains, moved_by
 from fieldsid.logs.mapping.fins.shares import WINDOWS_S as SHORT_S
 from fieldsid.logs.mapping.numbers.unit_inference import Reading, fin_reading, in_radians
@@ -30,22 +30,15 @@ from fieldsid.numerics.shifted_correlation import slope_of
 
 WINDOWS_S = (*SHORT_S, 10.0)
 """Windows in s over which changes are computed; a position with few digits needs a long one."""
-SAME_WAY = 0.9
-"""Smallest share of the distance that is made along the heading; it is below one by sideslip."""
-TURNS_ALONG = 0.6
-"""Smallest correlation of heading and course."""
 MOST_SLIP = 3.0
 """Largest ratio of the turns of heading and course, in either direction; they differ by sideslip."""
 MOST_WAYS = 30
-BEYOND_TILTS_DEG = 90.0
-ALIKE = 0.95
-"""Smallest correlation of two columns that are the same signal."""
 ONE_SIDED = 0.2
 """Smallest ratio of the largest fin angles to the two sides."""
 VARIES_WITHIN, IS_WITHIN = 0.3, 0.1
 """Largest mean relative deviation of a column from its prediction: of changes, which are noisy, and of a level."""
 GLOBE = (90.0, 180.0)
-"""Largest latitude and longitude in degrees."""
+"""Largest latitude and longitude in degrees; the first is also that of a pitch or a roll."""
 AT_REST = 1e-3
 """A median speed below this cannot be in m/s, and always is so in degrees of latitude and longitude per s."""
 MOST_COLUMNS = 40
@@ -142,12 +135,12 @@ class _Tie:
     units: tuple[str, ...]
     says: str
     within: float = VARIES_WITHIN
-    signs: tuple[int, ...] = (1,)
+    may_turn: bool = False
 
 
 TIES = (
     *(_Tie(rate, (angle,), partial(_Scene.turned, signal=angle), _Scene.integral_change, ("rad/s", "deg/s"),
-           f"the derivative of column {{{angle}}}", signs=(1, -1)) for angle, rate in PAIRS),
+           f"the derivative of column {{{angle}}}", may_turn=True) for angle, rate in PAIRS),
     _Tie("surge_m_s", ("yaw_rad", *PLACE), lambda s: s.speed().real, _Scene.values, ("m/s", "kn"),
          "the way made along the heading", IS_WITHIN),
     _Tie("sway_m_s", ("yaw_rad", *PLACE, "surge_m_s"), lambda s: s.speed().imag, _Scene.values, ("m/s", "kn"),
@@ -187,7 +180,7 @@ def _tied(scene: _Scene, tie: _Tie) -> Iterator[Recognised]:
         values = tie.by(scene, column)
         good = np.isfinite(values) & np.isfinite(made)
         size = float(np.abs(made[good]).sum())
-        for unit, sign in product(tie.units, tie.signs) if good.sum() >= FEWEST and size > 0.0 else ():
+        for unit, sign in product(tie.units, (1, -1) if tie.may_turn else (1,)) if good.sum() >= FEWEST and size > 0.0 else ():
             off = float(np.abs(sign * UNITS[unit].factor * values[good] - made[good]).sum()) / size
             fits.append((off, column, {"unit": unit} | ({"sign": -1} if sign < 0 else {})))
     off, column, item = min(fits, key=lambda fit: fit[0], default=(math.inf, "", {}))
@@ -216,7 +209,7 @@ def _assignments(scene: _Scene) -> list[list[Recognised]]:
     turning = [
         [Recognised("yaw_rad", c, {"unit": "deg"}, f"it goes to {largest:.4g}, beyond tilts, and has a derivative", rate.trust)]
         for c, rate in rates.items()
-        if (largest := float(np.nanmax(np.abs(scene.values(c))))) > BEYOND_TILTS_DEG and "sign" not in rate.item
+        if (largest := float(np.nanmax(np.abs(scene.values(c))))) > GLOBE[0] and "sign" not in rate.item
     ]
     return sorted(found, key=lambda displacement: -displacement[0].trust)[:MOST_WAYS] or turning or [[]]
 
@@ -228,15 +221,15 @@ def _pointing(
     displacement = scene.displacement(*place)
     seen = np.isfinite(displacement)
     made = float(np.abs(displacement[seen]).sum())
-    if not made > 0.0 or not float(np.median(np.abs(displacement[seen]))) > 0.0:
+    if not float(np.median(np.abs(displacement[seen]))) > 0.0:
         return
     item = {"unit": "deg"} if scene.is_geographic(*place) else {}
     for (heading, unit), direction in toward.items():
         along = float(np.vdot(direction[seen], displacement[seen]).real) / made
-        if heading in place or along <= SAME_WAY:
+        if heading in place or along <= STRONG:  # of the distance is made along the heading, but for sideslip
             continue
         slope, trust = slope_of(*(np.unwrap(np.angle(v[seen])) for v in (direction, displacement)))
-        if trust > TURNS_ALONG and 1.0 / MOST_SLIP < slope < MOST_SLIP:
+        if trust > WEAK and 1.0 / MOST_SLIP < slope < MOST_SLIP:
             why = f"{100 * along:.1f} % of the way that columns {' and '.join(map(str, place))} make is made along it"
             same = f"the way made in it is along the heading in column {heading}"
             of_place = [Recognised(s, c, item, same, along) for s, c in zip(PLACE, place, strict=True) if s not in scene.known]
@@ -275,7 +268,7 @@ def _fin_column(
     alone = [explained(grows, column, width) for column in moved.T]
     best = int(np.argmax(alone))
     # sway and roll are correlated with the fin: only the part that the other columns do not explain counts
-    every = [best, *(i for i in range(len(names)) if i != best and slope_of(angles[i], angles[best])[1] < ALIKE)]
+    every = [best, *(i for i in range(len(names)) if i != best and slope_of(angles[i], angles[best])[1] < 1.0 - FEW)]
     added = {i: left([o for o in every if o != i]) - left(every) for i in every if len(every) > 1}
     rival = max(every[1:], key=lambda i: added[i], default=None)
     if alone[best] < EXPLAINS or (rival is not None and added[best] < CLEARLY * added[rival]):

@@ -19,9 +19,9 @@ import numpy as np
 
 from fieldsid.logs.convert.frames import north_and_east
 from fieldsid.logs.convert.units import CLEARLY
-from fieldsid.logs.doctor.angle_and_rate import PAIRS, changes_of
-from fieldsid.logs.doctor.pair_findings import AGREES, TURNED, WINDOW_S, course_of
-from fieldsid.logs.doctor.together import FEWEST, SURE, change, width_of
+from fieldsid.logs.doctor.angle_and_rate import PAIR_WINDOW_S, PAIRS, STRONG, changes_of
+from fieldsid.logs.doctor.pair_findings import TURNED, WINDOW_S, course_of
+from fieldsid.logs.doctor.together import SURE, agreement, change, width_of
 from fieldsid.logs.mapping.canonical_names import unit_in_name, words_of
 from fieldsid.logs.mapping.numbers.unit_inference import in_radians
 from fieldsid.logs.mapping.vocabulary import COMMANDED, COMPASS, LATITUDE, LONGITUDE, OF_ANOTHER, OVER_GROUND
@@ -29,9 +29,6 @@ from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import Samples
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import ComplexArray, FloatArray
-
-LEAD_S = 1.0
-"""Window in s over which a course is computed; in a longer one a vehicle may turn more than once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +78,7 @@ def _rate_misfit(run: Run) -> float:
 
 def lead_of(run: Run) -> Lead | None:
     """Return the time by which the heading of a run leads its course; None where the log does not show it."""
-    made = course_of(run, LEAD_S)
+    made = course_of(run, PAIR_WINDOW_S)  # in a longer window a vehicle may turn more than once
     return None if made is None else _regressed(made.heading - made.course, made.heading, made.rate, made.width)
 
 
@@ -115,15 +112,18 @@ def true_north(samples: Samples, names: Sequence[str], signals: Mapping[str, Any
     notes, settled = list[Note](), set[tuple[str, ...]]()
     for source, travel in _travels(samples, names):
         for turned, direction in directions.items():
-            along, against, off = _agreement(direction, travel)
-            is_open = max(along, against) < AGREES or abs(along - against) < TURNED or (against > along and abs(off) > NEAR)
+            mean, mirrored = agreement(direction, travel)
+            along, against = abs(mean), abs(mirrored)
+            # counted from east and counterclockwise, x + iy = i (north - i east) is at pi/2 to the mirror image
+            off = math.remainder(float(np.angle(mirrored)) - 0.5 * math.pi, math.tau)
+            is_open = max(along, against) < STRONG or abs(along - against) < TURNED or (against > along and abs(off) > NEAR)
             if turned not in settled and not is_open:
                 settled.add(turned)
                 notes += _set_from_east(turned, signals, source, against, along) if against > along else []
     if len(directions) < 2 or ("yaw_rad",) in settled or _is_named(signals):
         return notes
-    along, against, _ = _agreement(*directions.values())
-    return [*notes, _frame_open()] if len(settled) == 0 and along > AGREES and along - against > TURNED else notes
+    along, against = map(abs, agreement(*directions.values()))
+    return [*notes, _frame_open()] if len(settled) == 0 and along > STRONG and along - against > TURNED else notes
 
 
 def _set_from_east(turned: tuple[str, ...], signals: Mapping[str, Any], source: str, against: float, along: float) -> list[Note]:
@@ -197,18 +197,3 @@ def _is_speed(name: str, side: str) -> bool:
     return f"v{side}" in words or (
         bool(words & {"v", "vel", "velocity", "speed"}) and bool(words & {side, full_word, f"{full_word}ing"})
     )
-
-
-def _agreement(directions: ComplexArray, travel: ComplexArray) -> tuple[float, float, float]:
-    """Return the agreement of a direction (n,) with the travel and with its mirror image, and the angle in rad to the latter.
-
-    Counted from east and counterclockwise, x + iy = i (north - i east): a direction that agrees with the mirror image is at pi/2
-    to it.
-    """
-    weight = np.abs(travel) * np.abs(directions)
-    seen = np.isfinite(weight) & (weight > 0.0)
-    if seen.sum() < FEWEST:
-        return 0.0, 0.0, 0.0
-    a, b, w = directions[seen] / np.abs(directions[seen]), travel[seen] / np.abs(travel[seen]), weight[seen]
-    along, against = complex(np.average(a * np.conj(b), weights=w)), complex(np.average(a * b, weights=w))
-    return abs(along), abs(against), math.remainder(float(np.angle(against)) - 0.5 * math.pi, math.tau)

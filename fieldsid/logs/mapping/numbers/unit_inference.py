@@ -20,6 +20,7 @@ from fieldsid.logs.convert.units import CLEARLY, DEGREE, UNITS, pick_unit
 from fieldsid.logs.doctor.angle_and_rate import PAIRS, agrees_with_rate
 from fieldsid.logs.doctor.pair_findings import goes_along_course, goes_with_depth, goes_with_way
 from fieldsid.logs.doctor.signal_findings import LARGEST
+from fieldsid.logs.few_of import FEW
 from fieldsid.logs.run import FINS, GOALS, MOTORS, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
@@ -33,8 +34,6 @@ TO_A_TURN = 1.01
 """Largest span of a wrapping heading, in turns: one, plus the rounding of the last digit."""
 TURN = TO_A_TURN * math.tau
 """Largest number of a wrapped heading in rad."""
-OFTEN = 0.05
-"""Smallest share of samples beyond 360 that counts; fewer may be damaged samples."""
 MOST_TURNS = 10.0
 """Largest number of turns that an unwrapped heading in a log of maneuvers counts."""
 
@@ -75,7 +74,7 @@ def unit_of_wraps(values: FloatArray) -> str | None:
     if seen.size < 2:
         return None
     jump, span = float(np.abs(np.diff(seen)).max()), float(np.ptp(seen))
-    units = WRAPPING if float((np.abs(seen) > 360.0).mean()) >= OFTEN else WRAPPING[:2]
+    units = WRAPPING if float((np.abs(seen) > 360.0).mean()) >= FEW else WRAPPING[:2]
     turns = {unit: 2.0 * math.pi / UNITS[unit].factor for unit in units}
     return next((u for u, turn in turns.items() if OF_A_TURN * turn <= jump <= span <= TO_A_TURN * turn), None)
 
@@ -142,7 +141,7 @@ def heading_in_doubt(values: FloatArray, signals: Mapping[str, Any]) -> list[Not
     seen = np.abs(values[np.isfinite(values)])
     largest = float(seen.max())
     in_degrees, in_radians, data = largest / 360.0, largest / (2.0 * np.pi), {"signal": "yaw_rad", "largest": largest}
-    if in_degrees > MOST_TURNS and float((seen > 360.0 * MOST_TURNS).mean()) >= OFTEN:
+    if in_degrees > MOST_TURNS and float((seen > 360.0 * MOST_TURNS).mean()) >= FEW:
         message = (
             f"yaw_rad is taken for degrees and reaches {largest:.5g}, {in_degrees:.0f} turns (limit {MOST_TURNS:.0f}): is it in "
             "another unit, as `unit: cdeg` or `unit: ddeg`?"
