@@ -10,7 +10,7 @@ from typing import Literal
 
 from fieldsid.logs.convert.clock import GAP_FACTOR
 from fieldsid.logs.convert.frames import Frame
-from fieldsid.logs.run import MEASURED_FIN
+from fieldsid.logs.run import ANGLES, MEASURED_FIN, RATE_OF
 
 Stamp = Literal["header", "receive"]
 ATTITUDE = "attitude"
@@ -18,11 +18,10 @@ ATTITUDE = "attitude"
 POSITION = "position"
 """Name for latitude and longitude in a mapping; they give x and y, in m north and east of the first fix."""
 COMBINED = (ATTITUDE, POSITION)
-ANGLES = ("yaw_rad", "pitch_rad", "roll_rad")
 
 
-AXES = tuple(zip((("yaw_rad", "yaw_rate_rad_s"), ("pitch_rad", "pitch_rate_rad_s")), MEASURED_FIN.items(), strict=True))
-"""The signals of each axis, motion and fin: identification needs at least one of each."""
+AXES = tuple(zip(RATE_OF.items(), MEASURED_FIN.items(), strict=False))
+"""The signals of yaw and of pitch, motion and fin: identification needs at least one of each."""
 
 
 def is_enough(signals: Iterable[str]) -> bool:

@@ -50,6 +50,13 @@ SIGNALS: Mapping[str, str] = MappingProxyType(
     }
 )
 """Canonical signal names and their units; `thrust` may be in any unit."""
+RATE_OF: Mapping[str, str] = MappingProxyType(
+    {"yaw_rad": "yaw_rate_rad_s", "pitch_rad": "pitch_rate_rad_s", "roll_rad": "roll_rate_rad_s"}
+)
+"""The rate of each angle."""
+ANGLES = tuple(RATE_OF)
+ANGLES_AND_RATES = tuple(signal for pair in RATE_OF.items() for signal in pair)
+"""Each angle and its rate, in the order in which they are chosen where nothing else decides."""
 FINS = ("rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad")
 """The commanded and the measured fin angles."""
 MEASURED_FIN: Mapping[str, str] = MappingProxyType(dict(zip(FINS[:2], FINS[2:], strict=True)))

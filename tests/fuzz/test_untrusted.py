@@ -231,7 +231,7 @@ RULE = "\n" + "=" * 80 + "\n"
     ids=["itself", "by another", "wide", "deep"],
 )
 def test_a_message_type_without_end_is_refused(definition):
-    with pytest.raises(LogError, match="holds itself|is none that is recorded|does not fit its messages"):
+    with pytest.raises(LogError, match=r"holds itself|is none that is recorded|does not fit its messages"):
         Decoder(_parsed(definition, "a/msg/B", "msg"), "a/msg/B", cdr=False).layout(b"\1\0\0\0" * 100)
 
 

@@ -10,8 +10,8 @@ from shlex import quote
 import numpy as np
 
 from fieldsid.errors import LogError, MappingError
-from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, ChannelMap, Source
-from fieldsid.logs.convert.clock import ANGLES_AND_RATES, Track, one_clock, summed
+from fieldsid.logs.channels import ATTITUDE, POSITION, ChannelMap, Source
+from fieldsid.logs.convert.clock import Track, one_clock, summed
 from fieldsid.logs.convert.conditioning import MAX_GAP_S, in_order, possible, refuse_impossible_steps, refuse_long_gaps
 from fieldsid.logs.convert.faults.copied_fins import without_copied_fins
 from fieldsid.logs.convert.faults.dropouts import SENSED, without_dropouts
@@ -23,7 +23,7 @@ from fieldsid.logs.convert.servo_counts import counts_unit, turned_from_counts
 from fieldsid.logs.convert.units import DEGREE, depth_of_pressure, factor_to, pick_unit, scaled
 from fieldsid.logs.few_of import MOSTLY, NEARLY_ALL
 from fieldsid.logs.reader import AS_IT_IS, RawLog, ReadOptions, Series
-from fieldsid.logs.run import COLUMNS, COMMANDS, FINS, PART, Note, Run, signal_of
+from fieldsid.logs.run import ANGLES, ANGLES_AND_RATES, COLUMNS, COMMANDS, FINS, PART, Note, Run, signal_of
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 WHOLE = (-np.inf, np.inf)

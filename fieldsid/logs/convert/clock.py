@@ -29,12 +29,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import MappingError
-from fieldsid.logs.run import COMMANDS, PART, STEP_LINES, Note, signal_of
+from fieldsid.logs.run import ANGLES_AND_RATES, COMMANDS, PART, STEP_LINES, Note, signal_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
-
-ANGLES_AND_RATES = ("yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s", "roll_rad", "roll_rate_rad_s")
-"""Signals whose clock the others are resampled to; where rates are equal, the first one is chosen."""
 
 SLOWER = 1.5
 """Ratio of a signal's median step to that of the clock above which the signal counts as slower than the clock."""

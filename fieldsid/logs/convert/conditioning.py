@@ -13,13 +13,15 @@ from fieldsid.logs.convert.times.clock_text import FEW_STEPS
 from fieldsid.logs.convert.times.time_column import unit_of_step
 from fieldsid.logs.few_of import FEWEST
 from fieldsid.logs.reader import AS_IT_IS, ReadOptions
-from fieldsid.logs.run import FINS, Note
+from fieldsid.logs.run import ANGLES_AND_RATES, FINS, Note
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 MAX_GAP_S = 2.0
 """A run in which a main signal is missing for longer than this is refused, unless the user raises the limit."""
 
-MAIN = ("yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s", *FINS)
+FITTED = ANGLES_AND_RATES[:4]
+"""Signals to which a free run is fitted."""
+MAIN = (*FITTED, *FINS)
 """Signals that identification depends on."""
 
 

@@ -10,14 +10,16 @@ import math
 from collections.abc import Container
 
 import numpy as np
+from scipy.special import fdtri
 
 from fieldsid.errors import DataError
+from fieldsid.logs.convert.faults.dropouts import MOST_CHANCE
 from fieldsid.logs.convert.faults.spikes import DIGITS, SPREADS, last_digit
 from fieldsid.logs.convert.heading_unwrap import ALIKE
 from fieldsid.logs.convert.units import UNIT_LIMIT, UNITS, unit_of_ratio
 from fieldsid.logs.doctor.stated import Stated
-from fieldsid.logs.doctor.together import SURE, delay_of, over, together
-from fieldsid.logs.run import SIGNALS, Note, Run
+from fieldsid.logs.doctor.together import FEWEST, SURE, delay_of, over, together
+from fieldsid.logs.run import RATE_OF, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.shifted_correlation import shifted_correlations, slope_of
 from fieldsid.numerics.trapezoid import trapezoid_integral
@@ -34,22 +36,21 @@ FASTER = 1.5
 """Allowed difference of an angle from its rate, in steps at the 90th percentile of the rate."""
 JUMP_WIDTHS = (1, 2, 4)
 """Numbers of steps over which jumps are sought."""
-FITS_BETTER = 2.5
-"""Significant ratio of two variances of the same steps, at least 50: 2.4 is the upper 0.1 percent point of F(50, 50)."""
+FITS_BETTER = float(fdtri(FEWEST, FEWEST, 1.0 - MOST_CHANCE))
+"""Significant ratio of two variances of the same steps, of which there are at least FEWEST: a quantile of F(50, 50), 2.4."""
 DEGREES = 180.0 / math.pi
 RATES = {u.name: u.factor for u in UNITS.values() if u.dimension == "angle rate"}
 """Units of rates, in rad/s."""
 SUMMED = 10.0
 """Ratio of the distances of an angle from the trapezoidal integral of its rate and from its sum from which on it is the sum."""
 
-PAIRS = (("yaw_rad", "yaw_rate_rad_s"), ("pitch_rad", "pitch_rate_rad_s"), ("roll_rad", "roll_rate_rad_s"))
 CONTRADICTING = frozenset({"rate_sign", "unit", "swapped", "unrelated"})
 
 
 def angle_findings(run: Run, stated: Stated, faulty: Container[str]) -> list[Note]:
     """Return the findings on each angle of a run and its rate; `faulty` are the signals with another known fault."""
     found: list[Note] = []
-    for angle, rate in PAIRS:
+    for angle, rate in RATE_OF.items():
         if run.has(angle) and run.has(rate):
             notes = _swapped(run, angle, rate) or _angle_and_rate(run, angle, rate, stated)
             if not any(n.code in CONTRADICTING for n in notes):
@@ -173,7 +174,7 @@ def _unwrapped_degrees(run: Run, angle: str, rate: str, stated: Stated) -> list[
     advice, unit = _in_degrees(angle, "deg", rate, stated)
     message = (
         f"{angle} goes with {rate} as degrees, not as rad (circular variances of the steps {as_deg:.3g} and {as_rad:.3g}, limit "
-        f"{FITS_BETTER:g} times): {advice}"
+        f"{FITS_BETTER:.2g} times): {advice}"
     )
     return [
         Note("unit", message, {"signal": angle, "signals": [angle, rate], "value": as_rad / as_deg, "limit": FITS_BETTER, **unit})

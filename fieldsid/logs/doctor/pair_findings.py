@@ -146,11 +146,10 @@ class Course:
     @property
     def slope(self) -> float | None:
         """Ratio of the turns of course and heading; None where they are uncorrelated or the course cannot be unwrapped."""
-        c, h = np.unwrap(self.course) - np.unwrap(self.course).mean(), self.heading - self.heading.mean()
-        power = math.sqrt(float(c @ c) * float(h @ h))
-        if self.moved <= 1.0 - FEW or power == 0.0 or float(c @ h) / power < STRONG or float(np.std(c)) < TURNED:
-            return None
-        return math.sqrt(float(c @ c) / float(h @ h))
+        turned = np.unwrap(self.course)
+        slope, agreed = slope_of(turned, self.heading)
+        is_known = self.moved > 1.0 - FEW and slope > 0.0 and agreed >= STRONG and float(np.std(turned)) >= TURNED
+        return slope if is_known else None
 
 
 def course_of(run: Run, window_s: float = WINDOW_S) -> Course | None:
@@ -245,9 +244,8 @@ def _depth_correlation(run: Run) -> tuple[float, float] | None:
     made, predicted = over(depth, width), over(trapezoid_integral(time, -surge * np.sin(pitch)), width)
     # Fisher's z = atanh(r), with the number of windows that do not overlap
     enough = math.atanh(TRUSTED) * math.sqrt(max(made.size / width - 3.0, 0.0)) >= SURE
-    if not enough or float(np.ptp(made)) == 0.0 or float(np.ptp(predicted)) == 0.0:
-        return None
-    return float(np.corrcoef(made, predicted)[0, 1]), float(np.std(made) / np.std(predicted))
+    slope, trust = slope_of(made, predicted)
+    return (math.copysign(trust, slope), abs(slope)) if enough and trust > 0.0 else None
 
 
 def _dive_findings(run: Run, stated: Stated) -> list[Note]:

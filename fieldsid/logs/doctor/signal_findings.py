@@ -6,24 +6,19 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fieldsid.logs.convert.conditioning import blocks_of
+from fieldsid.logs.convert.conditioning import FITTED, blocks_of
 from fieldsid.logs.convert.faults.repeats import LEAST_CHANGE
 from fieldsid.logs.convert.faults.spikes import DIGITS, last_digit, spikes_of
 from fieldsid.logs.convert.servo_counts import servo_of
-from fieldsid.logs.doctor.angle_and_rate import PAIRS
 from fieldsid.logs.doctor.holes import usual_step
 from fieldsid.logs.doctor.pair_findings import goes_with_way
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.few_of import FEW
-from fieldsid.logs.run import FINS, GOALS, MEASURED, MOTORS, SIGNALS, Note, Run
+from fieldsid.logs.run import FINS, GOALS, MEASURED, MOTORS, RATE_OF, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
-FITTED = frozenset({"yaw_rad", "pitch_rad", "yaw_rate_rad_s", "pitch_rate_rad_s"})
-"""The signals to which the free run is fitted."""
 PLACE = frozenset({"x_m", "y_m"})
 """The coordinates of one sensor: neither is frozen while the other changes."""
-RATE_OF = dict(PAIRS)
-"""The rate of each angle."""
 FROZEN_S = 1.0
 COARSE_LIMIT = 0.3
 """Largest share of samples equal to the one before; above it a signal is coarse, or is not examined for being frozen."""

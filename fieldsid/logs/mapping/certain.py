@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from fieldsid.logs.channels import ANGLES, ATTITUDE, ChannelMap, is_enough
+from fieldsid.logs.channels import ATTITUDE, ChannelMap, is_enough
 from fieldsid.logs.doctor.angle_and_rate import CONTRADICTING
 from fieldsid.logs.mapping.draft import place_of
 from fieldsid.logs.mapping.trial import Proposal
-from fieldsid.logs.run import READ_AS, Note
+from fieldsid.logs.run import ANGLES, READ_AS, Note
 
 DOUBT_REASONS: Mapping[str, str] = MappingProxyType(
     {"alternatives": "it may be another one", "left_out": "it cannot be read", "frame_open": "port and starboard are open",

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, Source
+from fieldsid.logs.channels import ATTITUDE, POSITION, Source
 from fieldsid.logs.few_of import MOSTLY
 from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.guesses import NOTHING, Guess, of_column, of_topic, quaternion_of
@@ -19,7 +19,7 @@ from fieldsid.logs.mapping.numbers.unit_inference import set_by_size
 from fieldsid.logs.mapping.vocabulary import LATITUDE, LONGITUDE
 from fieldsid.logs.mapping.word_meaning import is_command, meaning_of
 from fieldsid.logs.reader import TABLE, Inventory, Samples
-from fieldsid.logs.run import MEASURED_FIN, SIGNALS, Note
+from fieldsid.logs.run import ANGLES, MEASURED_FIN, SIGNALS, Note
 
 SCHEMA = "fieldsid/mapping/1"
 REP103, NED = "ENU/FLU", "NED/FRD"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.logs.channels import ANGLES, ATTITUDE
+from fieldsid.logs.channels import ATTITUDE
 from fieldsid.logs.convert.conditioning import MAX_PLAUSIBLE_VALUE
 from fieldsid.logs.convert.units import dimension_of
 from fieldsid.logs.few_of import FEW
@@ -17,6 +17,7 @@ from fieldsid.logs.mapping.canonical_names import unit_in_name, unit_of_field, w
 from fieldsid.logs.mapping.vocabulary import COMMANDED, COMPASS, LATITUDE, LONGITUDE, TIME, part_of, word_set
 from fieldsid.logs.mapping.word_meaning import CANONICAL, STANDARD, meaning_of
 from fieldsid.logs.reader import DEFINED, TABLE, ChannelInfo, FieldInfo
+from fieldsid.logs.run import ANGLES
 from fieldsid.numerics.arrays import FloatArray
 
 _COUNTERS = word_set("seq sec nanosec secs nsecs")

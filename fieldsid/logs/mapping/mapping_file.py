@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BeforeValidator, Field
 
 from fieldsid.errors import MappingError
-from fieldsid.logs.channels import ANGLES, ATTITUDE, COMBINED, POSITION, ChannelMap, Pressure, Source, TableForm
+from fieldsid.logs.channels import ATTITUDE, COMBINED, POSITION, ChannelMap, Pressure, Source, TableForm
 from fieldsid.logs.convert.clock import GAP_FACTOR
 from fieldsid.logs.convert.frames import Body, Frame, World
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, SUMMED, counts_unit
@@ -21,7 +21,7 @@ from fieldsid.logs.convert.times.time_column import time_unit
 from fieldsid.logs.convert.units import find_unit, pick_unit
 from fieldsid.logs.mapping.canonical_names import fitting
 from fieldsid.logs.mapping.vocabulary import TIME
-from fieldsid.logs.run import FINS, PART, SIGNALS, signal_of
+from fieldsid.logs.run import ANGLES, FINS, PART, SIGNALS, signal_of
 from fieldsid.registry import near
 from fieldsid.strict import StrictModel, read_model, validated
 

@@ -18,7 +18,6 @@ import numpy as np
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.channels import POSITION, ChannelMap
 from fieldsid.logs.convert.units import DEGREE
-from fieldsid.logs.doctor.angle_and_rate import PAIRS
 from fieldsid.logs.doctor.fin_findings import WIDEST
 from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.draft import place_of
@@ -31,7 +30,7 @@ from fieldsid.logs.mapping.numbers.unit_inference import (
     unit_of_wraps,
 )
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.run import FINS, SIGNALS, Note, Run
+from fieldsid.logs.run import FINS, RATE_OF, SIGNALS, Note, Run
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +94,7 @@ def tried(log: Log, body: dict[str, Any], defined: frozenset[str]) -> Proposal:
     if yaw is not None and "yaw_rad" in by_size and "unit" in signals["yaw_rad"]:
         why += heading_in_doubt(yaw.values, signals)
     # the size of a rate shows that it is not in rad/s; its unit follows from the comparison with its angle
-    open_rates = {rate for angle, rate in PAIRS if rate in by_size and run.has(angle)}
+    open_rates = {rate for angle, rate in RATE_OF.items() if rate in by_size and run.has(angle)}
     known = {*defined, *stated.units, *({"yaw_rad"} if wraps == "rad" else ())} - open_rates
     why += assumed_units(run, known, {s: (place_of(item), item.get("unit", SIGNALS.get(s, ""))) for s, item in signals.items()})
     return Proposal(body, replace(run, notes=(*run.notes, *notes)), notes=tuple(why))

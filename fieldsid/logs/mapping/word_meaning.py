@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-from fieldsid.logs.channels import ANGLES
-from fieldsid.logs.doctor.angle_and_rate import PAIRS
 from fieldsid.logs.mapping.canonical_names import canonical, stated_unit, unit_among_words, words_of
 from fieldsid.logs.mapping.vocabulary import (
     COMMANDED,
@@ -20,11 +18,9 @@ from fieldsid.logs.mapping.vocabulary import (
     part_of,
     weight,
 )
-from fieldsid.logs.run import FINS, MOTORS
+from fieldsid.logs.run import ANGLES, FINS, MOTORS, RATE_OF
 
 _PREFIXED = re.compile(r"\s*[A-Za-z][_ .]\w{2}")
-RATES = dict(PAIRS)
-"""The rate that the name of an angle means together with the unit of a rate, as in `yaw_deg_s`."""
 CANONICAL, STANDARD = 9, 8
 """Scores of a canonical name, as of a field that its format defines, and of a component of a standard message: those of rules
 are two for each word."""
@@ -50,11 +46,12 @@ def meaning_of(name: str, span: Span | None = None, unit_text: str | None = None
     if best[0] == 2 and is_abbreviation(words_of(re.split(r"[/ .]", name.strip())[-1])):
         return None
     signal = best[1].signal
+    # the name of an angle with the unit of a rate, as in `yaw_deg_s`, means the rate
     has_unit_of_rate = unit_among_words(name, ("angle rate",)) is not None or (
-        signal in RATES and unit_text is not None and stated_unit(unit_text, RATES[signal]) is not None
+        signal in RATE_OF and unit_text is not None and stated_unit(unit_text, RATE_OF[signal]) is not None
     )
-    is_rate = signal in RATES and unit_among_words(name, ("angle",)) is None and has_unit_of_rate
-    meant = RATES[signal] if is_rate else signal
+    is_rate = signal in RATE_OF and unit_among_words(name, ("angle",)) is None and has_unit_of_rate
+    meant = RATE_OF[signal] if is_rate else signal
     before = _of_control(name, meant)
     is_actuator = meant in (*FINS, *MOTORS)
     if before == "error" or (before == "command" and not is_actuator):

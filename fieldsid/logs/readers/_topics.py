@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from io import StringIO
 from pathlib import Path
@@ -15,6 +15,7 @@ import numpy as np
 
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import COMBINED, ChannelMap, Source, TableForm
+from fieldsid.logs.convert.times.time_column import origin_note
 from fieldsid.logs.few_of import few_of
 from fieldsid.logs.mapping.canonical_names import unit_of_field
 from fieldsid.logs.reader import (
@@ -150,9 +151,8 @@ def raw_log_of(path: Path, log: Topics, mapping: ChannelMap) -> RawLog:
     topics = _not_empty(path, log)
     picked = {signal: _picked(path, topics, signal, source) for signal, source in mapping.sources.items()}
     origin = min((float(s.time[0]) for s in picked.values()), default=0.0)
-    series = {signal: Series(s.time - origin, s.values, s.label, s.unit, s.is_height) for signal, s in picked.items()}
-    started = Note("time_origin", f"time 0 is {origin:.6f} s of the log's clock", {"origin_ns": round(origin * 1e9)})
-    return RawLog(stem_of(path), series, (*log.notes, started), one_clock=False)
+    series = {signal: replace(s, time=s.time - origin) for signal, s in picked.items()}
+    return RawLog(stem_of(path), series, (*log.notes, origin_note(origin)), one_clock=False)
 
 
 def topic_name(path: Path, what: str, topics: Collection[str], signal: str, source: Source) -> str:

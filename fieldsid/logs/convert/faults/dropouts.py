@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import gammainc
 
 from fieldsid.logs.convert.faults.spikes import DIGITS, OF_MEDIAN, SPREADS, last_digit
 from fieldsid.logs.convert.faults.spikes import FEWEST as SHORTEST
@@ -29,18 +30,14 @@ SENSED = MEASURED - {*FINS}
 def _chance(count: int, others: npt.NDArray[np.intp]) -> float:
     """Return the probability that any number ends `count` jumps by chance, where each other number ends `others` (k,) jumps.
 
-    Of N jumps to V equally likely numbers, N (N - 1) / V ordered pairs end at the same number, which gives V.
+    Of N jumps to V equally likely numbers, N (N - 1) / V ordered pairs end at the same number, which gives V. The incomplete
+    gamma function is the probability of `count` events or more with a mean number of its second argument (Poisson).
     """
     jumps, pairs = int(others.sum()), int((others * (others - 1)).sum())
     if pairs == 0:
         return 0.0
     numbers = jumps * (jumps - 1) / pairs
-    return numbers * _chance_of_as_many(count, (jumps + count) / numbers)
-
-
-def _chance_of_as_many(count: int, expected: float) -> float:
-    """Return the probability of `count` or more events with a mean number of `expected` (Poisson)."""
-    return max(1.0 - sum(math.exp(-expected + i * math.log(expected) - math.lgamma(i + 1)) for i in range(count)), 0.0)
+    return numbers * float(gammainc(count, (jumps + count) / numbers))
 
 
 def _note(name: str, number: float, count: int, samples: int) -> Note:
@@ -80,7 +77,7 @@ def _dropout_of(values: FloatArray) -> tuple[float, int, int] | None:
     number, count = float(numbers[k]), int(counts[k])
     jumps_back = int(np.count_nonzero(values[far] == number))
     samples = int(np.count_nonzero(values == number))
-    chance = max(_chance(count, np.delete(counts, k)), _chance_of_as_many(count, far.size * samples / values.size))
+    chance = max(_chance(count, np.delete(counts, k)), float(gammainc(count, far.size * samples / values.size)))
     if count < FEWEST or jumps_back < FEWEST - 1 or chance > MOST_CHANCE:
         return None
     return number, count, samples

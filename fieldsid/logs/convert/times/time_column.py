@@ -216,7 +216,7 @@ def _of_numbers(values: npt.NDArray[Any], factor: float, column: _Column) -> tup
     first = float(seen[0]) if seen.size else 0.0
     if (base + first) * factor <= EPOCH_FROM_S:
         return scaled(numbers + base if base else numbers, factor), [*notes, *coarse]
-    return scaled(numbers - first, factor), [*notes, *coarse, _origin((base + first) * factor)]
+    return scaled(numbers - first, factor), [*notes, *coarse, origin_note((base + first) * factor)]
 
 
 def _of_text(column: _Column, unit: str | None) -> tuple[FloatArray, list[Note]]:
@@ -277,7 +277,7 @@ def _from_start(
     start = float(seconds[there][0]) if there.any() else 0.0
     # A clock has at most nine decimals of a second; further digits are rounding errors of the subtraction.
     time, coarse = rebuilt(np.round(seconds - start, 9), column.name)
-    return time, [*notes, *coarse, _origin(start_s + start, is_of_day=is_of_day)]
+    return time, [*notes, *coarse, origin_note(start_s + start, is_of_day=is_of_day)]
 
 
 def _of_weeks(column: _Column, unit: str | None, weeks: npt.NDArray[Any]) -> tuple[FloatArray, list[Note]]:
@@ -296,6 +296,7 @@ def _iso(cells: npt.NDArray[Any]) -> npt.NDArray[np.datetime64]:
     return np.asarray(parsed.dt.tz_localize(None).to_numpy(dtype="datetime64[ns]"))
 
 
-def _origin(start_s: float, *, is_of_day: bool = False) -> Note:
+def origin_note(start_s: float, *, is_of_day: bool = False) -> Note:
+    """Return the note that states the reading of the log's clock in s at time 0 of the run."""
     where = f"{start_s:.3f} s of the log's clock, which has no date" if is_of_day else f"{start_s:.6f} s of the log's clock"
     return Note("time_origin", f"time 0 is {where}", {"origin_ns": round(start_s * 1e9)})

@@ -18,13 +18,14 @@ import numpy as np
 
 from fieldsid.logs.convert.frames import north_and_east
 from fieldsid.logs.convert.units import CLEARLY, UNITS
-from fieldsid.logs.doctor.angle_and_rate import PAIRS, STRONG, WEAK
+from fieldsid.logs.doctor.angle_and_rate import STRONG, WEAK
 from fieldsid.logs.doctor.together import FEWEST, change, width_of
 from fieldsid.logs.few_of import FEW, few_of
 from fieldsid.logs.mapping.fins.shares import EXPLAINS, beyond, explained, explains, moved_by
 from fieldsid.logs.mapping.fins.shares import WINDOWS_S as SHORT_S
 from fieldsid.logs.mapping.numbers.unit_inference import Reading, fin_reading, in_radians
 from fieldsid.logs.reader import Samples
+from fieldsid.logs.run import RATE_OF
 from fieldsid.numerics.arrays import ComplexArray, FloatArray
 from fieldsid.numerics.shifted_correlation import slope_of
 
@@ -140,7 +141,7 @@ class _Tie:
 
 TIES = (
     *(_Tie(rate, (angle,), partial(_Scene.turned, signal=angle), _Scene.integral_change, ("rad/s", "deg/s"),
-           f"the derivative of column {{{angle}}}", may_turn=True) for angle, rate in PAIRS),
+           f"the derivative of column {{{angle}}}", may_turn=True) for angle, rate in RATE_OF.items()),
     _Tie("surge_m_s", ("yaw_rad", *PLACE), lambda s: s.speed().real, _Scene.values, ("m/s", "kn"),
          "the way made along the heading", IS_WITHIN),
     _Tie("sway_m_s", ("yaw_rad", *PLACE, "surge_m_s"), lambda s: s.speed().imag, _Scene.values, ("m/s", "kn"),

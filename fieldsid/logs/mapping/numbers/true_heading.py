@@ -19,7 +19,7 @@ import numpy as np
 
 from fieldsid.logs.convert.frames import north_and_east
 from fieldsid.logs.convert.units import CLEARLY
-from fieldsid.logs.doctor.angle_and_rate import PAIR_WINDOW_S, PAIRS, STRONG, changes_of
+from fieldsid.logs.doctor.angle_and_rate import PAIR_WINDOW_S, STRONG, changes_of
 from fieldsid.logs.doctor.pair_findings import TURNED, WINDOW_S, course_of
 from fieldsid.logs.doctor.together import SURE, agreement, change, width_of
 from fieldsid.logs.mapping.canonical_names import unit_in_name, words_of
@@ -27,7 +27,7 @@ from fieldsid.logs.mapping.numbers.unit_inference import in_radians
 from fieldsid.logs.mapping.vocabulary import COMMANDED, COMPASS, LATITUDE, LONGITUDE, OF_ANOTHER, OVER_GROUND
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import Samples
-from fieldsid.logs.run import Note, Run
+from fieldsid.logs.run import ANGLES_AND_RATES, Note, Run
 from fieldsid.numerics.arrays import ComplexArray, FloatArray
 
 
@@ -72,7 +72,7 @@ def _taken(names: Sequence[str], best: int, why: str) -> Note:
 
 def _rate_misfit(run: Run) -> float:
     """Return the standard deviation in rad of a heading's changes from the integral of the yaw rate; infinite without a rate."""
-    changes = changes_of(run, *PAIRS[0])
+    changes = changes_of(run, *ANGLES_AND_RATES[:2])
     return float("inf") if changes is None else float(np.std(changes[0] - changes[1]))
 
 

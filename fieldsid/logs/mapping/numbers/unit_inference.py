@@ -17,11 +17,11 @@ import numpy as np
 from fieldsid.logs.channels import POSITION
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FULL_RAD, Servo, servo_of
 from fieldsid.logs.convert.units import CLEARLY, DEGREE, UNITS, pick_unit
-from fieldsid.logs.doctor.angle_and_rate import PAIRS, agrees_with_rate
+from fieldsid.logs.doctor.angle_and_rate import agrees_with_rate
 from fieldsid.logs.doctor.pair_findings import goes_along_course, goes_with_depth, goes_with_way
 from fieldsid.logs.doctor.signal_findings import LARGEST
 from fieldsid.logs.few_of import FEW
-from fieldsid.logs.run import FINS, GOALS, MOTORS, SIGNALS, Note, Run
+from fieldsid.logs.run import FINS, GOALS, MOTORS, RATE_OF, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
 LARGEST_DEG = 180.0
@@ -164,7 +164,7 @@ def assumed_units(run: Run, known: Collection[str], places: Mapping[str, tuple[s
         sure |= {"x_m", "y_m", "surge_m_s"}
     if goes_along_course(run):
         sure.add("yaw_rad")
-    agreeing = [{a, r} for a, r in PAIRS if agrees_with_rate(run, a, r)]
+    agreeing = [{a, r} for a, r in RATE_OF.items() if agrees_with_rate(run, a, r)]
     if goes_with_depth(run):
         agreeing += [{"depth_m", "surge_m_s"}]
     sure |= {s for both in agreeing if both & sure for s in both}
