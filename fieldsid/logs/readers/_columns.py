@@ -99,8 +99,7 @@ def samples_of(columns: Columns, time: FloatArray, source: Source) -> Samples:
     for i in range(columns.width):
         cells = numbers_mostly(columns.take(i))
         if cells.dtype.kind in "fiub":
-            name = columns.name(i)
-            taken[name if columns.names.count(name) == 1 else i] = cells[seen][::step].astype(np.float64)
+            taken[columns.place(i)] = cells[seen][::step].astype(np.float64)
     return Samples(time[seen][::step], taken, source)
 
 

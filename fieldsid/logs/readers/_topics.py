@@ -182,7 +182,7 @@ def _picked(path: Path, topics: Mapping[str, Topic], signal: str, source: Source
         if name not in topic.fields:
             raise MappingError(
                 f"topic `{name_of_topic}` has no field `{name}` for `{signal}`",
-                found=", ".join(topic.fields),
+                found=few_of(list(topic.fields)),
                 hint=near(name, list(topic.fields)),
                 signal=signal,
             )

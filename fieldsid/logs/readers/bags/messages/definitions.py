@@ -19,9 +19,9 @@ from fieldsid.logs.run import Note
 Fields = dict[str, list[tuple[str, Any]]]
 _IDL_RULE = "=" * 80 + "\n"
 DEEPEST = 4
-"""Depth of folders below that of the bag in which .msg files are searched, as in `workspace/src/package/msg`."""
+"""Depth of folders below a given one, or that of the bag, that are searched, as in `workspace/src/package/msg`."""
 MOST_FOLDERS = 2000
-"""Largest number of folders near a bag that are searched, so that a bag in a home folder does not start a search of all of it."""
+"""Largest number of folders that are searched, so that a bag in a home folder does not start a search of all of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +92,7 @@ def _shipped() -> Fields:
 def _of_folder(folder: Path | None, connection: Connection) -> Fields:
     if folder is None:
         return {}
-    files = sorted(folder.rglob("*.msg")) if folder.is_dir() else []
+    files = _msg_files(folder)
     if not files:
         raise LogError(
             f"`--msg-path {folder}` holds no .msg files", found="none below it", hint="give the folder above `pkg/msg/*.msg`"
@@ -122,7 +122,7 @@ def _file_of(name: str, files: Sequence[Path]) -> Path | None:
 
 @cache
 def _msg_files(root: Path) -> tuple[Path, ...]:
-    """Return the .msg files in a folder and the folders below it, within the limits DEEPEST and MOST_FOLDERS."""
+    """Return the .msg files in a folder and the folders below it, within the limits DEEPEST and MOST_FOLDERS; none without it."""
     found: list[Path] = []
     for count, (folder, folders, names) in enumerate(os.walk(root)):
         if count >= MOST_FOLDERS:

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from rosbags.interfaces import Nodetype
 
 from fieldsid.errors import LogError, MappingError
-from fieldsid.logs.few_of import SHOWN
+from fieldsid.logs.few_of import SHOWN, few_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
 
@@ -232,7 +232,7 @@ def _index(layout: Layout, base: str, key: str) -> int:
 
 def _no_field(layout: Layout, path: str) -> MappingError:
     known = [p if leaf.count is None else f"{p}[0]" for p, leaf in layout.leaves.items()]
-    return MappingError(f"the message has no number at `{path}`", found=", ".join(known[:12]), hint=near(path, known))
+    return MappingError(f"the message has no number at `{path}`", found=few_of(known), hint=near(path, known))
 
 
 def types_in(fields: Sequence[tuple[str, Any]]) -> list[str]:
