@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from fieldsid.logs.convert.units import find_unit
+from fieldsid.logs.convert.units import unit_among
 from fieldsid.logs.run import FINS, MOTORS, Note, signal_of
 from fieldsid.numerics.arrays import FloatArray
 
@@ -51,8 +51,8 @@ def counts_unit(signal: str, unit: str | None) -> str | None:
     signal = signal_of(signal)
     if unit is None or signal not in COUNTED or unit == COUNTS:
         return unit if signal in COUNTED else None
-    found = (find_unit(unit, dimension) for dimension in ("time", "ratio")) if signal in FINS else ()
-    return next((u.name for u in found if u is not None and u.name in BY_UNIT), None)
+    found = unit_among(unit, ("time", "ratio")) if signal in FINS else None
+    return found.name if found is not None and found.name in BY_UNIT else None
 
 
 def servo_of(values: FloatArray) -> Servo | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -169,6 +169,11 @@ def find_unit(name: str, dimension: str | None = None) -> Unit | None:
     several = _MULTIPLE.fullmatch(plain) if found is None else None
     base = find_unit(several["unit"], dimension) if several else None
     return found if base is None or several is None else Unit(plain, base.dimension, float(several["number"]) * base.factor)
+
+
+def unit_among(name: str, dimensions: Iterable[str]) -> Unit | None:
+    """Return the unit that a text is in one of some dimensions, the first that has it; None where it is in none of them."""
+    return next((u for d in dimensions if (u := find_unit(name, d)) is not None and u.dimension == d), None)
 
 
 def dimension_of(signal: str) -> str | None:

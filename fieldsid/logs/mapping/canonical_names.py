@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from fieldsid.logs.channels import POSITION
 from fieldsid.logs.convert.servo_counts import BY_UNIT
-from fieldsid.logs.convert.units import SPELLINGS, Unit, dimension_of, find_unit
+from fieldsid.logs.convert.units import SPELLINGS, Unit, dimension_of, find_unit, unit_among
 from fieldsid.logs.mapping.vocabulary import GLIDER, KNOWN, LATITUDE, LONGITUDE, TIME
 from fieldsid.logs.run import FINS, LINES, SIGNALS
 
@@ -85,10 +85,8 @@ def unit_among_words(name: str, dimensions: tuple[str, ...]) -> Unit | None:
     A compound unit is not taken for one of its parts: `heading_deg_s` is not in `deg`.
     """
     for inside in (text for text in reversed(_BRACKET.findall(name)) if not text.isdigit()):
-        units = [u for d in dimensions if (u := find_unit(inside, d)) is not None]
-        fitting = next((u for u in units if u.dimension in dimensions), None)
-        if fitting is not None or units:
-            return fitting
+        if find_unit(inside) is not None:
+            return unit_among(inside, dimensions)
     tokens = tokens_of(name)
     for size in range(LONGEST, 0, -1):
         for end in range(len(tokens), size - 1, -1):
@@ -157,9 +155,8 @@ def fitting(signal: str) -> tuple[str, ...]:
 
 def stated_unit(text: str, signal: str) -> str | None:
     """Return the name of the unit that a text such as `deg/s` or `[deg/s]` states; None where it does not fit the signal."""
-    bare = text.strip().strip("[]()")
-    units = (find_unit(bare, dimension) for dimension in fitting(signal))
-    return next((u.name for u in units if u is not None and u.dimension in fitting(signal)), None)
+    found = unit_among(text.strip().strip("[]()"), fitting(signal))
+    return None if found is None else found.name
 
 
 def unit_in_name(name: str, signal: str, unit_text: str | None = None) -> str | None:

@@ -20,7 +20,7 @@ from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import check_readable
 from fieldsid.logs.readers import csv_table, parquet
 from fieldsid.logs.run import Note
-from fieldsid.logs.several.run_names import common_start, name_of_run, names_apart, shared_start, stem_of
+from fieldsid.logs.several.run_names import name_of_run, names_apart, shared_ends, shared_start, stem_of
 
 
 def run_of(path: Path, joined: Sequence[Path]) -> list[Path]:
@@ -84,10 +84,8 @@ def names_in_run(tables: Sequence[Path]) -> dict[str, Path]:
 def _marks(kind: Sequence[Path]) -> dict[str, Path]:
     """Return tables of one kind by the part of their names that differs."""
     stems = [stem_of(path) for path in kind]
-    start = len(common_start(stems))
-    rest = [stem[start:] for stem in stems]
-    end = len(common_start([r[::-1] for r in rest]))
-    return {r[: len(r) - end]: path for r, path in zip(rest, kind, strict=True)}
+    shared = shared_ends(stems)
+    return {shared.middle(stem): path for stem, path in zip(stems, kind, strict=True)}
 
 
 def _names(path: Path) -> tuple[str, ...]:

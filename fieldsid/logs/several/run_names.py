@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import re
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from hashlib import sha256
 from itertools import chain, count, takewhile
 from pathlib import Path
@@ -100,8 +101,11 @@ class ShortNames:
 
     def of(self, name: str) -> str:
         """Return a name with three dots in place of the common start and end."""
-        middle = name[len(self.start) : len(name) - len(self.end)]
-        return f"{'...' if self.start else ''}{middle}{'...' if self.end else ''}"
+        return f"{'...' if self.start else ''}{self.middle(name)}{'...' if self.end else ''}"
+
+    def middle(self, name: str) -> str:
+        """Return what is between the common start and end of a name."""
+        return name[len(self.start) : len(name) - len(self.end)]
 
     @property
     def says(self) -> str:
@@ -114,9 +118,13 @@ def short_names(names: Sequence[str]) -> ShortNames:
     """Return the common start and end of names, in complete words, where one of them is longer than LONGEST_NAME."""
     if len(set(names)) < 2 or max(map(len, names)) <= LONGEST_NAME:
         return ShortNames("", "")
-    start = shared_start(names, _BOUNDARY_WITHOUT_POINT)
-    end = shared_start([name[len(start) :][::-1] for name in names], _BOUNDARY_WITHOUT_POINT)[::-1]
-    return ShortNames(start, end)
+    return shared_ends(names, partial(shared_start, boundary=_BOUNDARY_WITHOUT_POINT))
+
+
+def shared_ends(names: Sequence[str], start_of: Callable[[Sequence[str]], str] = common_start) -> ShortNames:
+    """Return the common start and end of names, each as `start_of` finds it from its side."""
+    start = start_of(names)
+    return ShortNames(start, start_of([name[len(start) :][::-1] for name in names])[::-1])
 
 
 def _labels(name: str, paths: Sequence[Path]) -> Iterator[list[str]]:

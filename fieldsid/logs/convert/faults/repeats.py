@@ -62,7 +62,7 @@ def _rows_per_measurement(changed: npt.NDArray[np.intp]) -> int:
 
 def rows_of(values: FloatArray) -> BoolArray:
     """Return a mask of the rows (n,) in which a sensor has a number, or several (n, k)."""
-    return np.asarray(np.isfinite(values.reshape(len(values), -1)).all(axis=1))
+    return np.asarray(np.isfinite(values if values.ndim > 1 else values[:, None]).all(axis=1))
 
 
 def measured_anew(values: FloatArray) -> BoolArray:
