@@ -104,7 +104,7 @@ USUAL_HZ = (1.0, 2.0, 4.0, 5.0, 8.0, 10.0, 16.0, 20.0, 25.0, 30.0, 32.0, 40.0, 5
 def rate_by_turning(run: Run, *, has_unit: bool) -> tuple[float, str, Note] | None:
     """Return the sampling rate of a run that was read with `ASSUMED_HZ`, the unit of its yaw rate, and a note; None where open.
 
-    A rate within FEW hundredths of a usual one of loggers is taken for that.
+    A rate that differs from a usual one of loggers by less than the share FEW is taken for that.
 
     `has_unit` states that the unit of the yaw rate is known; else it is the one that gives a possible sampling rate.
     """

@@ -32,6 +32,9 @@ from fieldsid.logs.mapping.numbers.unit_inference import (
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.run import FINS, RATE_OF, SIGNALS, Note, Run
 
+CORRECTED = ("unit", "sign", "frame")
+"""The keys of a signal that findings correct."""
+
 
 @dataclass(frozen=True, slots=True)
 class Log:
@@ -84,7 +87,7 @@ def tried(log: Log, body: dict[str, Any], defined: frozenset[str]) -> Proposal:
     wraps = None if yaw is None else unit_of_wraps(yaw.values)
     in_doubt = by_size if wraps is None else by_size - {"yaw_rad"}
     why: list[Note] = []
-    for _ in signals:  # each reading corrects a signal at least
+    for _ in range(len(CORRECTED) * len(signals) + 1):  # each reading but the last corrects a key at least
         run, stated = log.run_of(body, raw), stated_by(mapping_of(body), raw)
         notes = examine(run, stated=stated)
         corrections = mended(body, run, notes, in_doubt)

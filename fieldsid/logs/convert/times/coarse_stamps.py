@@ -113,8 +113,8 @@ def _last_digits(stamps: FloatArray) -> list[FloatArray]:
 def _whole(numbers: FloatArray, last_bit: float = 0.0) -> bool:
     """Whether numbers are whole within `last_bit`, the value of their last bit, and not all zero in too large a unit.
 
-    A last bit that is worth more than a FEW hundredths would make any number whole. A last digit tells apart what differs: an
-    epoch near a round number is not whole in millions of seconds.
+    A last bit that is worth more than the share FEW of a unit would make any number whole. A last digit tells apart what
+    differs: an epoch near a round number is not whole in millions of seconds.
     """
     whole = np.round(numbers)
     made_equal = np.diff(whole)[np.diff(numbers) != 0.0] == 0.0

@@ -20,8 +20,8 @@ DATE = re.compile(r"(\d{1,4})([-/.])(\d{1,2}|[A-Za-z]{3})[-/.](\d{1,4})")
 OF_WEEK_OR_YEAR = r"\d{4}-(?:W\d\d-\d|\d{3})"
 """2024-W09-5, the fifth day of a week, and 2024-061, the 61st day of a year."""
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
-YEARS = (1980, 2100)
-"""Plausible years of a log, the last one excluded."""
+YEARS = (1970, 2100)
+"""Years that a date of a log may have, the last one excluded; a clock that was never set starts with the first."""
 
 
 def days_of(cells: npt.NDArray[Any]) -> FloatArray | None:

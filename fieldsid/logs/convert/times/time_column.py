@@ -44,8 +44,8 @@ EPOCH_FROM_S = 1e8
 """A time that starts at more than this many seconds (three years) counts from an epoch, not from the start of the run."""
 GPS_EPOCH_S = datetime(1980, 1, 6, tzinfo=UTC).timestamp()
 """The day from which GPS weeks count, in seconds since 1970."""
-YEARS_S = tuple(datetime(year, 1, 1, tzinfo=UTC).timestamp() for year in YEARS)
-"""Seconds since 1970 at the start and the end of the plausible years of a log."""
+YEARS_S = (GPS_EPOCH_S, datetime(YEARS[1], 1, 1, tzinfo=UTC).timestamp())
+"""Range of the seconds since 1970 of a log; what is less counts from another start."""
 LATEST_S = 1e9 * YEARS_S[1]
 """Largest plausible time, even for nanoseconds since 1970 taken for seconds: a larger number is a damaged cell."""
 

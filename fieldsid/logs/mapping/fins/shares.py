@@ -75,7 +75,7 @@ def moved_by(
 def fin_shares(left: FloatArray, moved: FloatArray, width: int) -> FinShares:
     """Return the shares (m,) of fins in dr/dt, from the two results of `moved_by`.
 
-    A pattern of fin angles whose singular value is below FEW hundredths of the largest counts as absent.
+    A pattern of fin angles whose singular value is below the share FEW of the largest counts as absent.
     """
     solution, _, _, length = np.linalg.lstsq(moved, left, rcond=FEW)
     fitted = solution.astype(np.float64)

@@ -97,3 +97,13 @@ def test_one_row_of_text_is_a_number_or_refused():
     assert seconds_of(one, "s", name="t")[0].tolist() == [12.5]
     with pytest.raises(LogError, match="without a time"):
         seconds_of(np.array(["noon"], dtype=object), "s", name="t")
+
+
+@pytest.mark.parametrize("year", [1970, 2024])
+def test_digits_of_a_date_are_one_in_a_log_whose_clock_was_never_set_too(year):
+    assert likely_time_unit(year * 1e10 + 301142018.0 + np.arange(30.0)) == "yyyymmddhhmmss"
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
+def test_the_unit_of_an_epoch_is_the_one_in_which_it_is_a_year_of_logs(unit, factor):
+    assert likely_time_unit((1.7e9 + 0.1 * np.arange(30.0)) * factor) == unit
