@@ -114,7 +114,7 @@ def figure(told: Telltale) -> Figure:
     axes[0].plot(time, motion.measured(view.record, 1), color="0.25", linewidth=1.5, label="with the effect")
     axes[0].plot(time, np.degrees(view.rate), color=canvas.SIMULATED, linewidth=1.1, label="textbook's model, fitted to it")
     canvas.legend_above(axes[0], 80)
-    draw(motion.fin(replace(view, fin=view.record.fin)), axes[1])
+    draw(motion.fin(replace(view, fin=view.record.fin)), axes[1], 80)
     for ax, role in zip(axes[2:], roles, strict=False):
         label, factor = HELPER[role]
         canvas.dress(ax, y=label)
