@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hidden_lag
 import numpy as np
 import pytest
 from truth.pilots import Autopilot, excited
@@ -92,6 +93,17 @@ def test_a_form_that_does_not_fit_is_named_with_the_twin_and_what_is_left(speed)
     assert data["causes"] == ["collinear", "misfit"]
     assert "c22" in message
     assert "x the sensors' noise" in message
+
+
+def test_an_error_by_what_the_model_leaves_is_not_called_a_value_near_zero():
+    training, _ = hidden_lag.runs()
+    fit = identify(training, Axis.YAW, joint=True, method="output_error")[0]
+    notes = [n for n in fit.notes if n.code == "authority_unclear"]
+    assert [n.data["parameter"] for n in notes] == ["b2@1", "b2"]
+    for note in notes:
+        assert "misfit" in note.data["causes"]
+        assert "from zero" not in note.message
+        assert "x the sensors' noise" in note.message
 
 
 def test_of_many_parameters_those_are_named_whose_knowledge_helps():
