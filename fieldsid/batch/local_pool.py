@@ -42,8 +42,8 @@ def run_here(tasks: Sequence[Task], workers: int, *, timeout_s: float, memory_mb
             for answer in as_completed(asked):
                 yield asked[answer], answer.result()
         finally:
+            pool.shutdown(wait=False, cancel_futures=True)  # first, so that no process is started that is ended at once
             crew.dismiss()
-            pool.shutdown(cancel_futures=True)
 
 
 @dataclass

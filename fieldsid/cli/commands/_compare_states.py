@@ -144,5 +144,4 @@ def _next_command(found: Change, sides: Sequence[Side]) -> str | None:
 
 
 def _inputs(model: Path) -> list[str]:
-
     return [str(p) for p in inputs_of(model)]

@@ -19,6 +19,8 @@ from fieldsid.numerics.arrays import BoolArray, FloatArray
 MAX_GAP_S = 2.0
 """A run in which a main signal is missing for longer than this is refused, unless the user raises the limit."""
 
+ROUNDING = 1.01
+"""Tolerance of the limit for rounding and jitter of the times, as a factor."""
 FITTED = ANGLES_AND_RATES[:4]
 """Signals to which a free run is fitted."""
 MAIN = (*FITTED, *FINS)
@@ -118,7 +120,7 @@ def long_gaps(time: FloatArray, signals: Mapping[str, FloatArray], limit_s: floa
     for signal in (s for s in MAIN if s in signals):
         steps = np.diff(time[np.isfinite(signals[signal])])
         limit = max(limit_s, FEW_STEPS * float(np.median(steps))) if steps.size else limit_s
-        found += [(gap, signal, limit) for gap in gaps_in(time, signals[signal]) if gap.length_s > limit]
+        found += [(gap, signal, limit) for gap in gaps_in(time, signals[signal]) if gap.length_s > ROUNDING * limit]
     return found
 
 

@@ -23,9 +23,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.convert.clock import GAP_FACTOR, Track, interpolated
-from fieldsid.logs.convert.faults.spikes import SPREADS
 from fieldsid.logs.convert.frames import unwrapped
-from fieldsid.logs.few_of import FEW, few_of
+from fieldsid.logs.few_of import few_of
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.trapezoid import trapezoid_integral
@@ -38,11 +37,14 @@ LONGEST_SWEEP_S = math.tau / FASTEST_RAD_S
 SLACK_RAD_S = 0.5
 """Largest difference of the rate at a crossing of the wrap from that of the steps around it."""
 MIN_JUMP_RAD = 0.03
-"""A step is significant above this, and above SPREADS standard deviations of the noise."""
+NOISES = 6.0
+"""A step is significant above this many standard deviations of the noise, and above `MIN_JUMP_RAD`."""
 NEIGHBOURS = 8
 """Number of steps on each side from which the motion is estimated."""
 ALIKE = (math.sqrt(0.5), math.sqrt(2.0))
 """Ratios of two sensors' readings of one motion between which they agree; a wrong unit gives a ratio further off."""
+RARE = 0.02
+"""Share of samples with a nonzero second difference, up to which these do not show the level of the noise."""
 
 
 def unwrapped_over(heading: Track, rate: Track | None = None, gap_factor: float = GAP_FACTOR) -> tuple[Track, list[Note]]:
@@ -130,7 +132,7 @@ def _path(time: FloatArray, values: FloatArray, rate: Track | None) -> _Path | N
     steps, dt = np.diff(values), np.diff(time)
     turned = within_half_turn(steps)
     noise = noise_of_steps(np.where(np.abs(turned) > FASTEST_RAD_S * dt, np.nan, turned))
-    least = max(MIN_JUMP_RAD, SPREADS * math.sqrt(2.0) * noise)
+    least = max(MIN_JUMP_RAD, NOISES * math.sqrt(2.0) * noise)
     limit = np.maximum(FASTEST_RAD_S * dt, least)
     jumps = np.flatnonzero(np.abs(steps) > limit)
     spread = float(np.ptp(values)) - math.tau
@@ -149,9 +151,9 @@ def noise_of_steps(turned: FloatArray) -> float:
     """Return the standard deviation of the white noise on a heading, from its steps (n-1,), of which jumps are NaN."""
     bends = np.abs(np.diff(turned))
     bends = bends[np.isfinite(bends)]
-    # A value repeated over several samples has second differences only where it changes: those show its noise, unless FEW.
+    # A value repeated over several samples has second differences only where it changes: those show its noise, unless rare.
     some = bends[bends > 1e-9]
-    return 0.0 if some.size <= FEW * bends.size else robust_white_noise_std(some, 2)
+    return 0.0 if some.size <= RARE * bends.size else robust_white_noise_std(some, 2)
 
 
 def _swept(time: FloatArray, turned: FloatArray, calm: npt.NDArray[np.intp], rate: Track | None) -> FloatArray | None:

@@ -15,14 +15,15 @@ import numpy as np
 from fieldsid.logs.convert.clock import Track
 from fieldsid.logs.convert.conditioning import blocks_of
 from fieldsid.logs.convert.faults.dropouts import FEWEST
-from fieldsid.logs.convert.faults.spikes import SPREADS
-from fieldsid.logs.convert.heading_unwrap import FASTEST_RAD_S, MIN_JUMP_RAD, noise_of_steps, within_half_turn
-from fieldsid.logs.few_of import FEW, MOSTLY, NEARLY_ALL
+from fieldsid.logs.convert.heading_unwrap import FASTEST_RAD_S, MIN_JUMP_RAD, NOISES, noise_of_steps, within_half_turn
+from fieldsid.logs.few_of import FEW, MOSTLY
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 END_RAD = 1e-6
 """Largest distance of a fill value from a multiple of a right angle; every frame turns an end of the range into one."""
+GOES_ON = 0.8
+"""Smallest share of the jumps across which the other samples must form a continuous heading."""
 
 
 def without_fills(heading: Track) -> tuple[Track, list[Note]]:
@@ -66,12 +67,12 @@ def _fills(time: FloatArray, values: FloatArray, end: float) -> BoolArray:
     if others.sum() < 3 or before.size < FEWEST or at_end[before[0] : after[-1]].mean() > MOSTLY:
         return none
     steps, dt = within_half_turn(np.diff(values[others])), np.diff(time[others])
-    least = max(MIN_JUMP_RAD, SPREADS * math.sqrt(2.0) * noise_of_steps(steps))
+    least = max(MIN_JUMP_RAD, NOISES * math.sqrt(2.0) * noise_of_steps(steps))
     jumped = (np.abs(within_half_turn(values[before] - end)) > least + FASTEST_RAD_S * (time[before + 1] - time[before])) & (
         np.abs(within_half_turn(values[after] - end)) > least + FASTEST_RAD_S * (time[after] - time[after - 1])
     )
     fastest = 1.5 * float(np.quantile(np.abs(steps) / dt, 1.0 - FEW))
     across = np.abs(within_half_turn(values[after] - values[before])) <= least + fastest * (time[after] - time[before])
-    if jumped.sum() < FEWEST or across[jumped].mean() < NEARLY_ALL:
+    if jumped.sum() < FEWEST or across[jumped].mean() < GOES_ON:
         return none
     return at_end

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldsid.errors import LogError
-from fieldsid.logs.convert.conditioning import gaps_in, in_order, refuse_long_gaps
+from fieldsid.logs.convert.conditioning import gaps_in, in_order, long_gaps, refuse_long_gaps
 from fieldsid.logs.reader import ReadOptions
 
 
@@ -56,6 +56,13 @@ def test_a_long_gap_in_a_main_signal_is_refused_and_in_a_helper_is_not():
     assert "`sysid import a.csv --from 6.00 --to 9.90 -o imported/`" in error.value.hint
     refuse_long_gaps(time, {"yaw_rad": holed}, limit_s=5.0)
     refuse_long_gaps(time, {"surge_m_s": holed})
+
+
+def test_a_gap_as_long_as_the_limit_is_taken_however_its_times_are_rounded():
+    values = np.ones(100)
+    values[30:50] = np.nan
+    for start in range(200):
+        assert not long_gaps(0.1 * np.arange(start, start + 100), {"yaw_rad": values}, 2.0)
 
 
 def test_a_slow_sensor_on_a_fast_clock_is_no_gap():
