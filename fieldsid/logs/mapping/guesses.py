@@ -12,7 +12,6 @@ import numpy as np
 from fieldsid.logs.channels import ATTITUDE
 from fieldsid.logs.convert.conditioning import MAX_PLAUSIBLE_VALUE
 from fieldsid.logs.convert.units import dimension_of
-from fieldsid.logs.few_of import FEW
 from fieldsid.logs.mapping.canonical_names import unit_in_name, unit_of_field, words_of
 from fieldsid.logs.mapping.vocabulary import COMMANDED, COMPASS, LATITUDE, LONGITUDE, TIME, part_of, word_set
 from fieldsid.logs.mapping.word_meaning import CANONICAL, STANDARD, meaning_of
@@ -41,6 +40,8 @@ _PARTS_OF_QUATERNION = (
     re.compile(r"(?P<stem>.*?q(?:uat|uaternion)?s?[_.]?[\[(]?)(?P<part>[0-4])(?P<end>[\])]?)$", re.IGNORECASE),
 )
 """Names of the components of a quaternion: letters, or numbers after a `q`, as in `q[0]` and `quat_1`."""
+UNIT_LENGTH = 0.02
+"""Largest deviation of the median norm of a quaternion from one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +99,7 @@ def quaternion_of(names: Sequence[str], columns: Mapping[str | int, FloatArray])
         numbers = np.stack([columns[c] for c in picked])
         lengths = np.linalg.norm(numbers, axis=0)
         seen = lengths[np.isfinite(lengths)]
-        if len(picked) == 4 and seen.size and abs(float(np.median(seen)) - 1.0) < FEW:
+        if len(picked) == 4 and seen.size and abs(float(np.median(seen)) - 1.0) < UNIT_LENGTH:
             size = np.nanmean(numbers**2, axis=1)
             is_real_first = "x" not in parts and size[1] + size[2] <= size[0] + size[1]
             return {"columns": picked} | ({"order": "wxyz"} if is_real_first else {})

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 from fieldsid.logs.convert.units import CLEARLY
 from fieldsid.logs.doctor.angle_and_rate import TRUSTED, changes_of
-from fieldsid.logs.few_of import FEW
 from fieldsid.logs.mapping.canonical_names import words_of
 from fieldsid.logs.mapping.draft import Draft, draft_of, place_of, with_units_by_span
 from fieldsid.logs.mapping.fins.several import which_output, with_several_fins
@@ -99,12 +98,12 @@ def _without_clock(log: Log, draft: Draft) -> Proposal:
 
 ASSUMED_HZ = 10.0
 USUAL_HZ = (1.0, 2.0, 4.0, 5.0, 8.0, 10.0, 16.0, 20.0, 25.0, 30.0, 32.0, 40.0, 50.0, 60.0, 64.0, 100.0, 128.0, 200.0, 250.0)
+NEAR = 0.02
+"""Relative deviation up to which an estimated rate is replaced by a usual rate of loggers."""
 
 
 def rate_by_turning(run: Run, *, has_unit: bool) -> tuple[float, str, Note] | None:
     """Return the sampling rate of a run that was read with `ASSUMED_HZ`, the unit of its yaw rate, and a note; None where open.
-
-    A rate that differs from a usual one of loggers by less than the share FEW is taken for that.
 
     `has_unit` states that the unit of the yaw rate is known; else it is the one that gives a possible sampling rate.
     """
@@ -124,7 +123,7 @@ def rate_by_turning(run: Run, *, has_unit: bool) -> tuple[float, str, Note] | No
     )
     usual = min(USUAL_HZ, key=lambda known: abs(known - rate))
     return (
-        usual if abs(usual / rate - 1.0) < FEW else float(f"{rate:.3g}"),
+        usual if abs(usual / rate - 1.0) < NEAR else float(f"{rate:.3g}"),
         likely[0],
         Note("rate_guessed", message, {"value": rate, "signal": "yaw_rate_rad_s"}),
     )

@@ -18,7 +18,7 @@ import numpy as np
 
 from fieldsid.logs.convert.frames import north_and_east
 from fieldsid.logs.convert.units import CLEARLY, UNITS
-from fieldsid.logs.doctor.angle_and_rate import STRONG, WEAK
+from fieldsid.logs.doctor.angle_and_rate import STRONG
 from fieldsid.logs.doctor.together import FEWEST, change, width_of
 from fieldsid.logs.few_of import FEW, few_of
 from fieldsid.logs.mapping.fins.shares import EXPLAINS, beyond, explained, explains, moved_by
@@ -31,6 +31,8 @@ from fieldsid.numerics.shifted_correlation import slope_of
 
 WINDOWS_S = (*SHORT_S, 10.0)
 """Windows in s over which changes are computed; a position with few digits needs a long one."""
+TURNS_ALONG = 0.6
+"""Smallest correlation of heading and course."""
 MOST_SLIP = 3.0
 """Largest ratio of the turns of heading and course, in either direction; they differ by sideslip."""
 MOST_WAYS = 30
@@ -230,7 +232,7 @@ def _pointing(
         if heading in place or along <= STRONG:  # of the distance is made along the heading, but for sideslip
             continue
         slope, trust = slope_of(*(np.unwrap(np.angle(v[seen])) for v in (direction, displacement)))
-        if trust > WEAK and 1.0 / MOST_SLIP < slope < MOST_SLIP:
+        if trust > TURNS_ALONG and 1.0 / MOST_SLIP < slope < MOST_SLIP:
             why = f"{100 * along:.1f} % of the way that columns {' and '.join(map(str, place))} make is made along it"
             same = f"the way made in it is along the heading in column {heading}"
             of_place = [Recognised(s, c, item, same, along) for s, c in zip(PLACE, place, strict=True) if s not in scene.known]
