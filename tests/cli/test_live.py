@@ -160,7 +160,7 @@ def test_a_narrow_terminal_shows_every_name_and_goal(width, has_band):
     assert ("95 % band" in text) is has_band
 
 
-def test_gains_and_a_diagnosis_are_said_beside_the_estimate(run_cli, tmp_path):
+def test_gains_and_a_diagnosis_are_those_of_design_and_diagnose_once_a_maneuver_has_ended(run_cli, tmp_path):
     run = trial.flown(tmp_path, spec="square_pulses")
     said = ("live", run, "--axis", "yaw", "--speed", "0", "--json", "--every", "15", "--gains", "--diagnose")
     found = looks(run_cli(*said, "--want", "a22=30%,b2=30%"))
@@ -168,20 +168,14 @@ def test_gains_and_a_diagnosis_are_said_beside_the_estimate(run_cli, tmp_path):
     last = found[-1]
     assert last["gains"]["verdict"] == "use"
     assert last["gains"]["row"]["kp"] * last["parameters"]["b2"]["value"] > 0.0
+    (fit,) = identify([log := load_run(run)], Axis.YAW)
+    row = gains_of_one(fit.model, last["gains"]["speed_m_s"], usual(float(np.abs(log["rudder_rad"]).max()), by_rate=True)).row
+    assert last["gains"]["method"] == fit.model.method
+    assert [last["gains"]["row"][name] for name in ("kp", "kd")] == pytest.approx([row.gains.kp, row.gains.kd], rel=1e-6)
     after = run_cli("diagnose", run, "--axis", "yaw", "--json").json
     for told in ("verdict", "effects", "left", "base", "final", "noise_floor", "next_maneuver"):
         assert last["diagnosed"][told] == after[told]
     assert after["short"] in last["diagnosed"]["says"]
-
-
-def test_gains_are_those_of_the_design_once_a_maneuver_has_ended(run_cli, tmp_path):
-    run = trial.flown(tmp_path)
-    last = looks(run_cli("live", run, "--axis", "yaw", "--speed", "0", "--json", "--every", "15", "--gains"))[-1]["gains"]
-    log = load_run(run)
-    (fit,) = identify([log], Axis.YAW)
-    row = gains_of_one(fit.model, last["speed_m_s"], usual(float(np.abs(log["rudder_rad"]).max()), by_rate=True)).row
-    assert last["method"] == fit.model.method
-    assert (last["row"]["kp"], last["row"]["kd"]) == pytest.approx((row.gains.kp, row.gains.kd), rel=1e-6)
 
 
 def test_gains_of_lines_on_standard_input_are_of_all_that_was_sent(run_cli, tmp_path, monkeypatch):

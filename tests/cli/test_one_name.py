@@ -18,8 +18,15 @@ def table(folder):
     return path
 
 
-@pytest.mark.parametrize("command", [("turn-radius",), ("schedule", "design")])
-@pytest.mark.parametrize("given", [("--rudder-max", "0.2"), ("--fin-limit=0.2",), ("--fin-limit", "0.2"), ("--rudder-max=0.2",)])
+@pytest.mark.parametrize(
+    ("command", "given"),
+    [
+        (("turn-radius",), ("--rudder-max", "0.2")),
+        (("turn-radius",), ("--fin-limit=0.2",)),
+        (("schedule", "design"), ("--fin-limit", "0.2")),
+        (("schedule", "design"), ("--rudder-max=0.2",)),
+    ],
+)
 def test_a_fins_limit_has_one_name_and_is_understood_by_those_it_had(run_cli, tmp_path, command, given):
     asked, named = (run_cli(*command, table(tmp_path), *words, "--json").json["rows"] for words in (given, ("--fin-max", "0.2")))
     assert asked == named

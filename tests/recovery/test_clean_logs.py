@@ -38,7 +38,11 @@ def test_nothing_is_missing_where_the_model_follows_as_well_as_the_speed_was_mea
 
 
 @pytest.mark.parametrize(
-    ("hidden", "name"), [({"servo_tau": 0.4}, "servo_lag"), ({"quadratic": 1.0}, "quadratic_damping")], ids=["lag", "quadratic"]
+    ("hidden", "name"),
+    [
+        pytest.param({"servo_tau": 0.4}, "servo_lag", id="lag"),
+        pytest.param({"quadratic": 1.0}, "quadratic_damping", id="quadratic", marks=pytest.mark.slow),
+    ],
 )
 def test_what_is_hidden_is_named_alone_and_added_with_the_error_that_was_named(hidden, name):
     fitted, unseen = logs(HULL._replace(**hidden))
@@ -69,8 +73,10 @@ def test_a_filter_of_the_rate_and_a_moment_in_no_catalogue_hide_nothing_that_the
 
 @pytest.mark.parametrize(
     ("hidden", "name"),
-    [({"max_rate": 0.3}, "rate_limit"), ({"stall_angle": 0.12, "stall_slope": 0.5}, "stall")],
-    ids=["rate", "stall"],
+    [
+        pytest.param({"max_rate": 0.3}, "rate_limit", id="rate", marks=pytest.mark.slow),
+        pytest.param({"stall_angle": 0.12, "stall_slope": 0.5}, "stall", id="stall"),
+    ],
 )
 def test_the_trim_may_be_a_moment_of_its_own_beside_the_effect_that_is_named(hidden, name):
     """The plain model, which lacks the effect, prefers a trim that grows with the authority."""

@@ -31,8 +31,10 @@ def test_a_plain_hull_in_a_sea_is_disturbed_and_nothing_is_missing():
 
 @pytest.mark.parametrize(
     ("hidden", "name"),
-    [({"asymmetry": 0.3}, "asymmetric_fin"), ({"deadband_width": 0.12}, "deadband")],
-    ids=["asymmetric", "deadband"],
+    [
+        pytest.param({"asymmetry": 0.3}, "asymmetric_fin", id="asymmetric"),
+        pytest.param({"deadband_width": 0.12}, "deadband", id="deadband", marks=pytest.mark.slow),
+    ],
 )
 def test_what_is_hidden_is_named_though_the_sea_leaves_many_times_the_noise(hidden, name):
     fitted, unseen = logs(HULL._replace(**hidden))

@@ -53,8 +53,9 @@ def test_intervals_hold_the_truth_as_often_as_they_say(colour, flights, least):
     assert (np.sqrt((z**2).mean(axis=0)) > 0.6).all()
 
 
-@pytest.mark.parametrize("axis", ["yaw", "pitch"])
-@pytest.mark.parametrize("flights", [8, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("axis", "flights"), [("yaw", 8), *(pytest.param(axis, 40, marks=pytest.mark.slow) for axis in ("yaw", "pitch"))]
+)
 def test_a_disturbance_of_the_hull_does_not_bias_it(axis, flights):
     ended = [fed(OnlineIdentifier(axis), flown(axis, 2400, s, sea=(0.03, 3.0))).estimate() for s in range(flights)]
     z = np.array([far(now, axis) for now in ended])
