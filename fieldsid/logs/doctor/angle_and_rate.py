@@ -7,12 +7,13 @@ degrees taken for radians, and a time shift two different clocks. Where the two 
 from __future__ import annotations
 
 import math
-from collections.abc import Container
+from collections.abc import Container, Iterable
 
 import numpy as np
 from scipy.special import fdtri
 
 from fieldsid.errors import DataError
+from fieldsid.logs.convert.clock import GAP_FACTOR
 from fieldsid.logs.convert.faults.dropouts import MOST_CHANCE
 from fieldsid.logs.convert.faults.spikes import DIGITS, SPREADS, last_digit
 from fieldsid.logs.convert.heading_unwrap import ALIKE
@@ -41,10 +42,12 @@ FITS_BETTER = float(fdtri(FEWEST, FEWEST, 1.0 - MOST_CHANCE))
 DEGREES = 180.0 / math.pi
 RATES = {u.name: u.factor for u in UNITS.values() if u.dimension == "angle rate"}
 """Units of rates, in rad/s."""
+TIMES = {u.name: u.factor for u in UNITS.values() if u.dimension == "time"}
+"""Units of time, in s."""
 SUMMED = 10.0
 """Ratio of the distances of an angle from the trapezoidal integral of its rate and from its sum from which on it is the sum."""
 
-CONTRADICTING = frozenset({"rate_sign", "unit", "swapped", "unrelated"})
+CONTRADICTING = frozenset({"rate_sign", "unit", "swapped", "unrelated", "time_scale"})
 
 
 def angle_findings(run: Run, stated: Stated, faulty: Container[str]) -> list[Note]:
@@ -60,6 +63,8 @@ def angle_findings(run: Run, stated: Stated, faulty: Container[str]) -> list[Not
 
 
 def _angle_and_rate(run: Run, angle: str, rate: str, stated: Stated) -> list[Note]:
+    if in_time := _time_scale(run, angle, rate, stated):
+        return in_time
     in_degrees = _unwrapped_degrees(run, angle, rate, stated) if angle == "yaw_rad" else []
     changes = changes_of(run, angle, rate)
     if changes is None or in_degrees:
@@ -69,6 +74,24 @@ def _angle_and_rate(run: Run, angle: str, rate: str, stated: Stated) -> list[Not
     if trust < TRUSTED:
         return []
     return [*_slope_findings(angle, rate, slope, stated), *_lag_findings(angle, rate, a, b, step, stated)]
+
+
+def _time_scale(run: Run, angle: str, rate: str, stated: Stated) -> list[Note]:
+    """Return the finding that the times are in another unit: the units of angle and rate are stated, and agree only then."""
+    if stated.time is None or not {angle, rate} <= stated.units.keys():
+        return []
+    changes = changes_of(run, angle, rate) or _changes_as_logged(run, angle, rate)
+    slope, trust = (0.0, 0.0) if changes is None else slope_of(*changes[:2])
+    unit = unit_of_ratio(abs(slope) * TIMES[stated.time], TIMES) if trust >= TRUSTED else None
+    if unit is None or unit == stated.time:
+        return []
+    advice = f"the time is in {unit}, and not in {stated.time}: set its `unit: {unit}`"
+    is_open = ALIKE[0] < abs(slope) / DEGREES < ALIKE[1]  # a minute has nearly as many seconds as a radian has degrees
+    if is_open:
+        advice += f"; or {rate} is not in `{stated.units[rate]}`"
+    said = f"{angle} changes {abs(slope):.3g} times as fast as {rate} in `{stated.units[rate]}` says, correlation {trust:.2f}"
+    data = {"signal": rate, "signals": [angle, rate], "value": slope, "limit": 1.0}
+    return [Note("time_scale", f"{said}: {advice}", data | ({} if is_open else {"time_unit": unit}))]
 
 
 def agrees_with_rate(run: Run, angle: str, rate: str) -> bool:
@@ -186,11 +209,10 @@ def _jumps(run: Run, angle: str, rate: str) -> list[Note]:
 
     A rate that is wrong for a few samples stays within the noise of the angle in each step, so changes over a few steps are used.
     """
-    both = together(run, angle, rate)
+    both = _moving(run, angle, rate)
     if both is None:
         return []
-    time, turned, turning = both
-    swept = trapezoid_integral(time, turning)
+    time, turned, swept, turning = both
     fastest = FASTER * float(np.percentile(np.abs(turning), 90))
     found = [f for width in JUMP_WIDTHS if (f := _jumps_over(width, time, turned, swept, fastest)) is not None]
     if not found:
@@ -247,21 +269,51 @@ def changes_of(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray,
 
     Returns None where the log is too short, or where one of the two does not exceed its noise clearly.
     """
+    both = _moving(run, angle, rate)
+    if both is None:
+        return None
+    step = float(np.median(np.diff(both[0])))
+    return _changes_over(both, [max(1, round(window_s / step)) for window_s in (PAIR_WINDOW_S, LONG_WINDOW_S)], step)
+
+
+def _changes_as_logged(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray, float] | None:
+    """Return the same over the first window that exceeds the noise; windows count samples, and need no unit of time."""
+    both = _moving(run, angle, rate)
+    if both is None:
+        return None
+    return _changes_over(both, [1 << power for power in range(both[0].size.bit_length())], float(np.median(np.diff(both[0]))))
+
+
+def _changes_over(
+    both: tuple[FloatArray, FloatArray, FloatArray, FloatArray], widths: Iterable[int], step: float
+) -> tuple[FloatArray, FloatArray, float] | None:
+    time, turned, swept, turning = both
+    floor, noise = SURE * math.sqrt(2.0) * _noise(turned), _noise(turning)
+    for width in widths:
+        if time.size <= 3 * width:
+            return None
+        a, b = over(turned, width), over(swept, width)
+        if float(np.std(a)) > floor and float(np.std(b)) > SURE * noise * math.sqrt(width) * step:
+            return a, b, step
+    return None
+
+
+def _moving(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
+    """Return times (n,), an angle, the integral of its rate, and the rate; None where a run has too few samples of both.
+
+    How far either goes in a gap of the log is not known: neither changes there.
+    """
     both = together(run, angle, rate)
     if both is None:
         return None
     time, turned, turning = both
-    swept, step = trapezoid_integral(time, turning), float(np.median(np.diff(time)))
-    floor = SURE * math.sqrt(2.0) * _noise(turned)
-    noise = _noise(turning)
-    for window_s in (PAIR_WINDOW_S, LONG_WINDOW_S):
-        width = max(1, round(window_s / step))
-        if time.size <= 3 * width:
-            return None
-        a, b = over(turned, width), over(swept, width)
-        if float(np.std(a)) > floor and float(np.std(b)) > SURE * noise * math.sqrt(window_s * step):
-            return a, b, step
-    return None
+    steps = np.diff(time)
+    in_gap = steps > GAP_FACTOR * float(np.median(steps))
+    kept = [
+        np.concatenate([[v[0]], v[0] + np.cumsum(np.where(in_gap, 0.0, np.diff(v)))]) if in_gap.any() else v
+        for v in (turned, trapezoid_integral(time, turning))
+    ]
+    return time, kept[0], kept[1], turning
 
 
 def _noise(values: FloatArray) -> float:

@@ -6,19 +6,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from fieldsid.logs.channels import ChannelMap
-from fieldsid.logs.convert.units import factor_to
+from fieldsid.logs.channels import ChannelMap, Source
+from fieldsid.logs.convert.units import factor_to, find_unit
 from fieldsid.logs.reader import RawLog
 from fieldsid.logs.run import SIGNALS, signal_of
 
 
 @dataclass(frozen=True, slots=True)
 class Stated:
-    """Units by signal, the signals whose sign the mapping reverses, and those that use the stamps of receipt."""
+    """Units by signal, the signals whose sign the mapping reverses, those that use the stamps of receipt, and the unit of time.
+
+    The unit of time is None where the clock is that of a format, or its form has no unit.
+    """
 
     units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     turned: frozenset[str] = frozenset()
     received: frozenset[str] = frozenset()
+    time: str | None = None
 
     def is_si(self, signal: str) -> bool:
         """Return whether the numbers of a signal were read as SI: no unit was stated, or the SI unit."""
@@ -49,4 +53,13 @@ def stated_by(mapping: ChannelMap, raw: RawLog) -> Stated:
         MappingProxyType({signal_of(s): u for s, u in units.items() if signal_of(s) in SIGNALS}),
         frozenset(s for s, c in mapping.sources.items() if c.sign < 0),
         frozenset(signal_of(s) for s, c in mapping.sources.items() if (c.stamp or mapping.stamp) == "receive"),
+        _unit_of_time(mapping.time),
     )
+
+
+def _unit_of_time(time: Source | None) -> str | None:
+    """Return the unit of the numbers of a time in one column, seconds without one; None for a clock of another form."""
+    if time is None or time.column is None or time.date or time.week is not None or time.scale is not None:
+        return None
+    found = find_unit(time.unit or "s", "time")
+    return None if found is None or found.dimension != "time" else found.name

@@ -28,7 +28,7 @@ DOUBT_REASONS: Mapping[str, str] = MappingProxyType(
     | dict.fromkeys(CONTRADICTING - {"unit"}, "angle and rate contradict each other")
 )  # fmt: skip
 """The reason, in words, for the doubt about a signal, by the code of the note that names the signal."""
-TIME_DOUBTS = frozenset({"rate_guessed", "time_guessed", "time_unit"})
+TIME_DOUBTS = frozenset({"rate_guessed", "time_guessed", "time_unit", "time_scale"})
 """Codes of notes that put the time in doubt, and hence all signals."""
 
 

@@ -19,7 +19,7 @@ from fieldsid.errors import FieldsidError
 from fieldsid.logs.channels import POSITION, ChannelMap
 from fieldsid.logs.convert.units import DEGREE
 from fieldsid.logs.doctor.fin_findings import WIDEST
-from fieldsid.logs.mapping.canonical_names import words_of
+from fieldsid.logs.mapping.canonical_names import unit_in_name, words_of
 from fieldsid.logs.mapping.draft import place_of
 from fieldsid.logs.mapping.numbers.true_heading import GEOGRAPHIC
 from fieldsid.logs.mapping.numbers.unit_inference import (
@@ -29,6 +29,7 @@ from fieldsid.logs.mapping.numbers.unit_inference import (
     set_by_size,
     unit_of_wraps,
 )
+from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.run import FINS, RATE_OF, SIGNALS, Note, Run
 
@@ -87,10 +88,13 @@ def tried(log: Log, body: dict[str, Any], defined: frozenset[str]) -> Proposal:
     wraps = None if yaw is None else unit_of_wraps(yaw.values)
     in_doubt = by_size if wraps is None else by_size - {"yaw_rad"}
     why: list[Note] = []
-    for _ in range(len(CORRECTED) * len(signals) + 1):  # each reading but the last corrects a key at least
+    for _ in range(len(CORRECTED) * len(signals) + 2):  # each reading but the last corrects a key at least, or the time
         run, stated = log.run_of(body, raw), stated_by(mapping_of(body), raw)
-        notes = examine(run, stated=stated)
-        corrections = mended(body, run, notes, in_doubt)
+        notes = examine(run, stated=replace(stated, time=None) if by_size & {*RATE_OF.values()} else stated)
+        if retimed := _unit_of_time(log, body, notes):
+            raw, corrections = log.read(mapping_of(body)), retimed
+        else:
+            corrections = mended(body, run, notes, in_doubt)
         why += corrections
         if not corrections:
             break
@@ -101,6 +105,21 @@ def tried(log: Log, body: dict[str, Any], defined: frozenset[str]) -> Proposal:
     known = {*defined, *stated.units, *({"yaw_rad"} if wraps == "rad" else ())} - open_rates
     why += assumed_units(run, known, {s: (place_of(item), item.get("unit", SIGNALS.get(s, ""))) for s, item in signals.items()})
     return Proposal(body, replace(run, notes=(*run.notes, *notes)), notes=tuple(why))
+
+
+def _unit_of_time(log: Log, body: dict[str, Any], findings: Iterable[Note]) -> list[Note]:
+    """Set the unit that findings show for a time whose column states none; return the note on it, none where nothing was set."""
+    time = body.get("time", {})
+    names = {name: c for i, c in enumerate(log.inventory.channels) for name in (c.name, i)}
+    column = names.get(time.get("column", ""))
+    found = next((n for n in findings if "time_unit" in n.data), None)
+    if found is None or column is None or unit_in_name(column.name, TIME, column.unit) is not None:
+        return []
+    if time.get("unit", "s") == found.data["time_unit"]:
+        return []
+    time["unit"] = found.data["time_unit"]
+    seen = found.message.partition(": ")[0]
+    return [Note("evidence", f"time is taken with `unit: {time['unit']}`: {seen}", {"signal": TIME, "finding": found.code})]
 
 
 OTHER_ANGLES = (*FINS, "pitch_rad", "roll_rad")

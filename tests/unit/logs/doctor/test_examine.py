@@ -422,3 +422,13 @@ def test_a_vehicle_that_hovers_for_most_of_the_log_still_tells_the_frame_of_its_
     x, y = (np.cumsum(0.1 * speed * f(yaw)) + 0.15 * random.standard_normal(time.size) for f in (np.cos, np.sin))
     run = Run("hover", time, {"yaw_rad": 0.5 * np.pi - yaw if is_enu else yaw, "x_m": x, "y_m": y})
     assert ("course_against" in {n.code for n in examine(run)}) == is_enu
+
+
+@pytest.mark.parametrize("pause_s", [2.0, 1.7e9])
+def test_angle_and_rate_are_not_compared_over_gaps_of_the_log(pause_s):
+    """A clock that is set in the dive jumps by years: in that gap neither is known to change."""
+    run = healthy()
+    kept = (run.time % 15.0) < 13.0
+    time = run.time[kept] + (pause_s - 2.0) * np.floor(run.time[kept] / 15.0)
+    later = Run(run.name, time, {s: v[kept] for s, v in run.signals.items()})
+    assert not {n.code for n in examine(later)} & {"unrelated", "disagree", "swapped", "rate_scale"}

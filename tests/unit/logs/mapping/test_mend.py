@@ -99,3 +99,29 @@ def test_of_two_fins_that_move_alike_the_other_is_named(tmp_path):
     (why,) = (n.message for n in proposal.notes if n.data.get("signal") == "rudder_rad" and n.code == "evidence")
     assert {taken, 17 - taken} == {8, 9}
     assert f"column {17 - taken} moves as it does" in why
+
+
+@pytest.mark.parametrize(("unit", "of_a_second", "step"), [("ms", 1e3, 0.004), ("d", 1.0 / 86400.0, 0.05)])
+def test_a_time_of_no_stated_unit_has_the_one_in_which_heading_and_rate_agree(tmp_path, unit, of_a_second, step):
+    """A clock of 250 Hz in ms goes on by 4 a sample, as one in s may."""
+    rng, time = np.random.default_rng(2), step * np.arange(round(32.0 / step))
+    heading = 180.0 + 30.0 * np.sin(0.5 * time) + 0.2 * rng.normal(size=time.size)
+    rows = np.stack([time * of_a_second, heading, 15.0 * np.cos(0.5 * time), np.sign(np.sin(0.5 * time))], axis=1)
+    log = tmp_path / "log.csv"
+    np.savetxt(log, rows, "%.12g", ",", header="time,heading_deg,yaw_rate_deg_s,rudder_deg", comments="")
+    found = inspect_log(log)
+    assert any(f"`unit: {unit}`" in n.message for n in found.proposal.notes)
+    run = load_run(log, write_proposal(found, tmp_path / "m.yaml"))
+    np.testing.assert_allclose(run.time - run.time[0], time, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["time", "clock_s"])
+def test_minutes_may_be_radians_called_degrees(tmp_path, name):
+    """60 s a minute and 57.3 deg a rad are too near to tell which is meant: both are said, and nothing is set."""
+    time = 0.1 * np.arange(900)
+    rows = np.stack([time / 60.0, 180.0 + 30.0 * np.sin(0.5 * time), 15.0 * np.cos(0.5 * time), np.sign(np.sin(0.5 * time))], 1)
+    log = tmp_path / "log.csv"
+    np.savetxt(log, rows, "%.10g", ",", header=f"{name},heading_deg,yaw_rate_deg_s,rudder_deg", comments="")
+    said = {n.code: n.message for n in inspect_log(log).notes}
+    assert "in min, and not in s" in said["time_scale"]
+    assert "is not in `deg/s`" in said["time_scale"]
