@@ -220,7 +220,7 @@ def test_every_controller_is_stable_and_keeps_its_margin(kind, yaw, pitch):
 
 
 def test_integral_control_needs_no_feed_forward(yaw):
-    row = design_schedule(yaw, 0.26, wish=Wish(kind="pi")).rows[2]
+    (row,) = design_schedule(yaw, 0.26, speeds=[1.63], wish=Wish(kind="pi")).rows
     late = stepped(plants_at(yaw, 1.63, FinLimits(), 1, 0)[0][0], row, reference=0.0, seconds=120.0, offset=0.03)
     assert steady_error(late.angle, 0.0)[0] == pytest.approx(0.0, abs=2e-3)
 
@@ -377,7 +377,7 @@ def test_schedule_comes_back_from_its_file_and_is_clamped_outside(yaw, tmp_path)
 
 
 def test_a_schedule_without_rows_is_refused(yaw, tmp_path):
-    path = save_schedule(design_schedule(yaw, 0.26), tmp_path / "gains.yaml")
+    path = save_schedule(design_schedule(yaw, 0.26, speeds=[1.5]), tmp_path / "gains.yaml")
     path.write_text(path.read_text().split("rows:")[0] + "rows: []\nprovenance: {}\n")
     with pytest.raises(ArtifactError, match="not a complete schedule"):
         load_schedule(path)
@@ -452,7 +452,7 @@ def test_poles_of_all_draws_are_numpys_of_each():
 def test_the_autopilots_latency_comes_on_top_of_the_models_delay(yaw):
     late, own = (plants_at(yaw, 1.5, FinLimits(delay=0.2, latency=t), 1, 0)[0][0] for t in (0.15, None))
     assert (late.delay[0], own.delay[0]) == (pytest.approx(0.35), 0.2)
-    schedule = design_schedule(yaw, 0.26, limits=FinLimits(latency=0.15))
+    schedule = design_schedule(yaw, 0.26, speeds=[1.5], limits=FinLimits(latency=0.15))
     assert schedule.actuator["latency_s"] == schedule.stated["latency_s"] == 0.15
 
 
