@@ -137,9 +137,10 @@ def map_for(
         if (
             certain is not None
             and mapped is not None
-            and (not is_enough(mapped_signals) or mapped_signals < mapped.sources.keys())
+            and (not is_enough(mapped_signals) or _with_numbers(complete, found) < mapped.sources.keys())
         ):
             return mapped, list(certain.notes)
+        notes += [] if certain is None else certain.left_out_beside(mapped_signals)
         if complete is None:
             raise _no_mapping_error(path, reader, options, found, {} if certain is None else certain.doubts)
     if complete.origin is not None:
@@ -179,6 +180,13 @@ def to_map(log: Path, joined: Sequence[Path] = ()) -> str:
 def _is_in_log(mapping: ChannelMap, found: Inventory) -> bool:
     """Return whether a log contains every column and topic that a mapping names."""
     return _places_of(mapping) <= {c.name for c in found.channels}
+
+
+def _with_numbers(mapping: ChannelMap | None, found: Inventory) -> set[str]:
+    """Return the signals that a mapping names, without those whose columns are empty."""
+    empty = {c.name for c in found.channels if not c.count}
+    sources = {} if mapping is None else mapping.sources
+    return {s for s, source in sources.items() if not source.places or not {str(p) for p in source.places} <= empty}
 
 
 def _uses_every_column(mapping: ChannelMap | None, path: Path, reader: Reader) -> bool:

@@ -301,19 +301,20 @@ def _changes_over(
 def _moving(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
     """Return times (n,), an angle, the integral of its rate, and the rate; None where a run has too few samples of both.
 
-    How far either goes in a gap of the log is not known: neither changes there.
+    How far a vehicle turns in a gap of the log, or while its gyro stays at an end of its range, is not known: neither changes
+    there.
     """
     both = together(run, angle, rate)
     if both is None:
         return None
     time, turned, turning = both
     steps = np.diff(time)
-    in_gap = steps > GAP_FACTOR * float(np.median(steps))
-    kept = [
-        np.concatenate([[v[0]], v[0] + np.cumsum(np.where(in_gap, 0.0, np.diff(v)))]) if in_gap.any() else v
-        for v in (turned, trapezoid_integral(time, turning))
-    ]
-    return time, kept[0], kept[1], turning
+    at_end = (turning == turning.min()) | (turning == turning.max())
+    unknown = (steps > GAP_FACTOR * float(np.median(steps))) | (at_end[1:] & (turning[1:] == turning[:-1]))
+    swept = trapezoid_integral(time, turning)
+    if unknown.any():
+        turned, swept = (np.concatenate([[0.0], np.cumsum(np.where(unknown, 0.0, np.diff(v)))]) for v in (turned, swept))
+    return time, turned, swept, turning
 
 
 def _noise(values: FloatArray) -> float:

@@ -6,7 +6,7 @@ doubt is reported with the reason; it is left out where no axis needs it, else t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -28,17 +28,31 @@ DOUBT_REASONS: Mapping[str, str] = MappingProxyType(
     | dict.fromkeys(CONTRADICTING - {"unit"}, "angle and rate contradict each other")
 )  # fmt: skip
 """The reason, in words, for the doubt about a signal, by the code of the note that names the signal."""
+CONTRARY = CONTRADICTING | {"rate_scale"}
+"""Codes of notes that an angle and a rate are not of one motion as they are read."""
 TIME_DOUBTS = frozenset({"rate_guessed", "time_guessed", "time_unit", "time_scale"})
 """Codes of notes that put the time in doubt, and hence all signals."""
 
 
 @dataclass(frozen=True, slots=True)
 class Certain:
-    """A mapping that is used without confirmation, or None; its notes; and the reason for the doubt about each signal."""
+    """A mapping that is used without confirmation, or None; its notes; and the reason for the doubt about each signal.
+
+    `against` holds the findings that two proposed signals contradict each other, by the place of each signal.
+    """
 
     mapping: ChannelMap | None
     notes: tuple[Note, ...]
     doubts: Mapping[str, str]
+    against: tuple[tuple[Note, Mapping[str, str]], ...] = ()
+
+    def left_out_beside(self, read: Collection[str]) -> list[Note]:
+        """Return the notes on signals that are not read because they contradict one that is."""
+        pairs = [(n, places, s) for n, places in self.against if places.keys() & read for s in places if s not in read]
+        return [
+            Note("left_out", f"{s} from `{places[s]}` is not read, and contradicts what is: {n.message}", {"signal": s, **n.data})
+            for n, places, s in pairs
+        ]
 
 
 def certain_of(proposal: Proposal) -> Certain:
@@ -49,9 +63,13 @@ def certain_of(proposal: Proposal) -> Certain:
     notes = (*proposal.notes, *(() if proposal.run is None else proposal.run.notes))
     doubts = _doubts(signals, notes)
     sure = {s: item for s, item in signals.items() if s not in doubts}
+    against = tuple(
+        (n, {s: place_of(signals[s]) for s in n.data["signals"] if s in signals}) for n in notes if n.code in CONTRARY
+    )
     if proposal.run is None or not is_enough(sure) or any(n.code in TIME_DOUBTS for n in notes):
-        return Certain(None, (), MappingProxyType(doubts))
-    return Certain(mapping_of(proposal.body | {"signals": sure}), (_read_as_note(sure, doubts),), MappingProxyType(doubts))
+        return Certain(None, (), MappingProxyType(doubts), against)
+    mapping = mapping_of(proposal.body | {"signals": sure})
+    return Certain(mapping, (_read_as_note(sure, doubts),), MappingProxyType(doubts), against)
 
 
 def _doubts(signals: Mapping[str, Any], notes: Iterable[Note]) -> dict[str, str]:

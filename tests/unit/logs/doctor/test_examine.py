@@ -432,3 +432,9 @@ def test_angle_and_rate_are_not_compared_over_gaps_of_the_log(pause_s):
     time = run.time[kept] + (pause_s - 2.0) * np.floor(run.time[kept] / 15.0)
     later = Run(run.name, time, {s: v[kept] for s, v in run.signals.items()})
     assert not {n.code for n in examine(later)} & {"unrelated", "disagree", "swapped", "rate_scale"}
+
+
+def test_a_gyro_at_the_end_of_its_range_does_not_put_its_scale_in_doubt():
+    run = healthy()
+    clipped = changed(run, yaw_rate_rad_s=np.clip(run["yaw_rate_rad_s"], -0.2, 0.2))
+    assert "rate_scale" not in {n.code for n in examine(clipped)}
