@@ -14,7 +14,7 @@ from fieldsid.logs.mapping.numbers.true_heading import better_heading, lead_of
 from fieldsid.logs.mapping.trial import Log, Proposal, tried
 from fieldsid.logs.mapping.vocabulary import OVER_GROUND
 from fieldsid.logs.reader import Inventory, Reader, ReadOptions
-from fieldsid.logs.run import Note, Run
+from fieldsid.logs.run import MEASURED_FIN, Note, Run
 from fieldsid.logs.several.sifting import attempt
 from fieldsid.numerics.shifted_correlation import slope_of
 
@@ -35,6 +35,10 @@ def _tested(log: Log, draft: Draft) -> Proposal:
     signals = draft.body["signals"]
     while signals:
         done = attempt(lambda draft: _with_fins(log, _with_vehicle_heading(log, draft), draft), draft)
+        if isinstance(done, Proposal) and (still := _still_beside_command(done)):
+            signals = {s: item for s, item in done.body["signals"].items() if s not in still}
+            draft, left_out = replace(draft, body=done.body | {"signals": signals}), [*left_out, *still.values()]
+            continue
         if isinstance(done, Proposal):
             return done.saying(*left_out, *_over_ground(done))
         if done.signal not in signals or len(signals) < 2:
@@ -43,6 +47,19 @@ def _tested(log: Log, draft: Draft) -> Proposal:
         message = f"{done.signal} is not proposed from `{place_of(signals.pop(done.signal))}`: {done.what}"
         left_out.append(Note("left_out", message, {"signal": done.signal}))
     return Proposal(draft.body).saying(*draft.notes, *left_out)
+
+
+def _still_beside_command(done: Proposal) -> dict[str, Note]:
+    """Return the note on each measured fin that is constant while its command moves: a feedback that is not fitted, or stuck."""
+    run, said = done.run, "is constant while the command moves"
+    if run is None:
+        return {}
+    constant, lines = {n.data["signal"] for n in run.notes if n.code == "constant"}, done.body["signals"]
+    return {
+        fin: Note("left_out", f"{fin} is not proposed from `{place_of(lines[fin])}`: it {said}", {"signal": fin})
+        for command, fin in MEASURED_FIN.items()
+        if fin in constant and run.has(command) and command not in constant
+    }
 
 
 def _over_ground(done: Proposal) -> tuple[Note, ...]:

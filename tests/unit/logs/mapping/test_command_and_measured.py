@@ -54,3 +54,11 @@ def test_a_table_that_is_read_as_it_is_says_that_another_column_may_be_its_fin(t
     said = [n.message for n in run.notes if n.code == "alternatives"]
     assert bool(said) == is_said
     assert not said or f"`{other}`" in said[0]
+
+
+def test_a_feedback_that_never_moves_beside_its_command_is_not_proposed(tmp_path):
+    """It would be taken for the fin, and the run be refused as one without an excitation."""
+    angles = {"heading_deg": np.degrees(TRUTH["yaw_rad"]), "rudder_cmd_deg": FIN, "rudder_actual_deg": 0.0 * FIN}
+    found = inspect_log(write_table(tmp_path / "log.csv", {"time": TRUTH["time_s"], **angles}))
+    assert "rudder_measured_rad" not in found.proposal.body["signals"]
+    assert any("constant while the command moves" in n.message for n in found.proposal.notes)
