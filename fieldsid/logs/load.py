@@ -131,7 +131,8 @@ def map_for(
         from fieldsid.logs.mapping.propose import propose
 
         found = reader.inventory(path, options, TableForm())
-        certain = certain_of(propose(found, reader, options)) if may_join else None
+        proposal = propose(found, reader, options) if may_join else None
+        certain = None if proposal is None else certain_of(proposal)
         mapped = None if certain is None else certain.mapping
         # signals with canonical names are certain: where they suffice, proposed ones are added and replace none of them
         if (
@@ -141,6 +142,8 @@ def map_for(
         ):
             return mapped, list(certain.notes)
         notes += [] if certain is None else certain.left_out_beside(mapped_signals)
+        if complete is None and proposal is not None and proposal.problem is not None and is_enough(proposal.body["signals"]):
+            raise proposal.problem
         if complete is None:
             raise _no_mapping_error(path, reader, options, found, {} if certain is None else certain.doubts)
     if complete.origin is not None:

@@ -19,6 +19,7 @@ from fieldsid.logs.reader import SAMPLED, ReadOptions
 from fieldsid.logs.readers._cells import ERRORS, MISSING, SENTENCE, cells, has_number, is_word
 from fieldsid.logs.readers._columns import Columns, used_by
 from fieldsid.logs.readers._plain_text import HEAD, PlainText, plain_text
+from fieldsid.logs.readers._rows_of_several import refuse_rows_of_several
 from fieldsid.logs.readers._tables import Table, table_reader
 from fieldsid.logs.readers._text import LOOKED_AT, Form, form_of
 from fieldsid.logs.readers._unpacked import GZIP, LONGEST_ROW, refuse_endless
@@ -40,7 +41,10 @@ def table(path: Path, form: TableForm, options: ReadOptions, mapping: ChannelMap
     """Return the columns of a text table that a mapping names, or all, with its form; raises LogError where it is no table."""
     with opened(path, form, options) as text:
         written = text.form
-        columns = text.columns(range(written.width) if mapping is None else used_by(mapping, written.names, written.width))
+        used = range(written.width) if mapping is None else used_by(mapping, written.names, written.width)
+        if mapping is not None:
+            refuse_rows_of_several(path, written, text.text.head(), used)
+        columns = text.columns(used)
         sign: Literal[".", ","] = "," if written.decimal == "," else "."
         found = TableForm(written.separator, bool(written.names), written.start, form.encoding, sign)
         return Table(columns, found, tuple(text.notes))
