@@ -85,7 +85,7 @@ def _time_scale(run: Run, angle: str, rate: str, stated: Stated) -> list[Note]:
     unit = unit_of_ratio(abs(slope) * TIMES[stated.time], TIMES) if trust >= TRUSTED else None
     if unit is None or unit == stated.time:
         return []
-    advice = f"the time is in {unit}, and not in {stated.time}: set its `unit: {unit}`"
+    advice = f"the time is in {unit}, and not in {stated.time}: set `unit: {unit}` at time"
     is_open = ALIKE[0] < abs(slope) / DEGREES < ALIKE[1]  # a minute has nearly as many seconds as a radian has degrees
     if is_open:
         advice += f"; or {rate} is not in `{stated.units[rate]}`"

@@ -35,7 +35,7 @@ OF_ANOTHER = word_set(
     "wind ws air variation status mode enabled count id"
 )
 """Words that show that a name is not the signal it also contains, such as its error or its limit."""
-COMPASS = word_set("heading hdg compass")
+COMPASS = word_set("heading hdg hdt hdm compass")
 """Words of a heading that is counted clockwise from north, by its name."""
 OVER_GROUND = word_set("gps gnss course cog sog vtg ground track")
 """Words of a course or a speed over ground, from which heading and speed through water differ by current and sideslip; and of a
@@ -88,7 +88,7 @@ RULES = (
         "roll rate, gyro x, gyr x, gyroscope x, gx, omega x, wx, phidot, phi dot, roll dot, roll speed, roll velocity, "
         "angular velocity x, ang vel x",
     ),
-    Rule("yaw_rad", "yaw, heading, hdg, psi, compass", _TURN),
+    Rule("yaw_rad", "yaw, heading, hdg, hdt, hdm, psi, compass", _TURN),
     Rule("yaw_rad", "head", _TURN | word_set("water loss pump")),
     Rule("pitch_rad", "pitch, theta", _TURN, upto=STEEPEST_DEG),
     Rule("roll_rad", "roll, phi", _TURN, upto=STEEPEST_DEG),

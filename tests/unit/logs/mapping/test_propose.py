@@ -153,7 +153,14 @@ def test_names_that_hold_a_symbol_of_another_thing_name_no_signal(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "signal"), [("/auv/nav/state phi", "roll_rad"), ("est_psi_rad", "yaw_rad"), ("yaw (deg)", "yaw_rad")]
+    ("name", "signal"),
+    [
+        ("/auv/nav/state phi", "roll_rad"),
+        ("est_psi_rad", "yaw_rad"),
+        ("yaw (deg)", "yaw_rad"),
+        ("HDT", "yaw_rad"),
+        ("hdm_deg", "yaw_rad"),
+    ],
 )
 def test_symbols_and_units_still_name_theirs(name, signal):
     assert meaning_of(name)[0] == signal
