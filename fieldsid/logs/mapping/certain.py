@@ -64,7 +64,7 @@ def certain_of(proposal: Proposal) -> Certain:
     doubts = _doubts(signals, notes)
     sure = {s: item for s, item in signals.items() if s not in doubts}
     against = tuple(
-        (n, {s: place_of(signals[s]) for s in n.data["signals"] if s in signals}) for n in notes if n.code in CONTRARY
+        (n, {s: place_of(signals[s]) for s in n.data.get("signals", ()) if s in signals}) for n in notes if n.code in CONTRARY
     )
     if proposal.run is None or not is_enough(sure) or any(n.code in TIME_DOUBTS for n in notes):
         return Certain(None, (), MappingProxyType(doubts), against)

@@ -29,18 +29,17 @@ def refuse_rows_of_several(path: Path, form: Form, head: str, used: Iterable[int
     columns = list(zip(*(cells(line, form.separator) for line in lines), strict=True))
     numbers = {i: as_numbers(np.array(columns[i], dtype=object))[0] for i in used} if len(lines) > OF_ROWS else {}
     varying = {i: v for i, v in numbers.items() if OF_ROWS * np.unique(v[np.isfinite(v)]).size > v.size}
-    for place, tags in enumerate(columns):
-        found = next((i for i, v in varying.items() if i != place and _is_of_several(np.array(tags), v)), None)
+    for place, tags in enumerate(columns if varying else ()):
+        if not 1 < len(set(tags)) <= len(tags) / OF_ROWS or 2 * sum(map(str.__ne__, tags, tags[1:])) < len(tags):
+            continue
+        found = next((i for i, v in varying.items() if i != place and _goes_on_within(np.array(tags), v)), None)
         if found is not None:
             raise _refusal(path, form, lines, place, found)
 
 
-def _is_of_several(tags: np.ndarray[tuple[int], np.dtype[np.str_]], values: FloatArray) -> bool:
-    """Return whether tags (n,) name sources in turn, between whose values (n,) the steps are clearly larger than within each."""
-    sources = np.unique(tags)
-    if not 1 < sources.size <= tags.size / OF_ROWS or 2 * np.count_nonzero(tags[1:] != tags[:-1]) < tags.size:
-        return False
-    within = np.concatenate([np.abs(np.diff(values[tags == source])) for source in sources])
+def _goes_on_within(tags: np.ndarray[tuple[int], np.dtype[np.str_]], values: FloatArray) -> bool:
+    """Return whether the steps of values (n,) between rows are clearly larger than those within the rows of each tag (n,)."""
+    within = np.concatenate([np.abs(np.diff(values[tags == source])) for source in np.unique(tags)])
     between = np.abs(np.diff(values))
     if not (np.isfinite(within).any() and np.isfinite(between).any()):
         return False

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from fieldsid.logs.load import load_run, map_for
+from fieldsid.logs.mapping.certain import certain_of
+from fieldsid.logs.mapping.trial import Proposal
 from fieldsid.logs.reader import ReadOptions, reader_of
+from fieldsid.logs.run import Note
 
 HEADER = "time_s,pitch_rad,pitch_rate_rad_s,elevator_rad"
 
@@ -57,3 +60,8 @@ def test_a_heading_that_contradicts_the_rate_that_is_read_is_named(tmp_path):
 
 def test_an_empty_column_of_a_canonical_name_hides_no_heading_of_another(tmp_path):
     assert load_run(turning(tmp_path / "log.csv", pitch_deg="", surge_m_s="")).has("yaw_rad")
+
+
+def test_a_finding_on_one_signal_contradicts_no_other():
+    note = Note("unit", "rudder_rad reaches 3 rad", {"signal": "rudder_rad"})
+    assert certain_of(Proposal({"signals": {}}, notes=(note,))).left_out_beside({"rudder_rad"}) == []
