@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from faults.damages import DAMAGES, good_log
+from faults.damages import DAMAGES, good_log, is_told
 
 from fieldsid.artifacts import to_yaml
 from fieldsid.logs.run import EXPLAINING
@@ -60,10 +60,11 @@ def pasted(body, note):
 
 
 @pytest.mark.parametrize("damage", [d for d in DAMAGES if d.told_by], ids=lambda d: d.name)
-def test_what_a_finding_says_to_set_can_be_pasted_and_ends_it(run_cli, tmp_path, damage):
+def test_a_damage_is_told_and_what_its_finding_says_to_set_can_be_pasted_and_ends_it(run_cli, tmp_path, damage):
     log, body = written(tmp_path, damage)
     notes = imported(run_cli, tmp_path, log, body)
     codes = {n["code"] for n in notes}
+    assert is_told(damage, codes)
     for note in notes:
         ways = list(pasted(body, note))
         is_lost = note["code"] in ("unit", "speed_unit") and ("which one it is" in note["message"] or "time_unit" in codes)

@@ -13,8 +13,6 @@ from fieldsid.logs import Run, load_run, save_run
 from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.reader import reader_of
 
-ULOG = b"ULog\x01\x12\x35\x01" + bytes(8)
-
 
 def refused(path) -> LogError:
     with pytest.raises(LogError) as caught:
