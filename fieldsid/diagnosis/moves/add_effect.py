@@ -22,7 +22,6 @@ from fieldsid.fitting.initial.effect_screen import (
 )
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of, levenberg_marquardt
 from fieldsid.models.effect import Effect, with_variant
-from fieldsid.numerics.arrays import FloatArray
 from fieldsid.rounding import nine_digits
 
 T = TypeVar("T")
@@ -58,7 +57,8 @@ MIN_EVENT_SEPARATION_SHARE = 0.1
 class Addition:
     """A request to add one of some effects to a model: the `most` best of each screen, or all with all starts where that is None.
 
-    `flown`: the error of the free run is screened too, for a parent that may be far from the measurements.
+    `flown`: the error of the free run is screened too, for a parent that may be far from the measurements. The noise fitted to it
+    explains in part what the effect does, so that the whitened error hardly shows that.
     """
 
     parent: ScoredModel
@@ -224,7 +224,8 @@ def foremost(groups: Sequence[Sequence[SearchMove]], most: int) -> list[Sequence
 def is_redundant_start(move: SearchMove, known: LikelihoodFit) -> bool:
     """Return whether a fit of the same model has reached the predicted cost of a move, with its events at similar times."""
     fitted, cost = known.fitted, move.screened.predicted_cost
-    if fitted.problem.layout.names == move.screened.problem.layout.names and _starts_apart(move.screened, fitted.x):
+    layout, events = fitted.problem.layout, zip(fitted.problem.layout.parameters, move.screened.start, fitted.x, strict=True)
+    if layout.names == move.screened.problem.layout.names and any(s.is_event and starts_apart(a, b) for s, a, b in events):
         return False
     if move.by_output_error:
         return cost_of(fitted.problem, fitted.x, move.linearisation.noise) < (1.0 + MIN_OUTPUT_ERROR_COST_SHARE) * cost
@@ -232,10 +233,9 @@ def is_redundant_start(move: SearchMove, known: LikelihoodFit) -> bool:
     return gained > 0.5 * (move.linearisation.cost - cost) - MIN_LIKELIHOOD_GAIN
 
 
-def _starts_apart(screened: ScreenResult, x: FloatArray) -> bool:
-    """Return whether an event of a run starts so far from its time in x that the two would not converge to one."""
-    slots = screened.problem.layout.parameters
-    return any(abs(a - b) > MIN_EVENT_SEPARATION_SHARE for s, a, b in zip(slots, screened.start, x, strict=True) if s.is_event)
+def starts_apart(start: float, x: float) -> bool:
+    """Return whether an event of a run starts so far from its time x that the two would not converge to one."""
+    return abs(start - x) > MIN_EVENT_SEPARATION_SHARE
 
 
 def _output_error_linearisation(parent: ScoredModel) -> Linearisation:

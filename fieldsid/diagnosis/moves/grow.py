@@ -32,6 +32,7 @@ from fieldsid.diagnosis.moves.add_effect import (
 )
 from fieldsid.diagnosis.moves.archive import Archive, Names
 from fieldsid.diagnosis.moves.grounds import Grounds
+from fieldsid.diagnosis.moves.refit import with_events_of_parts
 from fieldsid.diagnosis.moves.variant_search import VariantRequest, try_variants
 from fieldsid.diagnosis.thresholds import (
     MAIN_EXPLAINED_SHARE,
@@ -68,7 +69,8 @@ class Growth:
         is_root = self.key == self.tried.known
         self.tried.expanded.add(self.key)
         most = None if self.forced else MAX_EFFECTS_AT_BASE if is_root else MAX_EFFECTS_LATER
-        groups = by_effects(screen_addition(Addition(self.parent, self.effects, most, flown=is_root), self.grounds.parallel))
+        flown = is_root or worst_error(self.parent, self.grounds.floor) > SUFFICIENT_ERROR_RATIO
+        groups = by_effects(screen_addition(Addition(self.parent, self.effects, most, flown=flown), self.grounds.parallel))
         if self.forced:
             self.evaluate(groups)
         else:
@@ -105,6 +107,7 @@ class Growth:
                     continue
                 fits.append(self._fitted(move, rival))
                 found = self.grounds.better(found, fits[-1])
+            found = found and with_events_of_parts(found, group[0].screened.effect.name, self.tried, self.grounds)
             return found and found.evaluate_errors()
 
         for group, found in zip(groups, self.grounds.parallel.map(evaluate_all, groups), strict=True):

@@ -17,7 +17,7 @@ from fieldsid.diagnosis.moves.add_effect import Addition, mechanisms, screen_add
 from fieldsid.diagnosis.moves.archive import Archive
 from fieldsid.diagnosis.moves.drop_effect import drop_each
 from fieldsid.diagnosis.moves.grow import Growth
-from fieldsid.diagnosis.moves.refit import refit_from_parts
+from fieldsid.diagnosis.moves.refit import refit_from_parts, with_events_of_parts
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.search.accepted_sets import core_of
 from fieldsid.diagnosis.search.search import MAX_CANDIDATES, Search
@@ -168,6 +168,38 @@ def test_a_model_that_is_less_likely_than_a_part_of_it_is_fitted_again_from_ther
     assert found.log_likelihood > lag.log_likelihood - 0.5
     assert found.model.values["lag"] == pytest.approx(lag.model.values["lag"], rel=0.05)
     assert not refit_from_parts([found], made.tried, made.grounds)
+
+
+def _with_a_step(run, share, moment=0.08):
+    """A run with the answer of its hull, of linear damping, to a moment (rad/s^2) from a share of the run on."""
+    damping = 1.1 * float(np.mean(run.signals["surge_m_s"])) / hidden_lag.REFERENCE
+    since = np.maximum(run.time - run.time[0] - share * (run.time[-1] - run.time[0]), 0.0)
+    rate = moment / damping * (1.0 - np.exp(-damping * since))
+    angle = moment / damping * since - rate / damping
+    moved = {"yaw_rad": run.signals["yaw_rad"] + angle, "yaw_rate_rad_s": run.signals["yaw_rate_rad_s"] + rate}
+    return replace(run, signals={**run.signals, **moved})
+
+
+def test_an_event_at_a_wrong_time_is_fitted_again_at_the_time_that_a_part_has_found():
+    training, unseen = hidden_lag.runs()
+    stepped = [_with_a_step(run, share) for run, share in zip(training, (0.4, 0.65), strict=True)]
+    records = [tuple(record_of(r, Axis.YAW) for r in runs) for runs in (stepped, [_with_a_step(unseen, 0.5)])]
+    made = Search(*records, Axis.YAW, [YAW["servo_lag"], YAW["step_change"]])
+    Growth(made.base(), made.catalogue, made.tried, made.grounds, lambda: False, forced=True).grow()
+    lag, step = made.tried[LAG], made.tried[frozenset({"step_change"})]
+    of_step = step.likelihood_fit.fitted
+    assert [of_step.x[of_step.problem.layout.nuisances_of(run)[-1]] for run in (0, 1)] == pytest.approx([0.4, 0.65], abs=0.1)
+    problem = of_step.problem.with_effects([*lag.effects, *step.effects])
+    begin = carry_parameters(problem.layout, of_step.vector, lag.likelihood_fit.fitted.vector)
+    events = np.array([s.is_event for s in problem.layout.parameters])
+    begin[events] = (0.0, 0.65)
+    missed = score_model(made.grounds.fit(problem, begin, step.likelihood_fit.noise), made.validation)
+    assert missed.likelihood_fit.fitted.x[events][0] < 0.2
+    found = with_events_of_parts(missed, "step_change", made.tried, made.grounds)
+    assert found.log_evidence > missed.log_evidence + 10.0
+    assert found.likelihood_fit.fitted.x[events] == pytest.approx([0.4, 0.65], abs=0.02)
+    assert with_events_of_parts(found, "step_change", made.tried, made.grounds) is found
+    assert with_events_of_parts(lag, "servo_lag", made.tried, made.grounds) is lag
 
 
 def test_a_model_is_fitted_again_in_the_variants_of_the_part_that_is_likelier():
