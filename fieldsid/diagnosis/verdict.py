@@ -60,7 +60,7 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     such an effect may exist without being the missing one. No effect is named either where those found do not stand.
     """
     floor = reported_noise_floor(search.floor, ml_fit.noise)
-    was, now = compared_errors(search.base(), found, floor)
+    was, now = compared_errors(search.base(), found)
     error, share = compared_error(search.base(), found, floor), compared_share(search.base(), found, floor)
     if frozenset(found.names) == search.root:
         if worst_error(found, floor) <= SUFFICIENT_ERROR_RATIO:

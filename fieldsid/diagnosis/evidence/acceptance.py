@@ -44,7 +44,7 @@ def lowers_error(
     without it has more than `least` times the floor. A validation error at which a model is sufficient is no argument against the
     effect: the run is too mild to show it. The validation error is that of `compared_errors`.
     """
-    before, now = compared_errors(without, with_, floor)
+    before, now = compared_errors(without, with_)
     was, left = fitted_errors(without, with_)
     unseen, fitted = now.mean / before.mean, left.mean / was.mean
     lowers = min(unseen, fitted) < MAX_ERROR_RATIO and unseen * fitted < 1.0
@@ -54,26 +54,20 @@ def lowers_error(
     return believed and (mild or _does_not_raise(before, now)) and (lowers or explains)
 
 
-def compared_errors(without: ScoredModel, with_: ScoredModel, floor: Noise | None = None) -> tuple[Errors, Errors]:
+def compared_errors(without: ScoredModel, with_: ScoredModel) -> tuple[Errors, Errors]:
     """Return the validation errors by which two models are compared.
 
-    They are the errors at the training runs' parameters. Where the validation runs are likelier with the addition, they may also
-    be the errors at the parameters estimated from all runs, if the addition lowers these more: training runs may leave a
-    parameter undetermined that one validation run determines, such as the deviation of a compass on headings that were not flown.
-    Given a noise floor, this holds only where the training runs, or the validation runs at those parameters, have a visible error
-    without the addition. The constant moments that differ from run to run have in both models the standard deviation that the
-    model with more evidence estimates, because an effect that one model lacks is not a trim that differs from run to run.
+    Each model is compared by the lower of its errors at the training runs' parameters and at those estimated from all runs.
+    Training runs may leave a parameter undetermined that one validation run determines, such as the deviation of a compass on
+    headings that were not flown. Where the validation runs are no likelier with the addition, the errors are those at the
+    training runs' parameters. The constant moments that differ from run to run have in both models the standard deviation that
+    the model with more evidence estimates, because an effect that one model lacks is not a trim that differs from run to run.
     """
     std = common_own_moment(without, with_)
-    first, *settled = zip(without.unseen_under(std), with_.unseen_under(std), strict=True)
+    before, now = without.unseen_under(std), with_.unseen_under(std)
     if float(with_.validation_log_density.sum()) <= float(without.validation_log_density.sum()):
-        return first
-    train = without.train_under(std)
-
-    def is_visible(before: Errors) -> bool:
-        return floor is None or any(errors.over(floor) > SUFFICIENT_ERROR_RATIO for errors in (before, train))
-
-    return min((first, *(pair for pair in settled if is_visible(pair[0]))), key=lambda pair: pair[1].mean / pair[0].mean)
+        return before[0], now[0]
+    return min(before, key=lambda errors: errors.mean), min(now, key=lambda errors: errors.mean)
 
 
 def fitted_errors(without: ScoredModel, with_: ScoredModel) -> tuple[Errors, Errors]:
@@ -151,16 +145,13 @@ def worst_error(h: ScoredModel, floor: Noise) -> float:
 
 
 def compared_error(base: ScoredModel, h: ScoredModel, floor: Noise) -> float:
-    """Return the larger error over a noise floor on unseen and on fitted runs, as in the comparison of a model with the base.
-
-    A model may follow the unseen runs at the fitted runs' parameters by chance, but not at the parameters of all runs.
-    """
-    return max(compared_errors(base, h, floor)[1].over(floor), fitted_errors(base, h)[1].over(floor))
+    """Return the larger error over a noise floor on unseen and on fitted runs, as in the comparison of a model with the base."""
+    return max(compared_errors(base, h)[1].over(floor), fitted_errors(base, h)[1].over(floor))
 
 
 def compared_share(base: ScoredModel, h: ScoredModel, floor: Noise) -> float:
     """Return the share (0..1) of the base's excess squared error that a model explains, with the errors of `compared_error`."""
-    pairs = compared_errors(base, h, floor), fitted_errors(base, h)
+    pairs = compared_errors(base, h), fitted_errors(base, h)
     return excess_share([was for was, _ in pairs], [left for _, left in pairs], floor)
 
 

@@ -29,7 +29,7 @@ from fieldsid.numerics.tail_probabilities import chi_square_tail, f_tail, pearso
 ENERGY_WINDOW_S = 2.0
 HISTORY_SPAN_S = 3.0
 BREUSCH_PAGAN_BLOCK_S, MIN_BLOCKS = 1.0, 20
-HOMOSCEDASTICITY_BLOCK_S, BLOCKS_PER_WINDOW = 0.5, 8
+BLOCK_S, BLOCKS_PER_WINDOW = 0.5, 8
 """Length of a block of slow innovations, in s, and the number of blocks in a window whose energy is tested."""
 
 
@@ -106,13 +106,13 @@ def _colour(runs: Sequence[Innovations]) -> float:
 def _features(run: Innovations, width: int) -> dict[str, FloatArray]:
     """Return block means of the signals that a missing effect could depend on, by name."""
     fin, rate = run.record.fin - run.record.fin.mean(), run.rate
-    lags = max(1, round(HISTORY_SPAN_S / ENERGY_WINDOW_S * 4))
+    lags = max(1, round(HISTORY_SPAN_S / BLOCK_S))
     parts: dict[str, FloatArray] = {"rate x |rate|": rate * np.abs(rate), "rate cubed": rate**3, "fin x rate": fin * rate}
     parts |= {"rate": rate, "fin x |fin|": fin * np.abs(fin), "fin squared": fin**2, "rate squared": rate**2}
     blocks = {name: block_means(v, width) for name, v in parts.items()}
     mean = block_means(fin, width)
     for lag in range(lags):
-        blocks[f"fin {lag} blocks before"] = np.concatenate([np.zeros(lag), mean[: mean.size - lag]])
+        blocks[f"fin {lag * BLOCK_S:g} s before" if lag else "fin"] = np.concatenate([np.zeros(lag), mean[: mean.size - lag]])
     return blocks
 
 
@@ -148,7 +148,7 @@ def _regression(
     """Return the p-value of an F test of slow innovations against features of all runs together, and the best feature."""
     target, columns, names = [], [], list[str]()
     for run in runs:
-        slow, width = _slow(run, ENERGY_WINDOW_S / 4)
+        slow, width = _slow(run, BLOCK_S)
         features = features_of(run, width)
         names = list(features)
         target.append(slow)
@@ -233,7 +233,7 @@ def _homoscedasticity(runs: Sequence[Innovations]) -> float:
     Of w blocks with variance one the mean square X has the cumulants (r-1)! (2/w)^(r-1); the sum of (X - 1)^2 over windows is
     tested by its first three moments (Pearson's type III).
     """
-    squared = [block_means(_slow(run, HOMOSCEDASTICITY_BLOCK_S)[0] ** 2, BLOCKS_PER_WINDOW) for run in runs]
+    squared = [block_means(_slow(run, BLOCK_S)[0] ** 2, BLOCKS_PER_WINDOW) for run in runs]
     y = np.concatenate([(x / x.mean() - 1.0) ** 2 for x in squared if x.size > 1 and x.mean() > 0.0] or [np.zeros(0)])
     if y.size < MIN_BLOCKS:
         return 1.0
