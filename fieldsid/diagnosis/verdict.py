@@ -13,7 +13,6 @@ from fieldsid.diagnosis.evidence.acceptance import (
     compared_errors,
     compared_share,
     excess_share,
-    settles_error,
     validation_error_ratio,
     worst_error,
 )
@@ -145,20 +144,14 @@ def added_effects(search: Search, h: ScoredModel) -> tuple[str, ...]:
 
 
 def rivals_of(search: Search, found: ScoredModel) -> tuple[ScoredModel, ...]:
-    """Return the rivals of the final model by evidence: models of its size, or larger ones that end a visible error.
+    """Return the rivals of the final model by evidence: models of its size.
 
     Their free runs may differ where the training runs leave a parameter undetermined, which the evidence takes into account.
     """
     margin, sums = RIVAL_LOG_ODDS if len(search.records) > 1 else 2.0 * RIVAL_LOG_ODDS, search.evidences()
     best = sums[frozenset(found.names)]
-
-    def is_rival(h: ScoredModel) -> bool:
-        if len(h.names) > len(found.names):
-            return set(found.names) < set(h.names) and settles_error(found, h, search.floor)
-        return len(h.names) == len(found.names)
-
     near = (h for h in search.ranked() if best - sums.get(frozenset(h.names), -np.inf) < margin)
-    return tuple(h for h in near if h is not found and is_rival(h))
+    return tuple(h for h in near if h is not found and len(h.names) == len(found.names))
 
 
 def excess_explained(search: Search, h: ScoredModel, floor: Noise | None = None) -> float:

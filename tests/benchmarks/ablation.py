@@ -37,7 +37,6 @@ STAGES = {
     "variants": [(f"{SEARCH}.search", "try_variants", lambda *_of: False), (f"{MOVES}.grow", "try_variants", lambda *_of: False)],
     "laws": [(f"{SEARCH}.search", "under_other_law", lambda *_of: None)],
     "free_run": [(f"{MOVES}.grounds", "Grounds.fit_from_the_free_run", lambda _grounds, h: h.likelihood_fit)],
-    "refit": [(f"{SEARCH}.search", "refit_from_parts", lambda *_of: False)],
     "drop": [(f"{SEARCH}.search", "drop_each", lambda *_of: False)],
 }
 """By stage: the module, the name and what stands in its place."""

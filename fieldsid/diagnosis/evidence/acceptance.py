@@ -19,7 +19,6 @@ from fieldsid.diagnosis.thresholds import (
     MAIN_EXPLAINED_SHARE,
     MAX_ERROR_RATIO,
     MIN_TRAINING_GAIN,
-    RIVAL_LOG_ODDS,
     SUFFICIENT_ERROR_RATIO,
 )
 from fieldsid.models.model import Noise
@@ -59,15 +58,13 @@ def compared_errors(without: ScoredModel, with_: ScoredModel) -> tuple[Errors, E
 
     Each model is compared by the lower of its errors at the training runs' parameters and at those estimated from all runs.
     Training runs may leave a parameter undetermined that one validation run determines, such as the deviation of a compass on
-    headings that were not flown. Where the validation runs are no likelier with the addition, the errors are those at the
-    training runs' parameters. The constant moments that differ from run to run have in both models the standard deviation that
-    the model with more evidence estimates, because an effect that one model lacks is not a trim that differs from run to run.
+    headings that were not flown. The constant moments that differ from run to run have in both models the standard deviation
+    that the model with more evidence estimates, because an effect that one model lacks is not a trim that differs from run to
+    run.
     """
     std = common_own_moment(without, with_)
-    before, now = without.unseen_under(std), with_.unseen_under(std)
-    if float(with_.validation_log_density.sum()) <= float(without.validation_log_density.sum()):
-        return before[0], now[0]
-    return min(before, key=lambda errors: errors.mean), min(now, key=lambda errors: errors.mean)
+    before, now = (min(h.unseen_under(std), key=lambda errors: errors.mean) for h in (without, with_))
+    return before, now
 
 
 def fitted_errors(without: ScoredModel, with_: ScoredModel) -> tuple[Errors, Errors]:
@@ -171,18 +168,6 @@ def _adds_run_parameters(without: ScoredModel, with_: ScoredModel) -> bool:
     """Whether an addition has parameters for each run: a nuisance coefficient or the start of a hidden state."""
     known = {e.name for e in without.effects}
     return any(e.nuisance or e.extra_states for e in with_.effects if e.name not in known)
-
-
-def settles_error(without: ScoredModel, with_: ScoredModel, floor: Noise) -> bool:
-    """Whether an addition that is a rival by log evidence reduces the error on all runs to the noise.
-
-    In the likelihood a slow disturbance can stand for a drift or a current at almost no cost, so that the evidence cannot
-    separate the two; the model whose free run follows all runs to the noise is then preferred. Effects with parameters for each
-    run can follow any run, and are excluded.
-    """
-    if with_.log_evidence <= without.log_evidence - RIVAL_LOG_ODDS or _adds_run_parameters(without, with_):
-        return False
-    return worst_error(with_, floor) <= SUFFICIENT_ERROR_RATIO < worst_error(without, floor)
 
 
 def gains_any_evidence(without: ScoredModel, with_: ScoredModel) -> bool:

@@ -7,7 +7,6 @@ import numpy as np
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.moves.archive import Archive
 from fieldsid.diagnosis.moves.grounds import Grounds
-from fieldsid.diagnosis.moves.refit import refit_from_parts
 from fieldsid.fitting.initial.effect_screen import carry_parameters
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
 from fieldsid.models.effect import Effect
@@ -17,7 +16,7 @@ def drop_each(h: ScoredModel, tried: Archive, grounds: Grounds) -> bool:
     """Fit a model without each of its effects, unless that was done; return whether any model was fitted.
 
     An effect added later may have made an earlier one superfluous. A smaller set may so far have been tried only in other
-    variants, or its fit may have ended at a worse optimum than the one reached from the larger model or from a subset.
+    variants, or its fit may have ended at a worse optimum than the one reached from the larger model.
     """
     if len(h.names) <= len(tried.known) + 1 or tried.is_thinned(h):
         return False
@@ -25,7 +24,6 @@ def drop_each(h: ScoredModel, tried: Archive, grounds: Grounds) -> bool:
     effects = [e for e in h.effects if e.name not in tried.known]
     less = grounds.parallel.map(lambda removed: _without(h, removed, tried, grounds), effects)
     tried.update({frozenset(w.names): w for w in less})
-    refit_from_parts(less, tried, grounds)
     return True
 
 

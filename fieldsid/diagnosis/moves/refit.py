@@ -1,36 +1,12 @@
-"""Refits of a set of effects from its subsets: at least as likely as any with one effect fewer, and with events at its times."""
+"""Refit of a set of effects with events at the times that its subsets have found."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, LikelihoodFit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.moves.add_effect import starts_apart
 from fieldsid.diagnosis.moves.archive import Archive
 from fieldsid.diagnosis.moves.grounds import Grounds
 from fieldsid.fitting.initial.effect_screen import carry_parameters
-
-
-def refit_from_parts(models: Sequence[ScoredModel], tried: Archive, grounds: Grounds) -> bool:
-    """Fit each model that is less likely than a subset of it again, from that subset; return whether any model improved.
-
-    The fit of the subset is newer, from other variants or another law, and shows an optimum that the model has missed.
-    """
-    missed = list[tuple[ScoredModel, ScoredModel]]()
-    for h in models:
-        subset = max((w for _, w in tried.without_each(h)), key=lambda w: w.log_likelihood, default=h)
-        if subset.log_likelihood > h.log_likelihood + MIN_LIKELIHOOD_GAIN:
-            missed.append((h, subset))
-
-    def refitted(pair: tuple[ScoredModel, ScoredModel]) -> ScoredModel:
-        h, subset = pair
-        found = grounds.better(h, _fit_from_subset(h, subset, grounds))
-        return found.evaluate_errors() if found.log_evidence > h.log_evidence + MIN_LIKELIHOOD_GAIN else h
-
-    found = grounds.parallel.map(refitted, missed)
-    tried.update({frozenset(h.names): h for h in found})
-    return any(h.log_evidence > before.log_evidence for h, (before, _) in zip(found, missed, strict=True))
 
 
 def with_events_of_parts(h: ScoredModel, effect: str, tried: Archive, grounds: Grounds) -> ScoredModel:
@@ -48,11 +24,3 @@ def with_events_of_parts(h: ScoredModel, effect: str, tried: Archive, grounds: G
                 start[place] = times[place]
                 h = grounds.better(h, grounds.fit(fitted.problem, start, h.likelihood_fit.noise))
     return h
-
-
-def _fit_from_subset(h: ScoredModel, subset: ScoredModel, grounds: Grounds) -> LikelihoodFit:
-    """Fit a model from a subset of it, in the variants and under the law of the subset; other parameters start at the model's."""
-    of_model, of_subset = h.likelihood_fit.fitted, subset.likelihood_fit.fitted
-    subset_effects = {e.name: e for e in subset.effects}
-    problem = of_subset.problem.with_effects([subset_effects.get(e.name, e) for e in h.effects])
-    return grounds.fit(problem, carry_parameters(problem.layout, of_subset.vector, of_model.vector), subset.likelihood_fit.noise)

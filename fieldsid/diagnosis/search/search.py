@@ -33,7 +33,6 @@ from fieldsid.diagnosis.moves.archive import Archive, Names
 from fieldsid.diagnosis.moves.drop_effect import drop_each
 from fieldsid.diagnosis.moves.grounds import Grounds
 from fieldsid.diagnosis.moves.grow import Growth
-from fieldsid.diagnosis.moves.refit import refit_from_parts
 from fieldsid.diagnosis.moves.speed_law_search import (
     error_product,
     fit_base_output_error,
@@ -129,12 +128,7 @@ class Search:
         """Refine the set found, and fit it without each of its effects; return whether any model was fitted or became better."""
         if self.refined(found) is not found:
             return True
-        return drop_each(found, self.tried, self.grounds) or self._refit_leading()
-
-    def _refit_leading(self) -> bool:
-        """Fit the models of the report again from any subset that is likelier; return whether one improved."""
-        leading = [self.best_admissible(), *self.tried.ranked()[:MAX_CANDIDATES]]
-        return refit_from_parts(list({frozenset(h.names): h for h in leading}.values()), self.tried, self.grounds)
+        return drop_each(found, self.tried, self.grounds)
 
     def expand(self, h: ScoredModel) -> None:
         """Add each effect to a model; fit the most evident one without each of its effects, in other variants and laws."""

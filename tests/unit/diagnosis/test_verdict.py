@@ -24,12 +24,9 @@ def errors(ratio, runs=1):
 
 def judged(
     monkeypatch, before, after, p, *,
-    noiseless=False, settled=None, named=("servo_lag",), fitted=None, runs=1, gain=50.0, likelier=0.0,
+    noiseless=False, settled=None, named=("servo_lag",), fitted=None, runs=1, gain=50.0,
 ):  # fmt: skip
-    """The word for errors over the floor before and after on one unseen run; `fitted` are those on `runs` training runs.
-
-    `likelier`: by how much the unseen run is with what is named.
-    """
+    """The word for errors over the floor before and after on one unseen run; `fitted` are those on `runs` training runs."""
     monkeypatch.setattr(verdict, "reported_noise_floor", lambda *_of: FLOOR)
     monkeypatch.setattr(verdict, "rivals_of", lambda *_of: ())
     monkeypatch.setattr(verdict, "added_effects", lambda *_of: named)
@@ -40,7 +37,6 @@ def judged(
         train_under=lambda _std: errors((fitted or (before, after))[0], runs),
         own_moment=0.0,
         log_evidence=0.0,
-        validation_log_density=np.zeros(1),
         unseen_under=lambda _std: (errors(before), errors(before)),
     )
     found = SimpleNamespace(
@@ -53,7 +49,6 @@ def judged(
         validation_errors=errors(after),
         own_moment=0.0,
         log_evidence=gain,
-        validation_log_density=np.full(1, likelier),
         unseen_under=lambda _std: (errors(after), errors(settled or after)),
     )
     sums = {frozenset(): 0.0, frozenset(named): gain}
@@ -78,11 +73,9 @@ def test_without_noise_no_floor_says_what_is_large(monkeypatch):
     assert judged(monkeypatch, 3.5, 3.3, 0.6, noiseless=True) == "effect"
 
 
-@pytest.mark.parametrize(
-    ("settled", "likelier", "word"), [(1.1, 20.0, "effect"), (12.0, 20.0, "unexplained"), (1.1, -20.0, "unexplained")]
-)
-def test_an_error_that_the_fitted_runs_leave_open_counts_with_the_numbers_of_all_runs(monkeypatch, settled, likelier, word):
-    found = judged(monkeypatch, 7.0, 12.8, 1e-9, settled=settled, fitted=(1.0, 1.0), likelier=likelier)
+@pytest.mark.parametrize(("settled", "word"), [(1.1, "effect"), (12.0, "unexplained")])
+def test_an_error_that_the_fitted_runs_leave_open_counts_with_the_numbers_of_all_runs(monkeypatch, settled, word):
+    found = judged(monkeypatch, 7.0, 12.8, 1e-9, settled=settled, fitted=(1.0, 1.0))
     assert found == word
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import combinations, pairwise
-from types import SimpleNamespace
 
 import hidden_lag
 import numpy as np
@@ -14,12 +13,9 @@ from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN
 from fieldsid.diagnosis.evidence.scored_model import score_model
 from fieldsid.diagnosis.moves.add_effect import Addition, mechanisms, screen_addition
-from fieldsid.diagnosis.moves.archive import Archive
 from fieldsid.diagnosis.moves.drop_effect import drop_each
 from fieldsid.diagnosis.moves.grow import Growth
-from fieldsid.diagnosis.moves.refit import refit_from_parts, with_events_of_parts
-from fieldsid.diagnosis.records import Errors
-from fieldsid.diagnosis.search.accepted_sets import core_of
+from fieldsid.diagnosis.moves.refit import with_events_of_parts
 from fieldsid.diagnosis.search.search import MAX_CANDIDATES, Search
 from fieldsid.diagnosis.search.whole_hull import ADDED, whole_hull
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, EVIDENCE_TEMPERATURE
@@ -27,8 +23,6 @@ from fieldsid.effects import all_effects
 from fieldsid.fitting.initial.effect_screen import carry_parameters
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import with_variant
-from fieldsid.models.model import Noise
 from fieldsid.models.record import record_of
 
 LAG = frozenset({"servo_lag"})
@@ -154,24 +148,6 @@ def test_the_same_optimum_is_not_scored_again(base):
     assert base.grounds.better(known, known.likelihood_fit) is known
 
 
-def test_a_model_that_is_less_likely_than_a_part_of_it_is_fitted_again_from_there():
-    made, _, (lag, bias) = grown("servo_lag", "gyro_bias")
-    problem = lag.likelihood_fit.fitted.problem.with_effects([*lag.effects, *bias.effects])
-    both = frozenset(["servo_lag", "gyro_bias"])
-    # an end at which nothing lags, as if its optimum had been missed
-    far = carry_parameters(problem.layout, bias.likelihood_fit.fitted.vector, otherwise={"lag": 0.0})
-    missed = replace(lag.likelihood_fit, fitted=replace(lag.likelihood_fit.fitted, problem=problem, x=far))
-    at_the_bias = bias.likelihood_fit
-    missed = replace(missed, noise=at_the_bias.noise, log_likelihood=at_the_bias.log_likelihood)
-    made.tried[both] = score_model(missed, made.validation)
-    assert made.tried[both].log_likelihood < lag.log_likelihood - 10.0
-    assert refit_from_parts([made.tried[both]], made.tried, made.grounds)
-    found = made.tried[both]
-    assert found.log_likelihood > lag.log_likelihood - 0.5
-    assert found.model.values["lag"] == pytest.approx(lag.model.values["lag"], rel=0.05)
-    assert not refit_from_parts([found], made.tried, made.grounds)
-
-
 def _with_a_step(run, share, moment=0.08):
     """A run with the answer of its hull, of linear damping, to a moment (rad/s^2) from a share of the run on."""
     damping = 1.1 * float(np.mean(run.signals["surge_m_s"])) / hidden_lag.REFERENCE
@@ -204,22 +180,6 @@ def test_an_event_at_a_wrong_time_is_fitted_again_at_the_time_that_a_part_has_fo
     assert with_events_of_parts(lag, "servo_lag", made.tried, made.grounds) is lag
 
 
-def test_a_model_is_fitted_again_in_the_variants_of_the_part_that_is_likelier():
-    made, _, (lag, bias) = grown("servo_lag", "gyro_bias")
-    swung = with_variant(lag.effects[0], next(v for v in lag.effects[0].variants if not v.without))
-    fitted = lag.likelihood_fit.fitted
-    problem = fitted.problem.with_effects([swung])
-    fit = made.grounds.fit(problem, carry_parameters(problem.layout, fitted.vector), lag.likelihood_fit.noise)
-    made.tried[LAG] = score_model(fit, made.validation)
-    plain = fitted.problem.with_effects([*lag.effects, *bias.effects])
-    far = carry_parameters(plain.layout, bias.likelihood_fit.fitted.vector, otherwise={"lag": 0.0})
-    missed = replace(bias.likelihood_fit, fitted=replace(bias.likelihood_fit.fitted, problem=plain, x=far))
-    made.tried[both := LAG | {"gyro_bias"}] = score_model(missed, made.validation)
-    assert refit_from_parts([made.tried[both]], made.tried, made.grounds)
-    assert swung in made.tried[both].effects
-    assert made.tried[both].log_likelihood > made.tried[LAG].log_likelihood - 0.5
-
-
 def test_a_model_without_one_of_its_effects_is_fitted_once():
     made, _, (lag, bias) = grown("servo_lag", "gyro_bias")
     assert not drop_each(lag, made.tried, made.grounds)  # without its one effect it is the base
@@ -228,37 +188,6 @@ def test_a_model_without_one_of_its_effects_is_fitted_once():
     assert drop_each(both, made.tried, made.grounds)
     assert not drop_each(both, made.tried, made.grounds)
     assert made.tried[LAG].log_likelihood > lag.log_likelihood - 0.5
-
-
-def test_an_effect_proven_beside_a_small_one_stays_when_that_is_left_out():
-    def model(names, *, error, evidence):
-        errors = Errors(0.004 * error, 0.002 * error)
-        return SimpleNamespace(
-            names=names,
-            effects=tuple(YAW[n] for n in names),
-            log_evidence=evidence,
-            log_likelihood=evidence,
-            validation_log_density=np.zeros(1),
-            selection_errors=errors,
-            train=errors,
-            own_moment=0.0,
-            train_under=lambda _std: errors,
-            unseen_under=lambda _std: (errors,),
-            likelihood_fit=SimpleNamespace(noise_kind="disturbance"),
-        )
-
-    both, whole = ("stall", "current"), ("stall", "current", "delay")
-    models = [
-        model((), error=1.1, evidence=0.0),
-        model(both[:1], error=2.0, evidence=60.0),
-        model(both, error=1.1, evidence=55.0),
-        model(("current",), error=3.0, evidence=9.0),
-        model(whole, error=1.05, evidence=120.0),
-        model(whole[::2], error=1.4, evidence=100.0),
-        model(whole[1:], error=2.0, evidence=90.0),
-    ]
-    tried = Archive(frozenset(), {frozenset(h.names): h for h in models})
-    assert core_of(models[4], tried, Noise(0.004, 0.002)) == frozenset(both)
 
 
 def test_what_does_without_the_textbooks_numbers_is_screened_beside_it():
