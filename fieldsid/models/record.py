@@ -180,9 +180,8 @@ def _stepped_path(fin: FloatArray, early: FloatArray, late: FloatArray) -> FinPa
     return FinPath(mean - half, mean + half, first, last)
 
 
-def first_part(record: Record, samples: int) -> Record:
-    """Return the first samples of a record, with the `speed` of the whole record."""
-    part = slice(0, samples)
+def part_of(record: Record, part: slice) -> Record:
+    """Return successive samples of a record, with the `speed` of the whole record."""
     early = None if record.command_lead is None else record.command_lead[part]
     goal = None if record.goal is None else record.goal[part]
     line = None if record.fin_line is None else record.fin_line[:, part]

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.run import Note
-from fieldsid.models.record import Record
+from fieldsid.models.record import Record, part_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.rounding import nine_digits
 
@@ -68,25 +68,3 @@ def quiet_before(record: Record, off: FloatArray) -> npt.NDArray[np.bool_]:
     moving = off > QUIET_RATE_SHARE * float(off.max())
     last_moved = np.maximum.accumulate(np.where(moving, record.time, record.time[0] - QUIET_SPAN_S))
     return np.asarray(record.time - last_moved >= QUIET_SPAN_S)
-
-
-def part_of(record: Record, samples: slice) -> Record:
-    """Return a part of a record."""
-    return Record(
-        name=record.name,
-        axis=record.axis,
-        time=record.time[samples],
-        fin=record.fin[samples],
-        fin_is_held=record.fin_is_held,
-        fin_is_measured=record.fin_is_measured,
-        angle=record.angle[samples],
-        rate=record.rate[samples],
-        angle_ok=record.angle_ok[samples],
-        rate_ok=record.rate_ok[samples],
-        cross=record.cross[samples],
-        cross_ok=record.cross_ok[samples],
-        signals={k: v[samples] for k, v in record.signals.items()},
-        speed=record.speed,
-        refused=record.refused,
-        fin_line=None if record.fin_line is None else record.fin_line[:, samples],
-    )

@@ -17,7 +17,7 @@ from fieldsid.models.axis import NAMES
 from fieldsid.models.effect import Effect, Motion, Values
 from fieldsid.models.fin_path import FinPath
 from fieldsid.models.hull import Core
-from fieldsid.models.record import Record, first_part
+from fieldsid.models.record import Record, part_of
 from fieldsid.models.speed_law import over_reference
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
@@ -76,7 +76,7 @@ class Problem:
         """Return the problem on the first `samples` samples of every run; this problem where no run is longer."""
         if all(len(r) <= samples for r in self.records):
             return self
-        return replace(self, records=tuple(first_part(r, samples) for r in self.records))
+        return replace(self, records=tuple(part_of(r, slice(0, samples)) for r in self.records))
 
     def with_effects(self, effects: Sequence[Effect]) -> Problem:
         """Return the problem of the same records and speed groups with other effects."""

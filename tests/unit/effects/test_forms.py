@@ -14,7 +14,7 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Motion, as_fitted, with_variant
 from fieldsid.models.fin_path import FinPath
 from fieldsid.models.hull import Core
-from fieldsid.models.record import first_part
+from fieldsid.models.record import part_of
 
 NEUTRAL = {
     "stall_blend": 0.0, "deadband_blend": 0.0, "deadband_jump": 0.0, "levelling": 0.0, "ramp": 0.0,
@@ -134,7 +134,7 @@ def test_a_fin_that_stays_out_is_its_rule_applied_finely(jump, release):
     steps = rng.random(60) < 0.4
     end = np.where(steps, start, end)
     values = {"width": width, "deadband_jump": jump, "release": release}
-    path = pick_effect("deadband").fin(FinPath(start, end), values, first_part(record(), 61))
+    path = pick_effect("deadband").fin(FinPath(start, end), values, part_of(record(), slice(0, 61)))
     moves = False
     for i in range(start.size):
         fine = start[i] + (end[i] - start[i]) * (np.arange(4000) + 0.5) / 4000

@@ -10,7 +10,7 @@ import pytest
 from fieldsid.logs.doctor.examine import examine
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
-from fieldsid.models.record import first_part, left_out, record_of
+from fieldsid.models.record import left_out, part_of, record_of
 
 
 def run_of(surge):
@@ -60,7 +60,7 @@ def test_the_cross_speed_is_kept_as_it_was_measured():
     assert np.flatnonzero(~record.cross_ok).tolist() == [100, 350]
     np.testing.assert_array_equal(record.cross, np.where(record.cross_ok, sway, 0.0))
     assert "cross" not in record.signals
-    part = first_part(record, 200)
+    part = part_of(record, slice(0, 200))
     np.testing.assert_array_equal(part.cross, record.cross[:200])
     assert part.cross_ok.sum() == 199
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
+from fieldsid.diagnosis.data.holdout_split import holdout_split
 from fieldsid.dynamics.free_run import command_record
 from fieldsid.effects import pick_effect
 from fieldsid.logs.run import Run
@@ -76,3 +77,14 @@ def test_runs_that_log_their_thrust_in_different_units_do_not_show_one_moment_of
     kept, skipped = applicable_effects([PROP], mixed)
     assert kept == ()
     assert skipped == {"prop_moment": "needs one thrust for all runs, and they log it as propeller_rpm and as thrust"}
+
+
+def test_parts_held_back_of_runs_that_log_another_thrust_cannot_show_its_moment():
+    time = np.arange(0.0, 60.0, 0.1)
+    rudder = np.where(time % 20.0 < 5.0, 0.1, 0.0)
+    signals = {"yaw_rate_rad_s": 0.1 * rudder, "rudder_rad": rudder, "surge_m_s": 1.5 + 0.1 * np.sin(time)}
+    runs = [Run(of, time, {**signals, of: 1.0 + 0.1 * np.sin(time)}) for of in ("thrust_ratio", "propeller_rpm")]
+    learned, unseen, _ = holdout_split([record_of(run, Axis.YAW) for run in runs])
+    assert unseen
+    _, skipped = applicable_effects([PROP], [*learned, *unseen])
+    assert skipped == {"prop_moment": "needs one thrust for all runs, and they log it as propeller_rpm and as thrust_ratio"}

@@ -17,7 +17,7 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import effect_named
 from fieldsid.models.model import Noise
-from fieldsid.models.record import first_part, record_of
+from fieldsid.models.record import part_of, record_of
 from fieldsid.noise.whiten import whiten
 
 WHITE = Noise(0.01, 0.01)
@@ -27,7 +27,9 @@ GUSTY = replace(WHITE, disturbance=0.01, disturbance_time=5.0)
 def problem_with(*names, steps=600):
     """A problem of two runs with some effects, and a vector near its minimum."""
     logs = [paper_run(YAW[1], angle_noise=0.01, rate_noise=0.01, seed=seed) for seed in (1, 2)]
-    runs = tuple(first_part(record_of(Run(f"run{i}", log.pop("time_s"), log), Axis.YAW), steps) for i, log in enumerate(logs))
+    runs = tuple(
+        part_of(record_of(Run(f"run{i}", log.pop("time_s"), log), Axis.YAW), slice(0, steps)) for i, log in enumerate(logs)
+    )
     effects = [effect_named(n) for n in names]
     layout = layout_of(runs, Axis.YAW, effects)
     start = np.where(equation_error_start(runs, layout) == 0.0, 1e-3, equation_error_start(runs, layout))

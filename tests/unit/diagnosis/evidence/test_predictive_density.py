@@ -25,7 +25,7 @@ from fieldsid.fitting.problem.problem import Problem
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
-from fieldsid.models.record import first_part, record_of
+from fieldsid.models.record import part_of, record_of
 
 NOISE = Noise(0.01, 0.01)
 
@@ -38,7 +38,7 @@ def record(row, seed, **change):
 @pytest.fixture(scope="module")
 def judged():
     """A short run and a faster one leave the parameters in doubt."""
-    runs = (first_part(record(YAW[1], 1, speed=1.0), 220), first_part(record(YAW[1], 2, speed=1.3), 220))
+    runs = (part_of(record(YAW[1], 1, speed=1.0), slice(0, 220)), part_of(record(YAW[1], 2, speed=1.3), slice(0, 220)))
     layout = layout_of(runs, Axis.YAW, ())
     trial = fit_output_error(Problem(runs, layout), equation_error_start(runs, layout), NOISE)
     x = levenberg_marquardt(trial.problem, trial.x, NOISE).x

@@ -18,7 +18,7 @@ from fieldsid.fitting.predict.predict import predict
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise
-from fieldsid.models.record import first_part, record_of
+from fieldsid.models.record import part_of, record_of
 from fieldsid.models.speed_law import SpeedLaw
 
 SPEED, LAG = 1.5, 0.2
@@ -155,7 +155,7 @@ def test_a_command_beside_its_sample_is_in_the_path_with_its_exact_area(rounded,
 def test_an_early_time_is_cut_with_its_record(rounded):
     record, _ = rounded
     times = np.linspace(0.0, 0.02, len(record))
-    part = first_part(replace(record, command_lead=times), 100)
+    part = part_of(replace(record, command_lead=times), slice(0, 100))
     np.testing.assert_array_equal(part.command_lead, times[:100])
     assert len(part.commanded.mean) == 99
 
