@@ -91,12 +91,18 @@ class Candidate(Displayed):
 class Left(Brief):
     """The error that remains with the named effects, or with the base where none is named.
 
-    `ratio`: the free-run error over the noise floor, of fitted or of unseen runs, whichever is larger. `unexplained`: it is
+    `ratio`: the free-run error over the noise floor, of fitted or of unseen runs, whichever is larger, at the parameters of the
+    fitted runs or of all runs, whichever are better. `unexplained`: it is
     visible, and its innovations are no disturbance's. It is largest in `run` from `start_s` to `end_s`, `burst` times the
     average, and follows `moves_with`, empty where no test says so.
     """
 
-    ratio: Annotated[Number, Key("The error over the noise floor, of fitted or of unseen runs, whichever is larger.")]
+    ratio: Annotated[
+        Number,
+        Key(
+            "The error over the noise floor: the larger of fitted and unseen runs, at the better of their and all runs' numbers."
+        ),
+    ]
     unexplained: Annotated[bool, Key("Whether it is visible and no disturbance.")]
     run: str = ""
     start_s: float = float("nan")

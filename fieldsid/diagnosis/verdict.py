@@ -91,12 +91,19 @@ def stands(search: Search, found: ScoredModel, tests: ResidualTests, floor: Nois
 def error_left(search: Search, found: ScoredModel, tests: ResidualTests, floor: Noise) -> float:
     """Return the error that a model leaves over the one that the right effects leave: the noise floor and MISFIT_SHARE.
 
-    It is the smaller of the errors at the parameters of the fitted runs and of all runs. Where the tests accept it as a
-    disturbance, it counts as GUSTY_ERROR_RATIO at most, because a larger one would fail them if it were a missing effect.
+    Where the tests accept it as a disturbance, it counts as GUSTY_ERROR_RATIO at most, because a larger one would fail them if it
+    were a missing effect.
     """
-    least = min(worst_error(found, floor), compared_error(search.base(), found, floor))
-    left = float(least / np.hypot(1.0, MISFIT_SHARE * worst_error(search.base(), floor)))
+    left = float(_least_error(search, found, floor) / np.hypot(1.0, MISFIT_SHARE * worst_error(search.base(), floor)))
     return left if _is_no_disturbance(found, tests, floor) else min(left, GUSTY_ERROR_RATIO)
+
+
+def _least_error(search: Search, h: ScoredModel, floor: Noise) -> float:
+    """Return the larger error of a model over a noise floor, of fitted and of unseen runs, at its better parameters.
+
+    They are those of the fitted runs or of all runs: what the fitted runs leave open is nothing that the model lacks.
+    """
+    return min(worst_error(h, floor), compared_error(search.base(), h, floor))
 
 
 def left_of(search: Search, named: ScoredModel, found: ScoredModel, tests: ResidualTests, floor: Noise) -> Left:
@@ -105,7 +112,7 @@ def left_of(search: Search, named: ScoredModel, found: ScoredModel, tests: Resid
     An error that the tests accept as a disturbance is not unexplained, unless it is far larger on the unseen runs. Where effects
     are named, an error above MISSING_ERROR_RATIO is unexplained whatever the tests say.
     """
-    ratio = worst_error(named, floor)
+    ratio = _least_error(search, named, floor)
     if ratio <= SUFFICIENT_ERROR_RATIO:
         return Left(ratio, unexplained=False)
     is_large_with_effects = ratio > MISSING_ERROR_RATIO and frozenset(named.names) != search.root

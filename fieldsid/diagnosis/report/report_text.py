@@ -168,7 +168,8 @@ def _less_likely_explanation(search: Search, found: ScoredModel, floor: Noise) -
 def _error_fall(search: Search, found: ScoredModel, floor: Noise, runs: str) -> str:
     """Return the clause on the fall of the error with a model's effects, on the validation runs where it clearly falls there.
 
-    Else the error at the parameters of all runs is stated where that falls, and otherwise the errors of fitted and unseen runs.
+    Where it falls clearly further at the parameters of all runs, that is stated too, and where it falls at neither, the errors of
+    fitted and unseen runs are.
     """
     base = search.base()
 
@@ -181,9 +182,10 @@ def _error_fall(search: Search, found: ScoredModel, floor: Noise, runs: str) -> 
         return f"from {before.over(floor):.2f} to {after.over(floor):.2f} x the noise floor"
 
     selected = base.selection_errors, found.selection_errors
-    if not search.validation or falls(*selected):
-        return f"the error on {runs} falls {size(*selected)}"
     settled = base.unseen_errors[-1], found.unseen_errors[-1]
+    is_open = bool(search.validation) and falls(found.selection_errors, settled[1])
+    if not search.validation or (falls(*selected) and not is_open):
+        return f"the error on {runs} falls {size(*selected)}"
     if falls(*settled):
         alone = f"with the fitted runs' own it goes {size(*selected)}"
         return f"with the numbers of all runs together the error on {runs} falls {size(*settled)}; {alone}"

@@ -143,13 +143,23 @@ def test_the_more_a_named_set_leaves_the_likelier_is_something_that_was_not_trie
 
 
 @pytest.mark.parametrize(
-    ("named", "ratio", "unexplained"), [((), 2.5, False), (("servo_lag",), 2.5, True), (("servo_lag",), 1.3, False)]
+    ("named", "unseen", "settled", "left", "unexplained"),
+    [
+        ((), 2.5, 2.5, 2.5, False),
+        (("servo_lag",), 2.5, 2.5, 2.5, True),
+        (("servo_lag",), 1.3, 1.3, 1.3, False),
+        (("servo_lag",), 5.4, 1.3, 1.3, False),  # the fitted runs leave a number open that all runs tell
+        (("servo_lag",), 1.3, 5.4, 1.3, False),
+    ],
 )
-def test_what_could_be_a_disturbance_is_unexplained_where_effects_are_named_and_no_disturbance_is(named, ratio, unexplained):
-    shown = errors(ratio)
+def test_what_could_be_a_disturbance_is_unexplained_where_effects_are_named_and_no_disturbance_is(
+    named, unseen, settled, left, unexplained
+):
+    fitted = errors(1.2)
     h = SimpleNamespace(
-        names=named, train_under=lambda _std: shown, selection_errors=shown, train=shown, validation=(), validation_errors=None
-    )
+        names=named, train_under=lambda _std: fitted, selection_errors=errors(unseen), train=fitted, validation=(),
+        validation_errors=None, own_moment=0.0, log_evidence=0.0, unseen_under=lambda _std: (errors(unseen), errors(settled)),
+    )  # fmt: skip
     tests = ResidualTests(0.5, 0.5, 0.5, "r0", 1.0, 3.0, 2.0, "")
-    left = verdict.left_of(SimpleNamespace(root=frozenset()), h, h, tests, FLOOR)
-    assert (left.unexplained, left.ratio) == (unexplained, pytest.approx(ratio))
+    found = verdict.left_of(SimpleNamespace(root=frozenset(), base=lambda: h), h, h, tests, FLOOR)
+    assert (found.unexplained, found.ratio) == (unexplained, pytest.approx(left))

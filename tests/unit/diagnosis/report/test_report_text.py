@@ -118,6 +118,15 @@ def test_errors_hold_those_of_each_run():
         ),
         (
             (3.0, 1.0),
+            (6.81, 5.42),
+            (5.35, 1.03),
+            (
+                "with the numbers of all runs together the error on unseen runs falls from 5.35 to 1.03 x the noise floor; "
+                "with the fitted runs' own it goes from 6.81 to 5.42 x the noise floor"
+            ),
+        ),
+        (
+            (3.0, 1.0),
             (1.03, 1.02),
             (1.03, 1.02),
             (
@@ -126,7 +135,7 @@ def test_errors_hold_those_of_each_run():
             ),
         ),
     ],
-    ids=["unseen", "settled", "fitted"],
+    ids=["unseen", "settled", "open", "fitted"],
 )
 def test_the_headline_says_the_error_that_falls(fitted, unseen, settled, said):
     base, found = (
