@@ -20,7 +20,7 @@ from fieldsid.models.record import record_of
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.planning.flight.excitation import Excitation, Window, fin_command
 from fieldsid.planning.flight.operating_point import autopilot_of, operating_point
-from fieldsid.planning.flight.rule_flight import fly_operating_points
+from fieldsid.planning.flight.rule_flight import fly_maneuver, plant_of
 
 SENSOR = float(np.radians(0.3))
 PAPER = {1.07: (1.04, -0.62, -0.0086), 1.36: (1.11, -0.86, -0.0082), 2.19: (1.10, -1.83, -0.0021)}
@@ -68,8 +68,8 @@ def orders(day: Day, candidate: Excitation, window: Window) -> TruthManeuver:
     scene = operating_point(exact(day), day.speed)
     limits = Limits(day.physics.fin_limit)
     schedule = Schedule(window.rate_hz, window.lead, window.recover)
-    flight = fly_operating_points(
-        [scene],
+    flight = fly_maneuver(
+        plant_of([scene], window.time.size, window.rate_hz),
         candidate.record,
         candidate.parameters,
         limits=limits,

@@ -137,8 +137,9 @@ def fly(
     limits: Limits,
     autopilot: Autopilot,
     schedule: Schedule | None = None,
+    samples: int | None = None,
 ) -> Flight:
-    """Return the simulation of a maneuver on a plant: the fin within its limits, and the motion.
+    """Return the simulation of a maneuver on a plant: the fin within its limits, and the motion; at most `samples` samples.
 
     A rule ends when every vehicle has finished it; the recovery follows.
     """
@@ -147,7 +148,8 @@ def fly(
     numbers, memory, gains = maneuver.vector(values), np.tile(np.array(maneuver.memory(values)), (size, 1)), autopilot.gains
     (low, high), step, length = limits.about(plant.trim), 1.0 / schedule.rate_hz, maneuver.duration(values)
     excite = max(length, step)
-    count = end = round((schedule.run_up + excite + schedule.recover) * schedule.rate_hz) + 1
+    count = round((schedule.run_up + excite + schedule.recover) * schedule.rate_hz) + 1
+    count = end = count if samples is None else min(count, samples)
     fin, angle, rate = np.zeros((3, count, size))
     free, command, last, done = np.zeros((count, size), dtype=bool), np.full(size, np.nan), np.zeros(size), False
     finish = schedule.run_up + excite

@@ -17,7 +17,7 @@ from fieldsid.planning.design.objective import Objective, Setting, information_o
 from fieldsid.planning.design.optimise import SMALLEST, Scored, as_switched, at_best_amplitude, catalogue, switching
 from fieldsid.planning.flight.excitation import LONGEST_WINDOW_S, Excitation, fits, flown
 from fieldsid.planning.flight.operating_point import operating_point
-from fieldsid.planning.flight.rule_flight import fly_operating_points
+from fieldsid.planning.flight.rule_flight import fly_maneuver, plant_of
 from fieldsid.planning.safety.envelope import MOST_TURNS
 from fieldsid.planning.safety.monte_carlo import Ensemble, draw_ensemble, fly_ensemble
 from fieldsid.runtime.parallel_map import parallel_map
@@ -113,11 +113,11 @@ def _nominal(objective: Objective, candidate: Excitation) -> FloatArray:
     if candidate.record.rule is None:
         return np.zeros(0)
     window, limits = objective.window, objective.envelope.limits
-    flight = fly_operating_points(
-        [objective.scene], candidate.record, candidate.parameters,
+    flight = fly_maneuver(
+        plant_of([objective.scene], window.time.size, window.rate_hz), candidate.record, candidate.parameters,
         limits=limits, autopilot=objective.autopilot, schedule=window.schedule,
     )  # fmt: skip
-    return np.where(flight.recovering[:, 0], np.nan, flight.fin[:, 0])[: window.time.size]
+    return np.where(flight.recovering[:, 0], np.nan, flight.fin[:, 0])
 
 
 def expected_errors(objective: Objective, candidate: Excitation, ensemble: Ensemble) -> dict[str, Expected]:

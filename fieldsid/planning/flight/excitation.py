@@ -12,7 +12,7 @@ from fieldsid.errors import UsageError
 from fieldsid.maneuvers import RATE_HZ, Autopilot, Limits, Maneuver, Schedule, pick_maneuver, spec_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.flight.operating_point import OperatingPoint
-from fieldsid.planning.flight.rule_flight import OperatingPointPlant, Response, fly_fins, fly_operating_points, plant_of
+from fieldsid.planning.flight.rule_flight import OperatingPointPlant, Response, fly_fins, fly_maneuver, plant_of
 from fieldsid.records.keys import Key
 
 LONGEST_WINDOW_S = 300.0
@@ -118,24 +118,21 @@ def fin_command(candidate: Excitation, window: Window) -> FloatArray:
 
 
 def fly_window(
-    plant: OperatingPointPlant, candidate: Excitation | FloatArray, window: Window, limits: Limits, autopilot: Autopilot,
-    moments: FloatArray | None = None,
+    plant: OperatingPointPlant, candidate: Excitation | FloatArray, window: Window, limits: Limits, autopilot: Autopilot
 ) -> tuple[FloatArray, FloatArray, FloatArray]:  # fmt: skip
     """Return command, angle and rate (k, m) of a plant under a candidate, for at most the length of a window.
 
     In place of a candidate it may be a list of fin angles about trim (rad, NaN for the autopilot, which steers after its end).
-    `plant` is over the window and has the disturbance `moments` (m, n), which the longer flight of a rule takes as well.
+    `plant` is over the window.
     """
     if not isinstance(candidate, Excitation) or candidate.record.rule is None:
         fins = fin_command(candidate, window) if isinstance(candidate, Excitation) else _filled(candidate, window)
         command, angle, rate = fly_fins(plant, fins, limits, autopilot)
         return command, angle, rate
-    flight = fly_operating_points(
-        plant.scenes, candidate.record, candidate.parameters,
-        limits=limits, autopilot=autopilot, schedule=window.schedule, moments=moments,
-    )  # fmt: skip
-    n = plant.steps.size + 1
-    return flight.fin[:n], flight.angle[:n], flight.rate[:n]
+    flight = fly_maneuver(
+        plant, candidate.record, candidate.parameters, limits=limits, autopilot=autopilot, schedule=window.schedule
+    )
+    return flight.fin, flight.angle, flight.rate
 
 
 def _filled(fins: FloatArray, window: Window) -> FloatArray:

@@ -166,26 +166,22 @@ def fly_fins(plant: OperatingPointPlant, fins: FloatArray, limits: Limits, autop
     return _through_actuators(plant, lambda at_rest: at_rest.flown(fins[:, None], gains, rows), lambda found: found[0])
 
 
-def fly_operating_points(
-    scenes: Sequence[OperatingPoint],
+def fly_maneuver(
+    plant: OperatingPointPlant,
     maneuver: Maneuver,
     parameters: Parameters,
     *,
     limits: Limits,
     autopilot: Autopilot,
     schedule: Schedule,
-    moments: FloatArray | None = None,
 ) -> Flight:
-    """Return the simulation of a maneuver from rest with actuator effects; moments (m, k) rad/s^2 are disturbances."""
-    longest = schedule.run_up + maneuver.duration(parameters) + schedule.recover
-    n = round(longest * schedule.rate_hz) + 2
-    if moments is not None:
-        moments = np.pad(moments, ((0, 0), (0, max(0, n - moments.shape[1]))), mode="edge")[:, :n]
+    """Return the simulation of a maneuver from rest with actuator effects, for at most the samples of the plant."""
 
     def flown(at_rest: OperatingPointPlant) -> Flight:
-        return fly(maneuver, parameters, at_rest, limits=limits, autopilot=autopilot, schedule=schedule)
+        samples = at_rest.steps.size + 1
+        return fly(maneuver, parameters, at_rest, limits=limits, autopilot=autopilot, schedule=schedule, samples=samples)
 
-    return _through_actuators(plant_of(scenes, n, schedule.rate_hz, moments), flown, lambda flight: flight.fin)
+    return _through_actuators(plant, flown, lambda flight: flight.fin)
 
 
 def _through_actuators(
@@ -202,10 +198,9 @@ def _through_actuators(
         if remaining:
             command, before, off = commands(found), off, np.zeros_like(off)
             idle = _idle(scenes, np.append(0.0, np.cumsum(plant.steps))[: command.shape[0]])
-            for i, scene in enumerate(scenes):
-                fin, constant = command[:, i] + scene.trim_fin, command[:-1, i] + scene.trim_fin
-                path = fin_path(idle[scene.speed].with_fin(fin), scene.effects, scene.values)
-                off[i, : constant.size] = np.column_stack([path.start - constant, path.end - constant])
+            for scene, fin, beside in zip(scenes, np.ascontiguousarray((command + plant.trim).T), off, strict=True):
+                path, held = fin_path(idle[scene.speed].with_fin(fin), scene.effects, scene.values), fin[:-1]
+                beside[: held.size, 0], beside[: held.size, 1] = path.start - held, path.end - held
             if np.array_equal(off, before):  # converged
                 break
     return found

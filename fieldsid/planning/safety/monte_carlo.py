@@ -23,9 +23,8 @@ TRIM_SPREAD = 0.005
 
 @dataclass(frozen=True, slots=True)
 class Ensemble:
-    """Draws of a prior at one speed, each with its disturbance moment (m, n), error of trim fin, and roll factor (m,)."""
+    """Draws of a prior at one speed with their roll factors (m,); the plant has their disturbance moments and errors of trim."""
 
-    moments: FloatArray
     roll: FloatArray
     plant: OperatingPointPlant
     window: Window
@@ -37,7 +36,7 @@ class Ensemble:
 
     def first(self, count: int) -> Ensemble:
         """Return the first draws only."""
-        return replace(self, moments=self.moments[:count], roll=self.roll[:count], plant=self.plant.first(count))
+        return replace(self, roll=self.roll[:count], plant=self.plant.first(count))
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +63,7 @@ def draw_ensemble(model: Model, speed: float, window: Window, count: int, seed: 
     lift = np.array([s.base.authority for s in scenes])
     moments = moments + (lift * TRIM_SPREAD * rng.standard_normal(count))[:, None]
     roll = np.exp(ROLL_SPREAD * rng.standard_normal(count))
-    return Ensemble(moments, roll, plant_of(scenes, n, window.rate_hz, moments), window)
+    return Ensemble(roll, plant_of(scenes, n, window.rate_hz, moments), window)
 
 
 def fly_ensemble(
@@ -74,7 +73,7 @@ def fly_ensemble(
 
     They have one autopilot, that for the prior's mean.
     """
-    _, angle, rate = fly_window(ensemble.plant, candidate, ensemble.window, envelope.limits, autopilot, ensemble.moments)
+    _, angle, rate = fly_window(ensemble.plant, candidate, ensemble.window, envelope.limits, autopilot)
     step, speed = 1.0 / ensemble.window.rate_hz, ensemble.scenes[0].speed
     axis = ensemble.scenes[0].axis
     far = excursions_of(axis, angle, rate, speed=speed, step=step, run_up=run_up_m, roll_gain=ensemble.roll)

@@ -93,6 +93,16 @@ def test_draws_flown_at_once_are_those_flown_one_by_one(spec):
         assert together.excursions["along"][i] == pytest.approx(5.0 + np.max(along), rel=0.01)
 
 
+@pytest.mark.parametrize("effects", [(), ("servo_lag",)])
+def test_a_window_that_ends_before_the_rule_has_the_start_of_its_flight(effects):
+    scene = scene_with(*effects)
+    pilot = autopilot_of(scene.base, LIMITS)
+    short, long = (flown_all([scene], candidate("zigzag:turn=1.5"), Window(s), LIMITS, pilot)[0] for s in (20.0, 67.0))
+    assert short.time.size == 401 < long.time.size
+    for part in ("time", "command", "angle", "rate"):
+        np.testing.assert_array_equal(getattr(short, part), getattr(long, part)[:401])
+
+
 def test_a_command_is_kept_inside_angle_and_rate_limits():
     scene = scene_with()
     limits = Limits(0.1, 0.4)
