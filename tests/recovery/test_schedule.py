@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from truth.pilots import Autopilot, excited
 from truth.vehicle import Fins, fly_vehicle
 
@@ -29,14 +28,14 @@ def flown(speed: float, seed: int, fins: Fins = FINS) -> Run:
     return Run(f"pulses_{speed:.1f}", log.pop("time_s"), log)
 
 
-def schedule_from(folder, fins: Fins, kind: str = "pd", bandwidth: float | None = 0.97):
+def schedule_from(folder, fins: Fins, bandwidth: float | None = 0.97):
     paths = []
     for i, speed in enumerate(KNOTS):
         (fit,) = identify([flown(speed, 20 + i, fins)], Axis.YAW, method="output_error")
         paths.append(save_model(fit.model, folder / f"m{i}.yaml"))
     limits = FinLimits(lag=fins.lag, rate=fins.rate)
     source = load_parameter_source(paths)
-    return design_schedule(source, fins.limit, wish=Wish(kind=kind, bandwidth=bandwidth), limits=limits), source
+    return design_schedule(source, fins.limit, wish=Wish("pd", bandwidth=bandwidth), limits=limits), source
 
 
 def steered(row, speed: float, *, fins: Fins = FINS, step: float = STEP, forward: bool = True, seed: int = 50):
@@ -58,11 +57,6 @@ def figures(time, yaw):
     over = 100.0 * max(float(np.max(yaw)) / STEP - 1.0, 0.0)
     off = np.flatnonzero(np.abs(yaw - STEP) > 0.1 * STEP)
     return over, float(time[off[-1]])
-
-
-@pytest.fixture(scope="module")
-def schedule(tmp_path_factory):
-    return schedule_from(tmp_path_factory.mktemp("models"), FINS)
 
 
 def test_steps_are_damped_and_quick_at_every_speed_and_none_slower_than_the_constant_gain(tmp_path):
