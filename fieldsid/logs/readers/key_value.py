@@ -22,6 +22,7 @@ from fieldsid.logs.readers import csv_table
 from fieldsid.logs.readers._cells import cells, is_word
 from fieldsid.logs.readers._columns import Columns
 from fieldsid.logs.readers._plain_text import HEAD, plain_text
+from fieldsid.logs.readers._rows_of_several import refuse_rows_of_several
 from fieldsid.logs.readers._text import LOOKED_AT, Form, form_of
 from fieldsid.logs.readers._topics import DATA, Topic, Topics, topic_of, topic_reader
 from fieldsid.logs.run import Note
@@ -67,6 +68,10 @@ def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
         places = _places(table.form, table.text.head())
         if places is None:
             raise LogError(f"`{path}` is no table of keys and values", found=", ".join(table.form.names), hint="name its columns")
+        lines = table.text.head().splitlines()[table.form.start :]
+        for key in {row[places[1]] for line in lines if len(row := cells(line, table.form.separator)) == table.form.width}:
+            of_key = [line for line in lines if key in cells(line, table.form.separator)]
+            refuse_rows_of_several(path, table.form, of_key, (places[2],))
         columns = table.columns(places)
         time, notes = _times(columns, places[0])
         keys, values = columns.take(places[1]).astype(str), as_numbers(columns.take(places[2]))[0]

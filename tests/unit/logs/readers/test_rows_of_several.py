@@ -44,3 +44,29 @@ def test_a_column_of_words_that_alternates_is_no_source_where_the_numbers_go_on(
     own = np.stack([TRUTH[name] for name in COLUMNS], axis=1)
     log = written(tmp_path / "log.csv", [(("tick", "tock")[i % 2], *row) for i, row in enumerate(own.tolist())])
     assert len(load_run(log)) == len(TRUTH["time_s"])
+
+
+@pytest.mark.parametrize("tags", [("alpha", "bravo"), ("1", "2", "3")])
+def test_rows_of_several_one_after_the_other_are_refused(tmp_path, tags):
+    rows = sorted(rows_of(tags, 1.5), key=lambda row: row[0])
+    log = written(tmp_path / "log.csv", rows)
+    with pytest.raises(LogError, match="rows of several one after the other: `vehicle` is"):
+        load_run(log)
+
+
+def test_a_number_of_the_day_is_no_source_where_the_heading_goes_on_over_midnight(tmp_path):
+    own = np.stack([TRUTH[name] for name in COLUMNS], axis=1)
+    own[:, 0] += 86390.0
+    day, own[:, 0] = own[:, 0] // 86400.0, own[:, 0] % 86400.0
+    log = written(tmp_path / "log.csv", [(d, *row) for d, row in zip(day.tolist(), own.tolist(), strict=True)])
+    assert len(load_run(log)) == len(TRUTH["time_s"])
+
+
+def test_readings_of_several_vehicles_in_a_table_of_keys_are_refused(tmp_path):
+    names = ("yaw_deg", "yaw_rate_deg_s", "rudder_deg")
+    own = zip(TRUTH["time_s"].tolist(), *(np.degrees(TRUTH[name]).tolist() for name in COLUMNS[1:]), strict=True)
+    lines = [f"{t},{tag},{key},{v + 40.0 * k}" for t, *row in own for k, tag in enumerate("ab") for key, v in zip(names, row)]  # noqa: B905
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join(["time,vehicle,key,value", *lines]) + "\n")
+    with pytest.raises(LogError, match="rows of several in turn: `vehicle` is `a`, `b`"):
+        load_run(log, recognise=True)
