@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fieldsid.errors import LogError
 from fieldsid.logs.convert.times.clock_text import FEW_STEPS
-from fieldsid.logs.convert.times.time_column import unit_of_step
+from fieldsid.logs.convert.times.time_column import units_of_step
 from fieldsid.logs.few_of import FEWEST
 from fieldsid.logs.reader import AS_IT_IS, ReadOptions
 from fieldsid.logs.run import ANGLES_AND_RATES, FINS, Note
@@ -44,8 +44,7 @@ def possible(signal: str, values: FloatArray) -> tuple[FloatArray, list[Note]]:
 
 def likely_unit(step_s: float) -> str:
     """Return the hint to set the unit of time in which a median step is plausible; empty where there is no such unit."""
-    unit = unit_of_step(step_s)
-    return f"set its unit, probably `unit: {unit}`" if unit else ""
+    return next((f"set its unit, probably `unit: {unit}`" for unit in units_of_step(step_s)), "")
 
 
 def refuse_impossible_steps(time: FloatArray, label: str) -> None:

@@ -94,6 +94,16 @@ def _time_scale(run: Run, angle: str, rate: str, stated: Stated) -> list[Note]:
     return [Note("time_scale", f"{said}: {advice}", data | ({} if is_open else {"time_unit": unit}))]
 
 
+def fastest_turn(run: Run) -> float:
+    """Return the largest rate in rad/s of any angle of a run over any window, less its noise; zero without an angle."""
+    fastest = 0.0
+    for time, turned in (both for angle in RATE_OF if (both := together(run, angle)) is not None):
+        floor = SURE * math.sqrt(2.0) * _noise(turned)
+        for width in (1 << power for power in range((turned.size - 1).bit_length())):
+            fastest = max(fastest, float(np.max((np.abs(over(turned, width)) - floor) / over(time, width))))
+    return fastest
+
+
 def agrees_with_rate(run: Run, angle: str, rate: str) -> bool:
     """Return whether the change of an angle equals the integral of its rate, in the units in which both were read."""
     changes = changes_of(run, angle, rate)
@@ -339,7 +349,9 @@ def _slope_findings(angle: str, rate: str, slope: float, stated: Stated) -> list
         message = f"{rate} is {1 / size:.3g} times the change of {angle}, as numbers in {goes_as} are: {advice}"
         found.append(Note("unit", message, {**data, "goes_as": goes_as, **unit}))
     elif abs(size - 1.0) > UNIT_LIMIT:
-        message = f"{angle} changes {size:.3g} times as fast as {rate} says (limit 1 +/- {UNIT_LIMIT:g}): check both scales"
+        said = f"{angle} changes {size:.3g} times as fast as {rate} says (limit 1 +/- {UNIT_LIMIT:g})"
+        read = f"{angle} is read at {size:.3g} times its true size, or {rate} or the time at {1.0 / size:.3g} times"
+        message = f"{said}: {read}; leave the wrong one of the two signals out, or set `unit` or `rate` at time"
         found.append(Note("rate_scale", message, {**data, "limit": UNIT_LIMIT}))
     return found
 

@@ -61,12 +61,12 @@ def certain_of(proposal: Proposal) -> Certain:
 
     signals = proposal.body["signals"]
     notes = (*proposal.notes, *(() if proposal.run is None else proposal.run.notes))
-    doubts = _doubts(signals, notes)
+    doubts = {s: n.message for n in notes if n.code in TIME_DOUBTS for s in ("time",)} | _doubts(signals, notes)
     sure = {s: item for s, item in signals.items() if s not in doubts}
     against = tuple(
         (n, {s: place_of(signals[s]) for s in n.data.get("signals", ()) if s in signals}) for n in notes if n.code in CONTRARY
     )
-    if proposal.run is None or not is_enough(sure) or any(n.code in TIME_DOUBTS for n in notes):
+    if proposal.run is None or not is_enough(sure) or "time" in doubts:
         return Certain(None, (), MappingProxyType(doubts), against)
     mapping = mapping_of(proposal.body | {"signals": sure})
     return Certain(mapping, (_read_as_note(sure, doubts),), MappingProxyType(doubts), against)

@@ -17,7 +17,10 @@ import numpy as np
 
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.channels import POSITION, ChannelMap
-from fieldsid.logs.convert.units import DEGREE
+from fieldsid.logs.convert.heading_unwrap import FASTEST_RAD_S
+from fieldsid.logs.convert.times.time_column import units_of_step
+from fieldsid.logs.convert.units import DEGREE, UNITS, find_unit
+from fieldsid.logs.doctor.angle_and_rate import agrees_with_rate, fastest_turn
 from fieldsid.logs.doctor.fin_findings import WIDEST
 from fieldsid.logs.mapping.canonical_names import unit_in_name, words_of
 from fieldsid.logs.mapping.draft import place_of
@@ -98,6 +101,7 @@ def tried(log: Log, body: dict[str, Any], defined: frozenset[str]) -> Proposal:
         why += corrections
         if not corrections:
             break
+    why += _open_unit_of_time(log, body, run)
     if yaw is not None and "yaw_rad" in by_size and "unit" in signals["yaw_rad"]:
         why += heading_in_doubt(yaw.values, signals)
     # the size of a rate shows that it is not in rad/s; its unit follows from the comparison with its angle
@@ -110,16 +114,43 @@ def tried(log: Log, body: dict[str, Any], defined: frozenset[str]) -> Proposal:
 def _unit_of_time(log: Log, body: dict[str, Any], findings: Iterable[Note]) -> list[Note]:
     """Set the unit that findings show for a time whose column states none; return the note on it, none where nothing was set."""
     time = body.get("time", {})
-    names = {name: c for i, c in enumerate(log.inventory.channels) for name in (c.name, i)}
-    column = names.get(time.get("column", ""))
     found = next((n for n in findings if "time_unit" in n.data), None)
-    if found is None or column is None or unit_in_name(column.name, TIME, column.unit) is not None:
-        return []
-    if time.get("unit", "s") == found.data["time_unit"]:
+    if found is None or not _states_no_unit(log, time) or time.get("unit", "s") == found.data["time_unit"]:
         return []
     time["unit"] = found.data["time_unit"]
     seen = found.message.partition(": ")[0]
     return [Note("evidence", f"time is taken with `unit: {time['unit']}`: {seen}", {"signal": TIME, "finding": found.code})]
+
+
+def _states_no_unit(log: Log, time: Mapping[str, Any]) -> bool:
+    names = {name: c for i, c in enumerate(log.inventory.channels) for name in (c.name, i)}
+    column = names.get(time.get("column", ""))
+    return column is not None and unit_in_name(column.name, TIME, column.unit) is None
+
+
+def _open_unit_of_time(log: Log, body: Mapping[str, Any], run: Run) -> list[Note]:
+    """Return the note that a time in whole numbers, whose column states no unit, may be in several; none where one is left.
+
+    In each the step is plausible, and no angle turns faster than a vehicle; an angle that agrees with its rate leaves one unit.
+    """
+    time = body.get("time", {})
+    own = find_unit(time.get("unit", "s"), "time")
+    if own is None or not _states_no_unit(log, time) or any(agrees_with_rate(run, *pair) for pair in RATE_OF.items()):
+        return []
+    counted, fastest = run.time / own.factor, fastest_turn(run) * own.factor
+    if not np.array_equal(np.round(counted, 6), np.round(counted)):
+        return []
+    step = float(np.median(np.diff(counted)))
+    turns = {unit: fastest / UNITS[unit].factor for unit in units_of_step(step)}
+    readings = [
+        f"{step * UNITS[u].factor:g} s a sample and {turn:.2g} rad/s at most in {u}"
+        for u, turn in turns.items()
+        if turn <= FASTEST_RAD_S
+    ]
+    if len(readings) < 2:
+        return []
+    message = f"`{time['column']}` states no unit, and nothing tells it: {', or '.join(readings)}; set `unit` at time"
+    return [Note("time_unit", message, {"signal": TIME, "value": step, "limit": FASTEST_RAD_S})]
 
 
 OTHER_ANGLES = (*FINS, "pitch_rad", "roll_rad")

@@ -134,7 +134,7 @@ def likely_time_unit(cells: npt.NDArray[Any]) -> str | None:
     """Return the likely unit of numbers of time: by their size, which is characteristic of an epoch, else by their median step.
 
     None where the cells are no numbers. A median step too long for a vehicle's motion in seconds, but plausible in ms, us or ns,
-    is taken for that unit. Fractional seconds since 1970 are seconds, however long the steps are, as in a glider's log.
+    is taken for the longest of them. Fractional seconds since 1970 are seconds, however long the steps are, as in a glider's log.
     """
     if cells.dtype.kind not in "iuf" or not cells.size or not np.isfinite(cells[0]):
         return None
@@ -149,7 +149,7 @@ def likely_time_unit(cells: npt.NDArray[Any]) -> str | None:
     if YEARS_S[0] < size < YEARS_S[1] and bool((seen != np.round(seen)).any()):
         return "s"
     of_epoch = next((u for u in ("ms", "us", "ns") if YEARS_S[0] < size * UNITS[u].factor < YEARS_S[1]), "")
-    return of_epoch or ("d" if _are_days(size, step) else unit_of_step(step)) or "s"
+    return of_epoch or ("d" if _are_days(size, step) else next(iter(units_of_step(step)), "s"))
 
 
 def _are_digits_of_a_clock(seen: npt.NDArray[Any]) -> bool:
@@ -181,10 +181,9 @@ SLOW_S = 5.0
 """A log with a longer step would not show a vehicle's motion, so that its time must be in another unit."""
 
 
-def unit_of_step(step_s: float) -> str:
-    """Return the unit of time in which a step that is too long in seconds is plausible; empty where there is none."""
-    plausible = (unit for unit in ("ms", "us", "ns") if FASTEST_S <= step_s * UNITS[unit].factor <= SLOW_S)
-    return next(plausible, "") if step_s > SLOW_S else ""
+def units_of_step(step: float) -> tuple[str, ...]:
+    """Return the units of time in which a step is plausible between two samples of a vehicle's motion, the longest first."""
+    return tuple(unit for unit in ("s", "ms", "us", "ns") if FASTEST_S <= step * UNITS[unit].factor <= SLOW_S)
 
 
 def time_unit(unit: str, what: str = "time") -> Unit:
