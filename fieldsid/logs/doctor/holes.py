@@ -59,15 +59,25 @@ def holes_of(time: FloatArray, fin: FloatArray) -> tuple[Hole, ...]:
     )
 
 
-def hiding(holes: Sequence[Hole], fin: FloatArray) -> tuple[Hole, ...]:
-    """Return the holes of a fin (n,) rad after which it is at another angle."""
+def hiding(time: FloatArray, fin: FloatArray) -> tuple[Hole, ...]:
+    """Return the holes of a fin (n,) rad after which it is at another angle, or that last longer than it ever rests."""
     least = MOVED * float(np.nanmax(fin) - np.nanmin(fin))
-    return tuple(h for h in holes if abs(h.after - h.before) > least)
+    rest = _longest_rest(time, fin, least)
+    return tuple(h for h in holes_of(time, fin) if abs(h.after - h.before) > least or _length(h) > rest)
+
+
+def _longest_rest(time: FloatArray, fin: FloatArray, least: float) -> float:
+    """Return the longest logged time in s between two steps of a fin (n,) by more than `least` rad, without its holes."""
+    seen = np.isfinite(fin)
+    steps = np.diff(time[seen], prepend=time[seen][0])
+    logged = np.cumsum(np.where(steps > FEW_STEPS * np.median(steps), 0.0, steps))
+    moved = np.flatnonzero(np.abs(np.diff(fin[seen])) > least)
+    return float(np.max(np.diff(logged[[0, *moved, -1]])))
 
 
 def unbroken(run: Run, signal: str) -> Run:
     """Return the part of a run, between holes that hide a movement of the fin, in which the fin moves most."""
-    hidden = hiding(holes_of(run.time, run[signal]), run[signal])
+    hidden = hiding(run.time, run[signal])
     if not hidden:
         return run
     starts = [float(run.time[0]), *(h.end_s for h in hidden)]
@@ -80,13 +90,15 @@ def unbroken(run: Run, signal: str) -> Run:
 def hole_notes(run: Run, signal: str) -> tuple[Note, ...]:
     """Return notes on the consequences of the holes in a fin signal for a fit; a gap of all signals is not one of them."""
     holes = holes_of(run.time, run[signal])
-    hidden = hiding(holes, run[signal])
+    hidden = hiding(run.time, run[signal])
     taken_as_constant = [h for h in holes if h not in hidden and ((run.time > h.start_s) & (run.time < h.end_s)).any()]
     notes = []
     if hidden:
         used, h = unbroken(run, signal), max(hidden, key=_length)
-        says = f" and is at {h.after:.3g} rad then, not at {h.before:.3g}: when it moved is not in the log, so that only "
-        part = f"{used.time[0]:.2f} .. {used.time[-1]:.2f} s are used"
+        says = (
+            f" and is at {h.after:.3g} rad then, not at {h.before:.3g}" if h.after != h.before else ", longer than it ever rests"
+        )
+        part = f": when it moved is not in the log, so that only {used.time[0]:.2f} .. {used.time[-1]:.2f} s are used"
         notes.append(_note("fin_unknown", run, signal, hidden, says + part))
     if taken_as_constant:
         notes.append(_note("fin_missing", run, signal, taken_as_constant, ": taken as held"))

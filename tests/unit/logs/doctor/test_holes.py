@@ -27,8 +27,18 @@ def test_a_hole_is_found_with_what_was_before_and_after():
     (hole,) = holes_of(TIME, fin)
     assert (hole.start_s, hole.end_s) == pytest.approx((9.4, 10.7))
     assert (hole.before, hole.after) == (0.2, -0.2)
-    assert hiding([hole], fin) == (hole,)
-    assert hiding(holes_of(TIME, without(switched(10.0), 19.45, 20.65)), fin) == ()
+    assert hiding(TIME, fin) == (hole,)
+    assert hiding(TIME, without(switched(10.0), 19.45, 20.65)) == ()
+
+
+def test_a_clock_that_was_set_under_way_hides_moves_and_a_hole_shorter_than_a_rest_does_not():
+    fin = switched(*range(4, 60, 5))
+    rows = TIME < 35.45
+    late = {gap: Run("log", np.where(rows, TIME, TIME + gap), {"rudder_rad": fin}) for gap in (2.0, 1.7e9)}
+    assert unbroken(late[2.0], "rudder_rad") is late[2.0]
+    assert unbroken(late[1.7e9], "rudder_rad").time[-1] == pytest.approx(35.4)
+    (note,) = hole_notes(late[1.7e9], "rudder_rad")
+    assert "longer than it ever rests: when it moved is not in the log" in note.message
 
 
 def test_a_few_samples_less_are_no_hole():
