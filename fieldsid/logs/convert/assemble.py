@@ -15,7 +15,7 @@ from fieldsid.logs.convert.clock import Track, one_clock, summed
 from fieldsid.logs.convert.conditioning import MAX_GAP_S, in_order, possible, refuse_impossible_steps, refuse_long_gaps
 from fieldsid.logs.convert.faults.copied_fins import without_copied_fins
 from fieldsid.logs.convert.faults.dropouts import SENSED, without_dropouts
-from fieldsid.logs.convert.faults.heading_fills import without_fills
+from fieldsid.logs.convert.faults.heading_fills import without_fills, without_standing_start
 from fieldsid.logs.convert.faults.repeats import measured_anew, note_on_repeats, rows_of, without_repeats
 from fieldsid.logs.convert.frames import SWAPPED_BY_WORLD, about_level, angles_of_quaternion, north_and_east, to_ned_frd
 from fieldsid.logs.convert.heading_unwrap import unwrapped_over
@@ -87,7 +87,8 @@ def _tracks_by_signal(raw: RawLog, mapping: ChannelMap, notes: list[Note], optio
 
 def _without_faults(tracks: dict[str, Track], mapping: ChannelMap, notes: list[Note]) -> dict[str, Track]:
     """Return tracks in which what is no measurement is missing, with continuous angles; append to `notes` what was found."""
-    tracks = dict(tracks)
+    tracks, found = without_standing_start(tracks) if "yaw_rad" in tracks else (dict(tracks), [])
+    notes += found
     for name in [n for n in tracks if n in SENSED]:
         values, repeats = without_repeats(name, tracks[name].values)
         values, dropouts = without_dropouts(name, values)

@@ -9,12 +9,14 @@ continuous heading. This does not hold for a heading that stays near its wrap an
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from fieldsid.logs.convert.clock import Track
 from fieldsid.logs.convert.conditioning import blocks_of
-from fieldsid.logs.convert.faults.dropouts import FEWEST
+from fieldsid.logs.convert.faults.dropouts import FEWEST, SENSED
 from fieldsid.logs.convert.heading_unwrap import FASTEST_RAD_S, MIN_JUMP_RAD, NOISES, noise_of_steps, within_half_turn
 from fieldsid.logs.few_of import FEW, MOSTLY
 from fieldsid.logs.run import Note
@@ -42,6 +44,39 @@ def without_fills(heading: Track) -> tuple[Track, list[Note]]:
             seen = np.flatnonzero(np.isfinite(values))
             notes.append(_note(end, fills.size, values.size))
     return Track(heading.time, values, heading.label), notes
+
+
+def without_standing_start(tracks: Mapping[str, Track]) -> tuple[dict[str, Track], list[Note]]:
+    """Return tracks without the samples before the compass was ready, and the note that says so.
+
+    Until then the heading stands at an end of its range, from which it jumps; other sensors that are exactly zero as long are not
+    ready either.
+    """
+    ready_s = _ready_s(tracks["yaw_rad"])
+    early = {s: t.time < ready_s for s, t in tracks.items() if s in SENSED}
+    out = {s: e for s, e in early.items() if e.any() and (s == "yaw_rad" or not tracks[s].values[e].any())}
+    changed = {s: replace(t, values=np.where(out[s], np.nan, t.values)) for s, t in tracks.items() if s in out}
+    if not changed:
+        return dict(tracks), []
+    number, count = float(tracks["yaw_rad"].values[out["yaw_rad"]][0]), int(out["yaw_rad"].sum())
+    message = (
+        f"{', '.join(out)}: the heading stands at exactly {number:.6g} until {ready_s:.2f} s and jumps then: its compass was not "
+        f"ready before, and the first {count} samples are missing now"
+    )
+    data = {"signal": "yaw_rad", "value": count, "limit": FEWEST, "number": number, "samples": count}
+    return {**tracks, **changed}, [Note("dropouts", message, data)]
+
+
+def _ready_s(heading: Track) -> float:
+    """Return the time in s of the first jump of a heading (n,) that stands at an end of its range until then; else -inf."""
+    seen = np.isfinite(heading.values)
+    time, values = heading.time[seen], heading.values[seen]
+    first = int(np.argmax(values != values[0])) if values.size else 0
+    if first < FEWEST or abs(math.remainder(float(values[0]), 0.5 * math.pi)) > END_RAD:
+        return -math.inf
+    limit = MIN_JUMP_RAD + FASTEST_RAD_S * float(time[first] - time[first - 1])
+    jump = abs(math.remainder(float(values[first] - values[0]), math.tau))
+    return float(time[first]) if jump > limit else -math.inf
 
 
 def _note(end: float, count: int, of: int) -> Note:

@@ -7,7 +7,7 @@ from truth.commanded import Commanded, pulses
 from fieldsid.fitting.fit import fit
 from fieldsid.logs import Run
 from fieldsid.logs.convert.clock import Track
-from fieldsid.logs.convert.faults.heading_fills import without_fills
+from fieldsid.logs.convert.faults.heading_fills import without_fills, without_standing_start
 from fieldsid.logs.convert.heading_unwrap import unwrapped_over
 from fieldsid.logs.load import load_run
 from fieldsid.models.axis import Axis
@@ -82,3 +82,27 @@ def test_what_was_put_in_comes_back_from_a_log_with_fills(tmp_path):
     found = fit([record_of(run, Axis.YAW)], Axis.YAW, method="output_error").model
     assert found.values["a22"] == pytest.approx(1.2, rel=0.03)
     assert found.values["b2"] == pytest.approx(0.9, rel=0.03)
+
+
+def start_at(heading, rate, count=25):
+    """Write exact zeros into the first samples of a heading and its rate, as a driver does before its sensor is ready."""
+    rows = np.arange(TIME.size) < count
+    return {
+        "yaw_rad": Track(TIME, np.where(rows, 0.0, heading), "heading"),
+        "yaw_rate_rad_s": Track(TIME, np.where(rows, 0.0, rate), "gyro"),
+        "rudder_rad": Track(TIME, np.zeros(TIME.size), "rudder"),
+    }
+
+
+def test_the_samples_before_a_compass_is_ready_belong_to_no_run():
+    tracks, (note,) = without_standing_start(start_at(3.5 + TURNING, np.gradient(TURNING, TIME)))
+    assert [int(np.isnan(t.values).sum()) for t in tracks.values()] == [25, 25, 0]
+    assert note.message.startswith("yaw_rad, yaw_rate_rad_s: the heading stands at exactly 0 until 2.50 s and jumps then")
+
+
+def test_a_vehicle_that_starts_straight_to_the_north_keeps_its_start():
+    turned = np.maximum(TIME - 2.5, 0.0) * 0.2
+    tracks = start_at(turned, 0.2 * (TIME >= 2.5))
+    same, notes = without_standing_start(tracks)
+    assert same == tracks
+    assert notes == []
