@@ -44,7 +44,7 @@ def possible(signal: str, values: FloatArray) -> tuple[FloatArray, list[Note]]:
 
 def likely_unit(step_s: float) -> str:
     """Return the hint to set the unit of time in which a median step is plausible; empty where there is no such unit."""
-    return next((f"set its unit, probably `unit: {unit}`" for unit in units_of_step(step_s)), "")
+    return next((f"set its unit, probably `unit: {unit}`" for unit in units_of_step(step_s) if unit != "s"), "")
 
 
 def refuse_impossible_steps(time: FloatArray, label: str) -> None:
