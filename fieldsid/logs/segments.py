@@ -16,6 +16,7 @@ import numpy as np
 
 from fieldsid.errors import DataError, UsageError
 from fieldsid.logs.convert.settling import settling_of
+from fieldsid.logs.few_of import few_of
 from fieldsid.logs.run import MEASURED_FIN, Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
@@ -169,9 +170,10 @@ def _settling_text(answer: Answer | None, fin: float) -> str:
 
 
 def no_fin(run: Run, axis: str, missing: str) -> DataError:
-    """Return the error of a run without a fin for an axis; its hint names the other axis where the run has a fin for that."""
+    """Return the error of a run without a fin for an axis; its hint names the columns not used, and the axis with a fin."""
     other = next(a for a in _FINS if a != axis)
-    hint = f"map `{missing}` on import"
+    unused = [f"`{column}`" for n in run.notes if n.code == "ignored_columns" for column in n.data["columns"]]
+    hint = f"map `{missing}` on import" + (f": not used of the log are {few_of(unused)}" if unused else "")
     if any(run.has(fin) for fin in _FINS[other]):
         hint += f", or take the other axis, for which it has a fin: `--axis {other}`, or a model of {other}"
     return DataError(

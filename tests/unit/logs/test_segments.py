@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldsid.errors import DataError, UsageError
-from fieldsid.logs import Run, segment
+from fieldsid.logs import Run, load_run, segment
 from fieldsid.logs.segments import excited_axis, may_show
 
 TIME = 0.05 * np.arange(1200)
@@ -112,3 +112,11 @@ def test_no_axis_is_guessed(signals, error, found):
     assert ("write `" in str(raised.value.hint)) is (error is UsageError)
     assert ("`yaw`" in str(raised.value.hint)) is ("rudder_rad" in signals)
     assert ("map `rudder_rad`" in str(raised.value.hint)) is ("rudder_rad" not in signals)
+
+
+def test_the_error_of_a_missing_fin_names_the_columns_that_are_not_used(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("time_s,yaw_rad,yaw_rate_rad_s,elevator_rad,servo1\n" + "".join(f"{t},0,0,0,{t}\n" for t in range(9)))
+    with pytest.raises(DataError, match="no fin signal for yaw") as error:
+        segment(load_run(log), "yaw")
+    assert "map `rudder_rad` on import: not used of the log are `servo1`, or take the other axis" in error.value.hint
