@@ -43,8 +43,9 @@ def possible(signal: str, values: FloatArray) -> tuple[FloatArray, list[Note]]:
 
 
 def likely_unit(step_s: float) -> str:
-    """Return the hint to set the unit of time in which a median step is plausible; empty where there is no such unit."""
-    return next((f"set its unit, probably `unit: {unit}`" for unit in units_of_step(step_s) if unit != "s"), "")
+    """Return the hint to set the unit of time in which a median step is plausible; empty where there is none, or in s."""
+    unit = next(iter(units_of_step(step_s)), "s")
+    return "" if unit == "s" else f"set its unit, probably `unit: {unit}`"
 
 
 def refuse_impossible_steps(time: FloatArray, label: str) -> None:

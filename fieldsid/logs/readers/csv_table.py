@@ -16,6 +16,7 @@ import numpy.typing as npt
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.mapping.vocabulary import TIME
+from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import SAMPLED, ReadOptions
 from fieldsid.logs.readers._cells import ERRORS, MISSING, SENTENCE, cells, has_number, is_word
 from fieldsid.logs.readers._columns import Columns, used_by
@@ -43,23 +44,27 @@ def table(path: Path, form: TableForm, options: ReadOptions, mapping: ChannelMap
     with opened(path, form, options) as text:
         written = text.form
         used = range(written.width) if mapping is None else used_by(mapping, written.names, written.width)
+        if mapping is not None:
+            refuse_rows_of_several(path, written, text.text.head().splitlines()[written.start :], used)
         columns = text.columns(used)
         if mapping is not None:
-            _refuse_several(text, columns, mapping, set(used))
+            _refuse_blocks_of_several(path, form, options, columns, mapping)
         sign: Literal[".", ","] = "," if written.decimal == "," else "."
         found = TableForm(written.separator, bool(written.names), written.start, form.encoding, sign)
         return Table(columns, found, tuple(text.notes))
 
 
-def _refuse_several(text: _Table, columns: Columns, mapping: ChannelMap, used: set[int]) -> None:
-    """Raise LogError where the rows are those of several, by the first rows, or by all where the time goes back."""
-    lines = text.text.head().splitlines()[text.form.start :]
-    place = columns.index(mapping.time.places[0], TIME) if mapping.time is not None and mapping.time.places else None
-    refuse_rows_of_several(text.path, text.form, lines, used - {place})
-    if place is not None and goes_back(columns.take(place)).any():
-        every = text.columns(range(text.form.width))
-        whole = [every.take(i) for i in range(every.width)]
-        refuse_rows_of_several(text.path, text.form, lines, {*range(every.width)} - {place}, whole, columns.take(place))
+def _refuse_blocks_of_several(path: Path, form: TableForm, options: ReadOptions, columns: Columns, mapping: ChannelMap) -> None:
+    """Raise LogError where the rows are those of several one after the other, by all columns, where the time goes back."""
+    source = mapping.time
+    place = None if source is None or source.column is None or source.date else columns.index(source.column, TIME)
+    if place is None or not goes_back(columns.take(place)).any():
+        return
+    with opened(path, form, options) as text:
+        lines, every = text.text.head().splitlines()[text.form.start :], text.columns(range(columns.width))
+    known = {i for i, name in enumerate(every.names) if (meaning := meaning_of(name)) is not None and meaning[0] != TIME}
+    whole = [every.take(i) for i in range(every.width)]
+    refuse_rows_of_several(path, text.form, lines, known, whole, columns.take(place))
 
 
 def names_of(path: Path) -> tuple[str, ...]:
