@@ -69,8 +69,10 @@ def _topics(path: Path, options: ReadOptions, wanted: frozenset[str]) -> Topics:
         if places is None:
             raise LogError(f"`{path}` is no table of keys and values", found=", ".join(table.form.names), hint="name its columns")
         lines = table.text.head().splitlines()[table.form.start :]
-        for key in {row[places[1]] for line in lines if len(row := cells(line, table.form.separator)) == table.form.width}:
-            of_key = [line for line in lines if key in cells(line, table.form.separator)]
+        lines_of: dict[str, list[str]] = {}
+        for line in (line for line in lines if len(cells(line, table.form.separator)) == table.form.width):
+            lines_of.setdefault(cells(line, table.form.separator)[places[1]], []).append(line)
+        for of_key in lines_of.values():
             refuse_rows_of_several(path, table.form, of_key, (places[2],))
         columns = table.columns(places)
         time, notes = _times(columns, places[0])
