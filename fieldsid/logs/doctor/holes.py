@@ -61,17 +61,24 @@ def holes_of(time: FloatArray, fin: FloatArray) -> tuple[Hole, ...]:
 
 def hiding(time: FloatArray, fin: FloatArray) -> tuple[Hole, ...]:
     """Return the holes of a fin (n,) rad after which it is at another angle, or that last longer than it ever rests."""
-    least = MOVED * float(np.nanmax(fin) - np.nanmin(fin))
-    rest = _longest_rest(time, fin, least)
-    return tuple(h for h in holes_of(time, fin) if abs(h.after - h.before) > least or _length(h) > rest)
+    rest = _longest_rest(time, fin)
+    return tuple(h for h in holes_of(time, fin) if _has_moved(h, fin) or _length(h) > rest)
 
 
-def _longest_rest(time: FloatArray, fin: FloatArray, least: float) -> float:
-    """Return the longest logged time in s between two steps of a fin (n,) by more than `least` rad, without its holes."""
+def _has_moved(hole: Hole, fin: FloatArray) -> bool:
+    return abs(hole.after - hole.before) > _least_move(fin)
+
+
+def _least_move(fin: FloatArray) -> float:
+    return MOVED * float(np.nanmax(fin) - np.nanmin(fin))
+
+
+def _longest_rest(time: FloatArray, fin: FloatArray) -> float:
+    """Return the longest logged time in s between two moves of a fin (n,) from sample to sample, without its holes."""
     seen = np.isfinite(fin)
     steps = np.diff(time[seen], prepend=time[seen][0])
     logged = np.cumsum(np.where(steps > FEW_STEPS * np.median(steps), 0.0, steps))
-    moved = np.flatnonzero(np.abs(np.diff(fin[seen])) > least)
+    moved = np.flatnonzero(np.abs(np.diff(fin[seen])) > _least_move(fin))
     return float(np.max(np.diff(logged[[0, *moved, -1]])))
 
 
@@ -95,9 +102,8 @@ def hole_notes(run: Run, signal: str) -> tuple[Note, ...]:
     notes = []
     if hidden:
         used, h = unbroken(run, signal), max(hidden, key=_length)
-        says = (
-            f" and is at {h.after:.3g} rad then, not at {h.before:.3g}" if h.after != h.before else ", longer than it ever rests"
-        )
+        moved = _has_moved(h, run[signal])
+        says = f" and is at {h.after:.3g} rad then, not at {h.before:.3g}" if moved else ", longer than it ever rests"
         part = f": when it moved is not in the log, so that only {used.time[0]:.2f} .. {used.time[-1]:.2f} s are used"
         notes.append(_note("fin_unknown", run, signal, hidden, says + part))
     if taken_as_constant:
