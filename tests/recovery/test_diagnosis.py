@@ -16,6 +16,7 @@ from truth.physics import Physics
 
 from fieldsid.diagnosis import Diagnosis, diagnose
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
+from fieldsid.diagnosis.search.accepted_sets import core_of
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.effects import all_effects
 from fieldsid.logs.run import Run
@@ -90,9 +91,9 @@ def test_an_effect_that_the_others_have_made_idle_is_left_out() -> None:
     catalogue, _ = applicable_effects(all_effects(axis).values(), [*training, *unseen])
     work = Search(training, unseen, axis, catalogue)
     found = work.best()
-    longer = work.forward_step(found)[0]
+    longer = work.grow(found, forced=True)[0]
     assert len(longer.names) == len(found.names) + 1 == 3
-    assert work.core_of(longer) == frozenset(found.names)
+    assert core_of(longer, work.tried, work.floor) == frozenset(found.names)
 
 
 @pytest.mark.slow  # the normal suite has a catalogue without the cause in tests/unit/diagnosis/search/test_budget.py

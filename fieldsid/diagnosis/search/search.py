@@ -1,10 +1,11 @@
 """The search over sets of effects: a best-first queue over one archive, from the bare model and from the whole hull.
 
-A model taken from the queue is expanded: each effect of the catalogue is added to it; the most evident model is then fitted
-without each of its effects, from its free run, under other laws of speed and trim, and with other variants of its effects. The
-search starts from below, at the bare model, and from above, at the whole hull: first together with the effects that were found
-from below and, where that leaves a visible error, without them. Both starts lead to the same sets of effects, and the better
-optimum of each set is kept. At the end the set found is fitted without each of its effects, until all are needed.
+The most evident model is expanded until it has been or leaves nothing above the noise: each effect of the catalogue is added to
+it; what is then most evident is fitted without each of its effects, from its free run, under other laws of speed and trim, and
+with other variants of its effects. The search starts from below, at the bare model, and from above, at the whole hull: first
+together with the effects that were found from below and, where that leaves a visible error, without them. All starts lead to the
+same sets of effects, and the better optimum of each set is kept. At the end the set found is fitted without each of its effects,
+until all are needed.
 
 Where one effect alone comes near the noise, the queue takes one more step from below before the whole hull is fitted. Otherwise a
 servo lag, which gains much evidence and lowers the error little, would hide that effect, and the free cross state of the hull
@@ -42,11 +43,11 @@ from fieldsid.diagnosis.moves.speed_law_search import (
 )
 from fieldsid.diagnosis.moves.variant_search import VariantRequest, try_variants
 from fieldsid.diagnosis.parallel_map import ParallelMap
-from fieldsid.diagnosis.search.accepted_sets import AcceptedSets, core_of
+from fieldsid.diagnosis.search.accepted_sets import AcceptedSets
 from fieldsid.diagnosis.search.budget import Budget
 from fieldsid.diagnosis.search.given_model import refitted_from
 from fieldsid.diagnosis.search.whole_hull import whole_hull, whole_hull_error
-from fieldsid.diagnosis.thresholds import MAX_ERROR_RATIO, MIN_EXPLAINED_SHARE, MISSING_ERROR_RATIO, SUFFICIENT_ERROR_RATIO
+from fieldsid.diagnosis.thresholds import MIN_EXPLAINED_SHARE, MISSING_ERROR_RATIO, SUFFICIENT_ERROR_RATIO
 from fieldsid.fitting.covariance.noise_selection import residuals_of
 from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
 from fieldsid.fitting.predict.speed_correction import error_of_speed
@@ -158,17 +159,9 @@ class Search:
         return self.tried.children(key)
 
     def _next_to_expand(self) -> ScoredModel | None:
-        """Return the next model to expand; None where all are expanded or at the noise, or the budget is used up.
-
-        The order is: the model with the highest log evidence; then models of accepted effects whose error is clearly lower, since
-        such a model may have less evidence only because it lacks a small effect.
-        """
-        if not self.may_go_on():
-            return None
+        """Return the model of the highest log evidence; None where it was expanded, is at the noise, or no budget is left."""
         best = self.tried.most_evident()
-        least = MAX_ERROR_RATIO * best.selection_errors.mean
-        front = [h for h in self.tried.ranked() if h.selection_errors.mean < least and self.admissible(h)]
-        return next((h for h in (best, *front) if self._is_expandable(h)), None)
+        return best if self.may_go_on() and self._is_expandable(best) else None
 
     def _is_expandable(self, h: ScoredModel) -> bool:
         """Whether a model has not been expanded, does not diverge, and leaves an error above the noise floor.
@@ -286,10 +279,6 @@ class Search:
         if known is None or len(at) != len(known[0]) or any(a is not b for a, b in zip(at, known[0], strict=True)):
             known = self._accepted = at, AcceptedSets.of(self.tried, self.floor)
         return known[1]
-
-    def admissible(self, h: ScoredModel) -> bool:
-        """Whether every effect of a model is accepted."""
-        return core_of(h, self.tried, self.floor) == frozenset(h.names)
 
     def best_admissible(self) -> ScoredModel:
         """Return the model of the accepted set with the highest log evidence."""

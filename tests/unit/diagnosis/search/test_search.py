@@ -16,6 +16,7 @@ from fieldsid.diagnosis.moves.add_effect import Addition, mechanisms, screen_add
 from fieldsid.diagnosis.moves.drop_effect import drop_each
 from fieldsid.diagnosis.moves.grow import Growth
 from fieldsid.diagnosis.moves.refit import with_events_of_parts
+from fieldsid.diagnosis.search.accepted_sets import core_of
 from fieldsid.diagnosis.search.search import MAX_CANDIDATES, Search
 from fieldsid.diagnosis.search.whole_hull import ADDED, whole_hull
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, EVIDENCE_TEMPERATURE
@@ -65,7 +66,7 @@ def test_it_finds_the_hidden_lag_and_nothing_besides(ended):
     made, found = ended
     assert set(found.names) & {"servo_lag", "delay"}
     assert len(found.names) == 1
-    assert made.admissible(found)
+    assert core_of(found, made.tried, made.floor) == frozenset(found.names)
 
 
 def test_what_is_found_was_fitted_without_each_of_its_effects(ended):
