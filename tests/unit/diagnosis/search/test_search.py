@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import combinations, pairwise
+from types import SimpleNamespace
 
 import hidden_lag
 import numpy as np
@@ -13,9 +14,11 @@ from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN
 from fieldsid.diagnosis.evidence.scored_model import score_model
 from fieldsid.diagnosis.moves.add_effect import Addition, mechanisms, screen_addition
+from fieldsid.diagnosis.moves.archive import Archive
 from fieldsid.diagnosis.moves.drop_effect import drop_each
 from fieldsid.diagnosis.moves.grow import Growth
 from fieldsid.diagnosis.moves.refit import with_events_of_parts
+from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.search.accepted_sets import core_of
 from fieldsid.diagnosis.search.search import MAX_CANDIDATES, Search
 from fieldsid.diagnosis.search.whole_hull import ADDED, whole_hull
@@ -24,6 +27,7 @@ from fieldsid.effects import all_effects
 from fieldsid.fitting.initial.effect_screen import carry_parameters
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
 from fieldsid.models.axis import Axis
+from fieldsid.models.model import Noise
 from fieldsid.models.record import record_of
 
 LAG = frozenset({"servo_lag"})
@@ -189,6 +193,37 @@ def test_a_model_without_one_of_its_effects_is_fitted_once():
     assert drop_each(both, made.tried, made.grounds)
     assert not drop_each(both, made.tried, made.grounds)
     assert made.tried[LAG].log_likelihood > lag.log_likelihood - 0.5
+
+
+def test_an_effect_proven_beside_a_small_one_stays_when_that_is_left_out():
+    def model(names, *, error, evidence):
+        errors = Errors(0.004 * error, 0.002 * error)
+        return SimpleNamespace(
+            names=names,
+            effects=tuple(YAW[n] for n in names),
+            log_evidence=evidence,
+            log_likelihood=evidence,
+            validation_log_density=np.zeros(1),
+            selection_errors=errors,
+            train=errors,
+            own_moment=0.0,
+            train_under=lambda _std: errors,
+            unseen_under=lambda _std: (errors,),
+            likelihood_fit=SimpleNamespace(noise_kind="disturbance"),
+        )
+
+    both, whole = ("stall", "current"), ("stall", "current", "delay")
+    models = [
+        model((), error=1.1, evidence=0.0),
+        model(both[:1], error=2.0, evidence=60.0),
+        model(both, error=1.1, evidence=55.0),
+        model(("current",), error=3.0, evidence=9.0),
+        model(whole, error=1.05, evidence=120.0),
+        model(whole[::2], error=1.4, evidence=100.0),
+        model(whole[1:], error=2.0, evidence=90.0),
+    ]
+    tried = Archive(frozenset(), {frozenset(h.names): h for h in models})
+    assert core_of(models[4], tried, Noise(0.004, 0.002)) == frozenset(both)
 
 
 def test_what_does_without_the_textbooks_numbers_is_screened_beside_it():
